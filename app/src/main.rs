@@ -11,16 +11,16 @@ fn main() -> ExitCode {
 
 #[cfg(feature = "window")]
 mod window {
-    use palpate_analysis::opening::{PlaybackRequest, Windows, WorkbenchRequest};
+    use palpate_analysis::window_requests::{PlaybackRequest, WindowOpener, WorkbenchRequest};
     use palpate_window::playback::run_playback;
     use palpate_window::window::{WindowOptions, run_window};
 
-    /// Windows on this computer's screen.
+    /// WindowOpener on this computer's screen.
     pub struct Desktop;
 
-    impl Windows for Desktop {
+    impl WindowOpener for Desktop {
         fn workbench(&self, request: WorkbenchRequest) -> Result<(), String> {
-            run_window(WindowOptions::remembered(request))
+            run_window(WindowOptions::from_request(request))
         }
 
         fn playback(&self, request: PlaybackRequest) -> Result<(), String> {

@@ -1,6 +1,6 @@
 //! A load cell on a link of its own: what every such device provides, whatever its protocol.
 
-use crate::text::{DeviceError, Lines, Taken};
+use crate::text::{DeviceError, Lines, ReceivedLine};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::{AdcDescription, RawBytes};
@@ -56,7 +56,7 @@ pub struct OpenedCell {
     /// Bytes exchanged, by the host's clock.
     pub raw: Vec<RawBytes>,
     /// Written when the link is closed, so that the device falls silent; may be empty.
-    pub farewell: Vec<u8>,
+    pub closing_bytes: Vec<u8>,
 }
 
 /// A load cell beside an axis, as its rig file describes it.
@@ -72,7 +72,7 @@ pub trait CellDevice: Debug + Send + Sync {
 
 /// A load cell that sends values by itself, in progress. It must neither wait nor read a clock.
 pub trait CellDialogue: Send {
-    fn received(&mut self, now: Nanos, bytes: &[u8]);
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]);
 
     /// The oldest value not taken yet.
     fn take_sample(&mut self) -> Option<CellSample>;
@@ -158,12 +158,14 @@ impl<P: CellProtocol> LineCell<P> {
 }
 
 impl<P: CellProtocol> CellDialogue for LineCell<P> {
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
         for byte in bytes {
             let is_garbled = match self.lines.take(*byte) {
                 None => false,
-                Some(Taken::Garbled) => true,
-                Some(Taken::Line(line)) => !self.protocol.take(now, &line, &mut self.reports),
+                Some(ReceivedLine::Garbled) => true,
+                Some(ReceivedLine::Line(line)) => {
+                    !self.protocol.take(now, &line, &mut self.reports)
+                }
             };
             self.garbled += u64::from(is_garbled);
         }

@@ -22,7 +22,7 @@ const BYTES_MAX: usize = 4096;
 const SHOWN_MAX: usize = 80;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum DetectedDevice {
     /// A device that palpate drives: its word in a rig file, its introduction, and its own words.
     Device(&'static str, &'static str, String),
     /// A device that palpate does not know, by its answer.
@@ -30,7 +30,7 @@ pub enum Found {
     Silent,
 }
 
-impl Found {
+impl DetectedDevice {
     fn from_kind(kind: &'static DeviceKind, text: &str) -> Self {
         let text = text.chars().take(SHOWN_MAX).collect();
         Self::Device(kind.word, kind.introduction, text)
@@ -45,7 +45,7 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for DetectedDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(_, introduction, text) => write!(f, "{introduction}{text}"),
@@ -57,7 +57,7 @@ impl fmt::Display for Found {
 
 /// Listens, asks, and identifies the device. Nothing moves: what is written is `?`, an end of line, and after an
 /// answer like a Galil controller's `^R^V`.
-pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
+pub fn detect_device(link: &mut dyn Link, clock: &HostClock) -> io::Result<DetectedDevice> {
     let mut received = Vec::new();
     receive(link, clock, LISTEN, &mut received, |received| recognise(received).is_some())?;
     if let Some(found) = recognise(&received) {
@@ -82,10 +82,14 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
                 Ok(board) => board.revision,
                 Err(err) => format!("{revision}: {err}"),
             };
-            return Ok(Found::Device(galil::KIND.word, galil::KIND.introduction, text));
+            return Ok(DetectedDevice::Device(galil::KIND.word, galil::KIND.introduction, text));
         }
     }
-    Ok(if received.is_empty() { Found::Silent } else { Found::Unknown(printable_text(&received)) })
+    Ok(if received.is_empty() {
+        DetectedDevice::Silent
+    } else {
+        DetectedDevice::Unknown(printable_text(&received))
+    })
 }
 
 /// Collects what comes in a time, until it is enough.
@@ -106,11 +110,11 @@ fn receive(
 }
 
 /// A device that is recognised by its whole lines; a line without its end may be half a line.
-fn recognise(received: &[u8]) -> Option<Found> {
+fn recognise(received: &[u8]) -> Option<DetectedDevice> {
     let end = received.iter().rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
     let text = String::from_utf8_lossy(&received[..end]);
     let (kind, text) = DeviceKind::recognise_lines(&split_lines(&text))?;
-    Some(Found::from_kind(kind, text))
+    Some(DetectedDevice::from_kind(kind, text))
 }
 
 /// The beginning of what was received, without control characters and bytes that are no text.

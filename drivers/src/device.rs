@@ -29,7 +29,7 @@ pub enum OpenError {
     Thread(String),
 }
 
-pub struct Opened {
+pub struct OpenedDevices {
     pub description: RigDescription,
     /// Newtons per volt, where the load cell itself is calibrated.
     pub newtons_per_volt: Option<f64>,
@@ -44,7 +44,7 @@ pub struct Opened {
 pub trait RigDevice: Send {
     /// Opens the links, checks and sets up what is behind them, and lets it send samples. Nothing moves. All lines of
     /// an earlier call are closed.
-    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError>;
+    fn open(&mut self, clock: &HostClock) -> Result<OpenedDevices, OpenError>;
 
     /// Fills in what no single link knows. `now` is on the host's clock.
     fn complete(&mut self, _now: Nanos, body: RigEventBody) -> RigEventBody {
@@ -93,7 +93,7 @@ impl CallerTime {
 pub struct DeviceRig<D> {
     device: D,
     /// Without links while it is being connected again, and after that has failed.
-    opened: Opened,
+    opened: OpenedDevices,
     /// An event of each link that waits for earlier ones of others.
     pending: Vec<Option<RigEvent>>,
     clock: HostClock,

@@ -23,12 +23,12 @@ pub struct DeviceKind {
     pub title: &'static str,
     /// Introduction of its own words where ports are listed.
     pub introduction: &'static str,
-    pub role: Role,
+    pub role: DeviceRole,
     /// The line that gives it away among whole lines that were heard, if one does.
     pub recognise: for<'a> fn(&[&'a str]) -> Option<&'a str>,
 }
 
-pub enum Role {
+pub enum DeviceRole {
     /// It moves the probe: its keys are those of the rig file itself. The first parameter is the rig's name.
     Axis(fn(String, &mut Fields) -> Option<RigFile>),
     /// A load cell beside an axis: its keys are in the table `[cell]`, but for those that say where it is.

@@ -16,13 +16,13 @@ pub mod grbl;
 pub mod hx711;
 pub mod mark10;
 pub mod open;
-pub mod parts;
 pub mod plain_numbers;
 pub mod priority;
 pub mod rig;
 pub mod rig_file;
 pub mod serial;
 pub mod sim;
+pub mod split_rig;
 pub mod text;
 pub mod wire;
 

@@ -8,7 +8,7 @@
 
 use crate::board_clock::{BoardClock, BoardTime};
 use crate::cell::{CellDescription, CellDevice, CellProtocol, CellReports, LineCell, silence_max};
-use crate::devices::{DeviceKind, LineEmulation, Role, split_lines};
+use crate::devices::{DeviceKind, DeviceRole, LineEmulation, split_lines};
 use crate::mark10::protocol::ForceUnit;
 use crate::rig_file::Fields;
 use crate::text::{DeviceError, FixedDecimal, OpenedCell, TextConsole};
@@ -22,7 +22,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "plain-numbers",
     title: "a device that sends plain numbers",
     introduction: "something that sends plain numbers, such as a load cell: ",
-    role: Role::Cell {
+    role: DeviceRole::Cell {
         read: |fields| Some(Arc::new(PlainNumbers::read(fields)?)),
         emulation: Some(LineEmulation {
             rate: 80.0,
@@ -91,7 +91,7 @@ pub struct PlainNumbers {
 impl PlainNumbers {
     pub fn read(fields: &mut Fields) -> Option<Self> {
         let unit = fields.choice("cell.unit", &UNITS, None);
-        let full_scale = fields.needed("cell.full_scale", 1e-6, 1e8);
+        let full_scale = fields.required_number("cell.full_scale", 1e-6, 1e8);
         let volts = fields.number("cell.full_scale_v", 1e-3, 1000.0).map(Volts);
         let noise = fields.number("cell.noise", 1e-9, 1e8);
         let directions = [("compression", false), ("tension", true)];
@@ -269,7 +269,7 @@ impl CellDevice for PlainNumbers {
             description,
             dialogue: Box::new(LineCell::start(numbers, console.now())),
             raw: console.into_raw(),
-            farewell: Vec::new(),
+            closing_bytes: Vec::new(),
         })
     }
 }

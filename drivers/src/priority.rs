@@ -10,13 +10,13 @@ use thread_priority::{
 const WANTED: u8 = 30;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Granted {
+pub enum GrantedPriority {
     /// Real time, first in first out, with this priority: nothing ordinary comes between.
     RealTime(u8),
     Ordinary(String),
 }
 
-impl fmt::Display for Granted {
+impl fmt::Display for GrantedPriority {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::RealTime(priority) => write!(f, "real time, priority {priority}"),
@@ -30,7 +30,7 @@ impl fmt::Display for Granted {
 
 /// Asks for real time for the thread that calls.
 #[must_use]
-pub fn ask() -> Granted {
+pub fn request_real_time() -> GrantedPriority {
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let granted = ThreadPriorityValue::try_from(WANTED).and_then(|value| {
         let priority = ThreadPriority::Crossplatform(value);
@@ -38,7 +38,7 @@ pub fn ask() -> Granted {
             .map_err(|err| err.to_string())
     });
     match granted {
-        Ok(()) => Granted::RealTime(WANTED),
-        Err(reason) => Granted::Ordinary(reason),
+        Ok(()) => GrantedPriority::RealTime(WANTED),
+        Err(reason) => GrantedPriority::Ordinary(reason),
     }
 }

@@ -56,7 +56,7 @@ pub enum RigError {
     #[error(transparent)]
     RigFile(#[from] RigFileError),
     #[error("this rig cannot be connected again; close it and open it again")]
-    NotAgain,
+    CannotReconnect,
     #[error("rig {file}: {error}")]
     Device { file: String, error: OpenError },
 }
@@ -80,7 +80,7 @@ pub trait Rig: Send {
     /// devices at the same addresses, checked and set up as at first, the axis stopped. Nothing moves; the axis must be
     /// homed again. It may wait for seconds. Callers have asked the operator.
     fn reconnect(&mut self) -> Result<(), RigError> {
-        Err(RigError::NotAgain)
+        Err(RigError::CannotReconnect)
     }
 
     /// The link as it was measured when it was opened, in words for the operator: latency, jitter, and how samples are
@@ -94,7 +94,7 @@ pub trait Rig: Send {
 
     /// A person has done something at the rig, as an instruction asked. A real rig has nothing to do then; a simulated
     /// rig does it now.
-    fn by_hand(&mut self, _action: HandAction) {}
+    fn apply_hand_action(&mut self, _action: HandAction) {}
 
     /// The bytes exchanged with devices since the last call, in order, at the caller's time. A rig without
     /// wires has none. Must not wait.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// One parameter of a fitted model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Parameter {
+pub struct FittedParameter {
     pub name: String,
     pub value: f64,
     /// The unit of value, error and interval.
@@ -38,7 +38,7 @@ pub struct Identifiability {
 pub struct LiveEstimate {
     /// The five of the body, then `f0` and `f_offset`. Without a standard error a parameter is not
     /// identified yet.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<FittedParameter>,
     /// Weighted root mean square residual in N.
     #[serde(alias = "rmse_n")]
     pub rmse_weighted_n: f64,
@@ -51,7 +51,7 @@ pub struct LiveEstimate {
 
 impl LiveEstimate {
     /// A parameter by name, if the record so far identifies it.
-    pub fn identified(&self, name: &str) -> Option<&Parameter> {
+    pub fn identified_parameter(&self, name: &str) -> Option<&FittedParameter> {
         let is_refused =
             self.verdicts.iter().any(|verdict| verdict.parameter == name && !verdict.is_identified);
         self.parameters

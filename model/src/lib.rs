@@ -9,12 +9,12 @@
 //! Start reading at [`units`], then [`rig`] for the words every crate shares.
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
-pub mod about;
 pub mod calibration;
-pub mod contained;
 pub mod estimate;
 pub mod linalg;
+pub mod metadata;
 mod named;
+pub mod panics;
 pub mod quantity;
 pub mod random;
 pub mod rig;

@@ -11,6 +11,6 @@ pub mod file;
 pub mod plans;
 pub mod preview;
 mod steps;
-pub mod weighed;
+pub mod weight_readings;
 
 pub use steps::{MeterSample, StepMeter, StepTarget};

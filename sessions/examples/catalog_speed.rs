@@ -6,10 +6,10 @@
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::Duration;
-use palpate_model::about::Labels;
-use palpate_sessions::catalog::{Catalog, Condition, Query};
+use palpate_model::metadata::SessionLabels;
+use palpate_sessions::catalog::{Catalog, CatalogQuery, Condition};
 use palpate_sessions::{
-    Change, Edit, EndRecord, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
+    DataQuality, Edit, EditChange, EndRecord, LogWriter, Manifest, Session, Sink, add_edit,
 };
 use std::error::Error;
 use std::fs;
@@ -49,10 +49,10 @@ fn timed<T>(what: &str, body: impl FnOnce() -> T) -> T {
 
 fn manifest_of(original: &Manifest, number: usize) -> Outcome<Manifest> {
     let operators = ["Ada", "Grace", "Mary", "Emmy"];
-    let mut labels = Labels::default();
+    let mut labels = SessionLabels::default();
     let thickness = 5.0 + (number % 100) as f64 / 10.0;
-    labels.tell("specimen.thickness_mm", &thickness.to_string())?;
-    labels.tell("specimen.source", "pig stomach, fundus")?;
+    labels.set("specimen.thickness_mm", &thickness.to_string())?;
+    labels.set("specimen.source", "pig stomach, fundus")?;
     let mut plan = original.plan.clone();
     plan["source"]["values"]["depth"] = format!("{} mm", number % 30).into();
     Ok(Manifest {
@@ -87,8 +87,9 @@ fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
         at: manifest.started_at,
         by: "palpate".into(),
         reason: "finished, no sample missing".into(),
-        change: Change::Verdict {
-            verdict: [Verdict::Valid, Verdict::Suspect][usize::from(number.is_multiple_of(9))],
+        change: EditChange::Verdict {
+            verdict: [DataQuality::Valid, DataQuality::Suspect]
+                [usize::from(number.is_multiple_of(9))],
         },
     };
     Ok(add_edit(&folder, &manifest.session_id, &edit)?)
@@ -110,18 +111,18 @@ fn main() -> Outcome<()> {
     let changes = timed("brought up to date, nothing new", || catalog.update(&mut |_, _| {}))?;
     println!("  {} sessions read", changes.read);
     let text = |text: &str| text.to_owned();
-    let page = Query { limit: Some(20), ..Query::default() };
+    let page = CatalogQuery { limit: Some(20), ..CatalogQuery::default() };
     for (what, query) in [
         ("the latest", page.clone()),
-        ("a specimen", Query { specimen: Some(text("stomach 77")), ..page.clone() }),
-        ("words", Query { words: text("pig fund ada"), ..page.clone() }),
+        ("a specimen", CatalogQuery { specimen: Some(text("stomach 77")), ..page.clone() }),
+        ("words", CatalogQuery { words: text("pig fund ada"), ..page.clone() }),
         (
             "one value",
-            Query { conditions: vec!["depth>=28mm".parse::<Condition>()?], ..page.clone() },
+            CatalogQuery { conditions: vec!["depth>=28mm".parse::<Condition>()?], ..page.clone() },
         ),
         (
             "words, operator and two values",
-            Query {
+            CatalogQuery {
                 words: text("stomach"),
                 operator: Some(text("Grace")),
                 conditions: vec!["depth>=10mm".parse()?, "specimen.thickness_mm<8".parse()?],

@@ -7,19 +7,19 @@ use chrono::{TimeZone, Utc};
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    EndRecord, Manifest, Pace, RECORD_VERSION, Row, Session, SessionFolder, SessionWriter, Summary,
-    new_session_id,
+    EndRecord, Manifest, RECORD_VERSION, RecordingPace, SampleRow, Session, SessionFolder,
+    SessionSummary, SessionWriter, new_session_id,
 };
 use std::time::Instant;
 
 /// A sample as of the simulated rig at 20 kHz, with noise in every digit of the signal.
-fn row(index: u64, random: &mut u64) -> Row {
+fn row(index: u64, random: &mut u64) -> SampleRow {
     *random =
         random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let noise = (*random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
     let depth = 0.015 * (index / 500 % 500) as f64;
     let volts = 0.5 + 0.1 * depth + 1e-3 * noise;
-    Row {
+    SampleRow {
         tick: index,
         host: Nanos(index * 50_000),
         volts: Some(volts),
@@ -28,7 +28,7 @@ fn row(index: u64, random: &mut u64) -> Row {
         depth: Some(depth),
         phase: Phase::Hold,
         cycle: 1,
-        ..Row::default()
+        ..SampleRow::default()
     }
 }
 
@@ -84,8 +84,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = std::path::Path::new(&folder).join(&manifest.session_id);
     let mut random = 1;
     timed("write", samples, || -> Result<(), Box<dyn std::error::Error>> {
-        let mut writer =
-            SessionWriter::start(SessionFolder::create(&path)?, None, &manifest, Pace::Virtual)?;
+        let mut writer = SessionWriter::start(
+            SessionFolder::create(&path)?,
+            None,
+            &manifest,
+            RecordingPace::Virtual,
+        )?;
         for index in 0..samples {
             writer.push_row(row(index, &mut random))?;
         }
@@ -103,7 +107,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("{:.2} bytes a sample", bytes as f64 / samples as f64);
     for _ in 0..3 {
-        let summary = timed("summary", samples, || Summary::read(&path))?;
+        let summary = timed("summary", samples, || SessionSummary::read(&path))?;
         assert_eq!(summary.samples, samples);
         let mut sum = 0.0;
         let outline = timed("scan of all channels", samples, || {

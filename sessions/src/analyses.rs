@@ -24,7 +24,7 @@ const NAME_MAX: usize = 80;
 
 /// One input of an analysis.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Input {
+pub struct AnalysisInput {
     /// A file of the session, or `calibration` or `analysis NAME`.
     pub what: String,
     /// Hash of the file's bytes, or of a document's compact JSON with its keys in alphabetical order.
@@ -33,7 +33,7 @@ pub struct Input {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "analysis", rename_all = "lowercase")]
-pub enum Analysed {
+pub enum AnalysisContent {
     Fit {
         /// Name of the analysis whose forces were fitted, if any.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -53,7 +53,7 @@ pub enum Analysed {
     Withdrawal,
 }
 
-impl Analysed {
+impl AnalysisContent {
     pub const fn word(&self) -> &'static str {
         match self {
             Self::Fit { .. } => "fit",
@@ -75,9 +75,9 @@ pub struct Analysis {
     pub software_version: String,
     /// Version of the decision rules in that program.
     pub engine_version: u32,
-    pub inputs: Vec<Input>,
+    pub inputs: Vec<AnalysisInput>,
     #[serde(flatten)]
-    pub what: Analysed,
+    pub what: AnalysisContent,
 }
 
 #[derive(Debug, Error)]
@@ -141,27 +141,27 @@ impl Analyses {
     }
 
     /// The file itself as an input; `None` without any record.
-    pub fn input(&self) -> Option<Input> {
+    pub fn input(&self) -> Option<AnalysisInput> {
         (!self.all.is_empty())
-            .then(|| Input { what: ANALYSES_FILE.to_owned(), sha256: self.sha256.clone() })
+            .then(|| AnalysisInput { what: ANALYSES_FILE.to_owned(), sha256: self.sha256.clone() })
     }
 
     pub fn withdrawal(&self, name: &str) -> Option<&Analysis> {
-        let is_it = |one: &&Analysis| one.name == name && one.what == Analysed::Withdrawal;
+        let is_it = |one: &&Analysis| one.name == name && one.what == AnalysisContent::Withdrawal;
         self.all.iter().find(is_it)
     }
 
     /// Analyses that are not withdrawn, in the order of writing.
-    pub fn counting(&self) -> impl Iterator<Item = &Analysis> {
+    pub fn active(&self) -> impl Iterator<Item = &Analysis> {
         let is_open = |one: &&Analysis| {
-            one.what != Analysed::Withdrawal && self.withdrawal(&one.name).is_none()
+            one.what != AnalysisContent::Withdrawal && self.withdrawal(&one.name).is_none()
         };
         self.all.iter().filter(is_open)
     }
 
     /// The analysis of this name that is not withdrawn.
     pub fn get(&self, name: &str) -> Result<&Analysis, AnalysisError> {
-        self.counting().find(|one| one.name == name).ok_or_else(|| AnalysisError::None {
+        self.active().find(|one| one.name == name).ok_or_else(|| AnalysisError::None {
             name: name.to_owned(),
             known: match self.withdrawal(name) {
                 Some(by) => format!(" any more, {} withdrew it: {}", by.by, by.reason),
@@ -173,7 +173,7 @@ impl Analyses {
 }
 
 /// Hashes of the files that every analysis reads: the log and the edits.
-pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
+pub fn read_session_inputs(session: &Path) -> Result<Vec<AnalysisInput>, AnalysisError> {
     let mut files = find_files(session)?;
     let edits = match session.is_dir() {
         true => session.join(EDITS_FILE),
@@ -181,7 +181,7 @@ pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
     };
     files.extend(edits.is_file().then_some(edits));
     let input = |path: PathBuf| match sha256_of_file(&path) {
-        Ok(sha256) => Ok(Input {
+        Ok(sha256) => Ok(AnalysisInput {
             what: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             sha256,
         }),
@@ -191,18 +191,19 @@ pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
 }
 
 #[must_use]
-pub fn document_input(what: &str, document: &Value) -> Input {
-    Input { what: what.to_owned(), sha256: sha256(document.to_string().as_bytes()) }
+pub fn document_input(what: &str, document: &Value) -> AnalysisInput {
+    AnalysisInput { what: what.to_owned(), sha256: sha256(document.to_string().as_bytes()) }
 }
 
-/// Names of the input files that differ from `now`, which comes from [`inputs_of`]; documents are not compared.
+/// Names of the input files that differ from `now`, which comes from [`read_session_inputs`]; documents are not compared.
 #[must_use]
-pub fn changed_inputs(analysis: &Analysis, now: &[Input]) -> Vec<String> {
-    let of = |inputs: &[Input], what: &str| {
+pub fn changed_inputs(analysis: &Analysis, now: &[AnalysisInput]) -> Vec<String> {
+    let of = |inputs: &[AnalysisInput], what: &str| {
         let found = inputs.iter().find(|one| one.what == what);
         found.map(|one| one.sha256.clone())
     };
-    let is_file = |one: &&Input| one.what == EDITS_FILE || segment_number(&one.what).is_some();
+    let is_file =
+        |one: &&AnalysisInput| one.what == EDITS_FILE || segment_number(&one.what).is_some();
     let mut names: Vec<&str> =
         analysis.inputs.iter().filter(is_file).chain(now).map(|one| one.what.as_str()).collect();
     names.sort_unstable();
@@ -227,7 +228,7 @@ pub fn add_analysis(
     }
     let _lock = HolderLock::acquire_waiting(&folder.join(LOCK_FILE))?;
     let there = Analyses::read(folder, session_id)?;
-    if analysis.what == Analysed::Withdrawal {
+    if analysis.what == AnalysisContent::Withdrawal {
         there.get(name)?;
         if analysis.reason.trim().is_empty() {
             return Err(AnalysisError::NoReason);
@@ -244,7 +245,7 @@ mod tests {
     use super::*;
     use chrono::TimeZone;
 
-    fn analysis(name: &str, reason: &str, what: Analysed) -> Analysis {
+    fn analysis(name: &str, reason: &str, what: AnalysisContent) -> Analysis {
         Analysis {
             name: name.into(),
             at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
@@ -257,8 +258,8 @@ mod tests {
         }
     }
 
-    fn mask(from: f64) -> Analysed {
-        Analysed::Mask { left_out_s: vec![[from, from + 1.0]] }
+    fn mask(from: f64) -> AnalysisContent {
+        AnalysisContent::Mask { left_out_s: vec![[from, from + 1.0]] }
     }
 
     #[test]
@@ -270,7 +271,7 @@ mod tests {
         add(&analysis("µ \"two\"", "", mask(3.0))).unwrap();
         let taken = add(&analysis("bump", "", mask(5.0))).unwrap_err();
         assert!(taken.to_string().contains("never used twice"), "{taken}");
-        let withdrawal = |name, reason| analysis(name, reason, Analysed::Withdrawal);
+        let withdrawal = |name, reason| analysis(name, reason, AnalysisContent::Withdrawal);
         assert!(matches!(add(&withdrawal("bump", " ")), Err(AnalysisError::NoReason)));
         assert!(matches!(add(&withdrawal("other", "why")), Err(AnalysisError::None { .. })));
         add(&withdrawal("bump", "wrong stretch")).unwrap();
@@ -280,7 +281,7 @@ mod tests {
         let read = Analyses::read(at, "id").unwrap();
         assert_eq!(read.all.len(), 3);
         assert_eq!(read.all[0].what, mask(0.1 + 0.2));
-        let names: Vec<&str> = read.counting().map(|one| one.name.as_str()).collect();
+        let names: Vec<&str> = read.active().map(|one| one.name.as_str()).collect();
         assert_eq!(names, ["µ \"two\""]);
         assert!(read.get("bump").is_err() && read.get("µ \"two\"").is_ok());
         for name in ["", " ", "a\nb", "\u{0}", &"x".repeat(81)] {
@@ -303,15 +304,15 @@ mod tests {
         // `printf '{"a":2,"b":1}' | sha256sum`
         let expected = "d3626ac30a87e6f7a6428233b3c68299976865fa5508e4267c5415c76af7a772";
         assert_eq!(calibration.sha256, expected);
-        let mut inputs = inputs_of(at).unwrap();
+        let mut inputs = read_session_inputs(at).unwrap();
         inputs.push(calibration);
         let one = Analysis { inputs, ..analysis("a", "", mask(0.0)) };
-        assert!(changed_inputs(&one, &inputs_of(at).unwrap()).is_empty());
+        assert!(changed_inputs(&one, &read_session_inputs(at).unwrap()).is_empty());
         std::fs::write(at.join(EDITS_FILE), "edit").unwrap();
-        let changed = changed_inputs(&one, &inputs_of(at).unwrap());
+        let changed = changed_inputs(&one, &read_session_inputs(at).unwrap());
         assert_eq!(changed, [EDITS_FILE]);
         std::fs::write(at.join("000.mcap"), "lug").unwrap();
-        let changed = changed_inputs(&one, &inputs_of(at).unwrap());
+        let changed = changed_inputs(&one, &read_session_inputs(at).unwrap());
         assert_eq!(changed, ["000.mcap", EDITS_FILE]);
     }
 }

@@ -10,14 +10,14 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use walkdir::WalkDir;
 
-/// Ending of the hidden names.
+/// FigureFormat of the hidden names.
 const ENDING: &str = ".palpate.tmp";
 /// Letters of the file's name in the draft's name: file systems allow 255 bytes, and a letter has up to four.
 const NAME_LETTERS_MAX: usize = 50;
 
 /// What to do with a file that already has the name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Existing {
+pub enum ExistingFile {
     /// The new file replaces it.
     Replace,
     /// It stays; the new file is refused with [`io::ErrorKind::AlreadyExists`].
@@ -67,11 +67,11 @@ impl Draft {
     }
 
     /// Gives the file its name. Once this returns, name and content survive a power cut.
-    pub fn persist(self, existing: Existing) -> io::Result<()> {
+    pub fn persist(self, existing: ExistingFile) -> io::Result<()> {
         self.file.as_file().sync_all()?;
         let named = match existing {
-            Existing::Replace => self.file.persist(&self.path),
-            Existing::Keep => self.file.persist_noclobber(&self.path),
+            ExistingFile::Replace => self.file.persist(&self.path),
+            ExistingFile::Keep => self.file.persist_noclobber(&self.path),
         };
         named.map_err(|err| err.error)?;
         // A folder without read permission can be written but not synchronised.
@@ -83,15 +83,15 @@ impl Draft {
 }
 
 pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    write(path, bytes, Existing::Replace)
+    write(path, bytes, ExistingFile::Replace)
 }
 
 /// Fails if `path` exists.
 pub fn create(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    write(path, bytes, Existing::Keep)
+    write(path, bytes, ExistingFile::Keep)
 }
 
-fn write(path: &Path, bytes: &[u8], existing: Existing) -> io::Result<()> {
+fn write(path: &Path, bytes: &[u8], existing: ExistingFile) -> io::Result<()> {
     let draft = Draft::new(path)?;
     draft.file.as_file().write_all(bytes)?;
     draft.persist(existing)
@@ -99,13 +99,13 @@ fn write(path: &Path, bytes: &[u8], existing: Existing) -> io::Result<()> {
 
 /// Abandoned drafts in a folder and its subfolders down to `depth`.
 #[must_use]
-pub fn leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
+pub fn find_leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
     let found = unowned(folder, depth);
     found.into_iter().map(|(path, _lock)| path).collect()
 }
 
 /// Deletes abandoned drafts as far as permissions allow; returns the deleted paths.
-pub fn sweep(folder: &Path, depth: usize) -> Vec<PathBuf> {
+pub fn remove_leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
     let mut found = unowned(folder, depth);
     // Held locks make a process that has just created this draft notice the deletion.
     found.retain(|(path, _lock)| std::fs::remove_file(path).is_ok());
@@ -196,10 +196,10 @@ mod tests {
         fs::create_dir(at.join("deep")).unwrap();
         let deep = Draft::new(&at.join("deep/old.csv")).unwrap().file.keep();
         let (_, deep) = deep.unwrap();
-        assert_eq!(leftovers(at, 1), std::slice::from_ref(&abandoned));
-        assert_eq!(sweep(at, 1), [abandoned]);
-        assert_eq!(sweep(at, usize::MAX), [deep]);
-        written.persist(Existing::Keep).unwrap();
+        assert_eq!(find_leftovers(at, 1), std::slice::from_ref(&abandoned));
+        assert_eq!(remove_leftovers(at, 1), [abandoned]);
+        assert_eq!(remove_leftovers(at, usize::MAX), [deep]);
+        written.persist(ExistingFile::Keep).unwrap();
         assert_eq!(names(at), [".another.tmp", "deep", "now.csv"]);
     }
 }

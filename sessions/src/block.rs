@@ -3,9 +3,9 @@
 //! where the rig or the imported file has no such value.
 
 use crate::packed::{Field, extend_doubles, extend_numbers, read_fields, zigzag};
-use crate::record::Row;
+use crate::record::SampleRow;
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, Phase};
+use palpate_model::rig::{Phase, SampleAge};
 
 /// Most samples in one block, so that a block and its decoded form stay small.
 pub const BLOCK_ROWS_MAX: usize = 1 << 16;
@@ -55,18 +55,18 @@ pub(crate) struct DerivedBlock {
 }
 
 /// Presence of age, counts, volts and pulses.
-fn present_values(row: &Row) -> [bool; 4] {
+fn present_values(row: &SampleRow) -> [bool; 4] {
     [row.age.is_some(), row.counts.is_some(), row.volts.is_some(), row.pulses.is_some()]
 }
 
 /// Splits rows where a block must end: at its size limit, and where optional values appear or vanish.
-pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
+pub(crate) fn block_slices(rows: &[SampleRow]) -> impl Iterator<Item = &[SampleRow]> {
     rows.chunk_by(|a, b| present_values(a) == present_values(b))
         .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
 }
 
 /// The rows must all have the same optional values, as [`block_slices`] gives them.
-pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, DerivedBlock) {
+pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[SampleRow]) -> (DaqBlock, DerivedBlock) {
     let mut daq = DaqBlock { first_sample, ..DaqBlock::default() };
     let mut derived = DerivedBlock { first_sample, ..DerivedBlock::default() };
     let (mut tick, mut host, mut pulses) = (0u64, 0u64, 0i64);
@@ -94,8 +94,11 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     (daq, derived)
 }
 
-fn age(daq: &DaqBlock, index: usize) -> Option<Age> {
-    Some(Age { by: Nanos(*daq.age_ns.get(index)?), within: Nanos(*daq.age_within_ns.get(index)?) })
+fn age(daq: &DaqBlock, index: usize) -> Option<SampleAge> {
+    Some(SampleAge {
+        by: Nanos(*daq.age_ns.get(index)?),
+        within: Nanos(*daq.age_within_ns.get(index)?),
+    })
 }
 
 /// Size of the largest block: 68 bytes hold every value of a sample in its longest form.
@@ -103,13 +106,13 @@ const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 68;
 
 /// A verified block of samples, column by column. Its memory is reused for the next block.
 #[derive(Debug, Default)]
-pub struct Block {
+pub struct SampleBlock {
     // After `check`, the deltas are summed to absolute values.
     daq: DaqBlock,
     derived: DerivedBlock,
 }
 
-impl Block {
+impl SampleBlock {
     /// Session-wide number of the first sample.
     pub fn first_sample(&self) -> u64 {
         self.daq.first_sample
@@ -123,7 +126,7 @@ impl Block {
         self.daq.tick_delta.is_empty()
     }
 
-    /// Force above tare in N; 0 where [`Row::force`] is `None`.
+    /// Force above tare in N; 0 where [`SampleRow::force`] is `None`.
     pub fn force(&self) -> &[f64] {
         &self.derived.force_newtons
     }
@@ -134,10 +137,10 @@ impl Block {
     }
 
     /// Panics if `index` is out of range.
-    pub fn row(&self, index: usize) -> Row {
+    pub fn row(&self, index: usize) -> SampleRow {
         let (daq, derived) = (&self.daq, &self.derived);
         let validity = derived.validity[index];
-        Row {
+        SampleRow {
             tick: daq.tick_delta[index] as u64,
             host: Nanos(daq.host_delta_ns[index] as u64),
             age: age(daq, index),
@@ -153,7 +156,7 @@ impl Block {
         }
     }
 
-    pub fn rows(&self) -> impl Iterator<Item = Row> {
+    pub fn rows(&self) -> impl Iterator<Item = SampleRow> {
         (0..self.len()).map(|index| self.row(index))
     }
 
@@ -276,8 +279,8 @@ mod tests {
     use super::*;
     use prost::Message;
 
-    fn row(tick: u64, counts: Option<i32>) -> Row {
-        Row {
+    fn row(tick: u64, counts: Option<i32>) -> SampleRow {
+        SampleRow {
             tick,
             host: Nanos(u64::MAX - tick),
             age: None,
@@ -298,16 +301,22 @@ mod tests {
             row(u64::MAX, None),
             row(0, None),
             row(7, Some(i32::MIN)),
-            Row { volts: None, ..row(12, Some(0)) },
-            Row { pulses: None, ..row(13, Some(1)) },
-            Row { age: Some(Age { by: Nanos(u64::MAX), within: Nanos(1) }), ..row(14, Some(2)) },
-            Row { age: Some(Age { by: Nanos(0), within: Nanos(u64::MAX) }), ..row(15, Some(2)) },
+            SampleRow { volts: None, ..row(12, Some(0)) },
+            SampleRow { pulses: None, ..row(13, Some(1)) },
+            SampleRow {
+                age: Some(SampleAge { by: Nanos(u64::MAX), within: Nanos(1) }),
+                ..row(14, Some(2))
+            },
+            SampleRow {
+                age: Some(SampleAge { by: Nanos(0), within: Nanos(u64::MAX) }),
+                ..row(15, Some(2))
+            },
         ];
         let mut back = Vec::new();
         let mut first = 0;
         for slice in block_slices(&rows) {
             let (daq, derived) = blocks_from_rows(first, slice);
-            let mut block = Block::default();
+            let mut block = SampleBlock::default();
             (block.daq, block.derived) = (daq, derived);
             block.check().unwrap();
             back.extend(block.rows());
@@ -320,11 +329,11 @@ mod tests {
 
     #[test]
     fn blocks_are_read_as_the_general_decoder_reads_them() {
-        let rows: Vec<Row> = (0..1000u64)
+        let rows: Vec<SampleRow> = (0..1000u64)
             .map(|i| row(i.wrapping_pow(9) >> (i % 60), Some((i * i) as i32 - 7)))
             .collect();
         let (daq, derived) = blocks_from_rows(3, &rows);
-        let mut ours = Block::default();
+        let mut ours = SampleBlock::default();
         ours.take_raw(&daq.encode_to_vec()).unwrap();
         assert_eq!(ours.daq, DaqBlock::decode(&*daq.encode_to_vec()).unwrap());
         ours.take_derived(&derived.encode_to_vec()).unwrap();
@@ -359,7 +368,7 @@ mod tests {
         for (edit, expected) in edits {
             let (mut daq, mut derived) = (daq.clone(), derived.clone());
             edit(&mut daq, &mut derived);
-            let refusal = Block { daq, derived }.check().unwrap_err();
+            let refusal = SampleBlock { daq, derived }.check().unwrap_err();
             assert!(refusal.contains(expected), "{refusal}");
         }
     }

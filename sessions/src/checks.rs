@@ -69,7 +69,7 @@ pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), ChainError> {
 
 /// The last check on the day of `now`, in this computer's time zone.
 #[must_use]
-pub fn last_of_day(checks: &[DailyCheck], now: DateTime<Utc>) -> Option<&DailyCheck> {
+pub fn last_check_of_day(checks: &[DailyCheck], now: DateTime<Utc>) -> Option<&DailyCheck> {
     let day = |at: DateTime<Utc>| at.with_timezone(&Local).date_naive();
     checks.iter().rev().find(|check| day(check.at) == day(now))
 }
@@ -113,11 +113,13 @@ mod tests {
         }
         let own = read_checks(at, "sim:bench 2").unwrap();
         assert_eq!(own.len(), 3);
-        let last = last_of_day(&own, noon + hour).unwrap();
+        let last = last_check_of_day(&own, noon + hour).unwrap();
         assert_eq!((last.at, last.is_passed), (noon, false));
         assert!(last.failures().contains("0.3 N"));
-        assert!(last_of_day(&own, noon + hour * 24).is_none());
-        assert!(last_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon).unwrap().is_passed);
+        assert!(last_check_of_day(&own, noon + hour * 24).is_none());
+        assert!(
+            last_check_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon).unwrap().is_passed
+        );
         assert_eq!(read_checks(at, "never").unwrap(), []);
         // A name never leads out of the folder; every file has a head beside it.
         assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 6);

@@ -1,11 +1,11 @@
 //! The machine compliances of a library, in `compliances/`.
 
-use crate::shelf::{self, Document};
+use crate::document_store::{self, Document};
 use palpate_model::rig::RigCompliance;
 
-pub type Kept = shelf::Kept<RigCompliance>;
+pub type StoredCompliance = document_store::StoredDocument<RigCompliance>;
 
-pub type Shelf = shelf::Shelf<RigCompliance>;
+pub type ComplianceStore = document_store::DocumentStore<RigCompliance>;
 
 impl Document for RigCompliance {
     const KIND: &'static str = "compliance";
@@ -41,7 +41,7 @@ impl Document for RigCompliance {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shelf::{LibraryError, read, save, supersede};
+    use crate::document_store::{LibraryError, read_document, save_document, supersede_document};
 
     fn taken(day: &str, mm_per_n: f64) -> RigCompliance {
         RigCompliance {
@@ -57,15 +57,17 @@ mod tests {
     #[test]
     fn compliance_is_stored_superseded_and_not_read_as_calibration() {
         let home = tempfile::tempdir().unwrap();
-        let first = save(home.path(), &taken("2026-03-05", 0.06)).unwrap();
+        let first = save_document(home.path(), &taken("2026-03-05", 0.06)).unwrap();
         assert!(first.id.starts_with("20260305-bench-"), "{}", first.id);
-        let second = supersede(home.path(), &first.id, &taken("2026-03-01", 0.05)).unwrap();
-        let shelf = Shelf::open(home.path());
+        let second =
+            supersede_document(home.path(), &first.id, &taken("2026-03-01", 0.05)).unwrap();
+        let shelf = ComplianceStore::open(home.path());
         assert_eq!(shelf.in_force("bench"), Some(&second));
-        let wrong = read::<palpate_model::calibration::Calibration>(&first.path).unwrap_err();
+        let wrong =
+            read_document::<palpate_model::calibration::Calibration>(&first.path).unwrap_err();
         assert!(matches!(wrong, LibraryError::NotOne { .. }), "{wrong}");
-        assert!(crate::Shelf::open(home.path()).kept.is_empty());
-        let nothing = save(home.path(), &taken("2026-03-05", 0.0)).unwrap_err();
+        assert!(ComplianceStore::open(home.path()).documents.is_empty());
+        let nothing = save_document(home.path(), &taken("2026-03-05", 0.0)).unwrap_err();
         assert!(matches!(nothing, LibraryError::Unsound { .. }), "{nothing}");
     }
 }

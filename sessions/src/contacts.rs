@@ -1,6 +1,6 @@
 //! The contact points of a session, in the order in which edits number them.
 
-use crate::record::{Entry, EntryKind};
+use crate::record::{EntryKind, LogEntry};
 use palpate_model::units::Position;
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ pub struct FoundContact {
 }
 
 #[must_use]
-pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
+pub fn contacts(entries: &[LogEntry]) -> Vec<FoundContact> {
     let found = entries.iter().filter_map(|entry| {
         Some(FoundContact {
             after_sample: entry.after_sample,
@@ -24,13 +24,13 @@ pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
 
 /// The position in a decision that records a contact.
 #[must_use]
-pub fn contact_position(entry: &Entry) -> Option<&Value> {
+pub fn contact_position(entry: &LogEntry) -> Option<&Value> {
     is_record(entry, "contact_found").then(|| entry.body.get("position"))?
 }
 
 /// Whether an entry is a decision with a record of this name.
 #[must_use]
-pub fn is_record(entry: &Entry, name: &str) -> bool {
+pub fn is_record(entry: &LogEntry, name: &str) -> bool {
     let body = &entry.body;
     entry.kind == EntryKind::Decision && body["effect"] == "record" && body["record"] == name
 }

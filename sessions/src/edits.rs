@@ -2,7 +2,7 @@
 //! notes and reviews. The log stays unchanged; every edit stays in `edits.jsonl` beside it. The last verdict, and the last
 //! correction of each contact, counts.
 
-use crate::analyses::Input;
+use crate::analyses::AnalysisInput;
 use crate::chain::{self, ChainError, ChainHead};
 use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
@@ -19,7 +19,7 @@ pub const EDITS_FILE: &str = "edits.jsonl";
 palpate_model::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
-    pub enum Verdict {
+    pub enum DataQuality {
         Valid = "valid",
         /// Used, with a remark to every reader.
         Suspect = "suspect",
@@ -28,7 +28,7 @@ palpate_model::named! {
     }
 }
 
-impl FromStr for Verdict {
+impl FromStr for DataQuality {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -41,7 +41,7 @@ palpate_model::named! {
     /// A reviewer's decision about a session.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
-    pub enum Decision {
+    pub enum ReviewDecision {
         /// With its analyses.
         Accepted = "accepted",
         Rejected = "rejected",
@@ -52,7 +52,7 @@ palpate_model::named! {
 /// The last review and what has changed since.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Review {
-    pub decision: Decision,
+    pub decision: ReviewDecision,
     pub by: String,
     pub at: DateTime<Utc>,
     pub reason: String,
@@ -65,9 +65,9 @@ const TAG_MAX: usize = 40;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "lowercase")]
-pub enum Change {
+pub enum EditChange {
     Verdict {
-        verdict: Verdict,
+        verdict: DataQuality,
     },
     Contact {
         /// Number of the contact in the session, from 1.
@@ -85,9 +85,9 @@ pub enum Change {
     /// The note's text is the edit's reason.
     Note,
     Review {
-        decision: Decision,
+        decision: ReviewDecision,
         /// Hashes of the reviewed files.
-        seen: Vec<Input>,
+        seen: Vec<AnalysisInput>,
     },
 }
 
@@ -97,7 +97,7 @@ pub struct Edit {
     pub by: String,
     pub reason: String,
     #[serde(flatten)]
-    pub change: Change,
+    pub change: EditChange,
 }
 
 #[derive(Debug, Error)]
@@ -147,9 +147,9 @@ impl Edits {
     }
 
     /// The last verdict and its edit.
-    pub fn verdict(&self) -> Option<(Verdict, &Edit)> {
+    pub fn verdict(&self) -> Option<(DataQuality, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
-            Change::Verdict { verdict } => Some((verdict, edit)),
+            EditChange::Verdict { verdict } => Some((verdict, edit)),
             _ => None,
         })
     }
@@ -157,7 +157,7 @@ impl Edits {
     /// The last correction of a contact, numbered from 1.
     pub fn contact(&self, number: u32) -> Option<(Position, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
-            Change::Contact { number: own, position_mm, .. } if own == number => {
+            EditChange::Contact { number: own, position_mm, .. } if own == number => {
                 Some((position_mm, edit))
             }
             _ => None,
@@ -167,7 +167,7 @@ impl Edits {
     pub fn tags(&self) -> BTreeSet<&str> {
         let mut tags = BTreeSet::new();
         for edit in &self.all {
-            if let Change::Tags { add, remove } = &edit.change {
+            if let EditChange::Tags { add, remove } = &edit.change {
                 tags.extend(add.iter().map(String::as_str));
                 for tag in remove {
                     tags.remove(tag.as_str());
@@ -178,33 +178,34 @@ impl Edits {
     }
 
     pub fn notes(&self) -> impl Iterator<Item = &Edit> {
-        let is_note = |edit: &&Edit| matches!(edit.change, Change::Note);
+        let is_note = |edit: &&Edit| matches!(edit.change, EditChange::Note);
         self.all.iter().filter(is_note)
     }
 
     /// The last review. `now` has the present hashes of the analyses and, to compare the log too, of all its files.
-    pub fn review(&self, now: &[Input]) -> Option<Review> {
-        let is_review = |edit: &Edit| matches!(edit.change, Change::Review { .. });
+    pub fn review(&self, now: &[AnalysisInput]) -> Option<Review> {
+        let is_review = |edit: &Edit| matches!(edit.change, EditChange::Review { .. });
         let at = self.all.iter().rposition(is_review)?;
         let (edit, later) = (&self.all[at], &self.all[at + 1..]);
-        let Change::Review { decision, seen } = &edit.change else {
+        let EditChange::Review { decision, seen } = &edit.change else {
             return None;
         };
-        let is_other = |one: &&Input| {
+        let is_other = |one: &&AnalysisInput| {
             let seen = seen.iter().find(|seen| seen.what == one.what);
             seen.map(|seen| &seen.sha256) != Some(&one.sha256)
         };
         // If `now` has no log files, the log is not compared.
-        let is_log = |one: &Input| segment_number(&one.what).is_some();
+        let is_log = |one: &AnalysisInput| segment_number(&one.what).is_some();
         let has_logs = now.iter().any(is_log);
-        let is_gone = |one: &&Input| {
+        let is_gone = |one: &&AnalysisInput| {
             (has_logs || !is_log(one)) && now.iter().all(|there| there.what != one.what)
         };
         let gone = seen.iter().filter(is_gone);
         let changed = now.iter().filter(is_other).chain(gone);
         let mut changed: Vec<String> = changed.map(|one| one.what.clone()).collect();
         // Tags and notes do not affect the reviewed data.
-        let is_irrelevant = |edit: &Edit| matches!(edit.change, Change::Tags { .. } | Change::Note);
+        let is_irrelevant =
+            |edit: &Edit| matches!(edit.change, EditChange::Tags { .. } | EditChange::Note);
         if !later.iter().all(is_irrelevant) {
             changed.push(EDITS_FILE.to_owned());
         }
@@ -230,7 +231,7 @@ fn check_tag(tag: &str) -> Result<(), EditError> {
 pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
     match &edit.change {
         // A tag explains itself.
-        Change::Tags { add, remove } => {
+        EditChange::Tags { add, remove } => {
             add.iter().chain(remove).try_for_each(|tag| check_tag(tag))?
         }
         _ if edit.reason.trim().is_empty() => return Err(EditError::NoReason),
@@ -248,7 +249,7 @@ mod tests {
     use super::*;
     use chrono::TimeZone;
 
-    fn edit(reason: &str, change: Change) -> Edit {
+    fn edit(reason: &str, change: EditChange) -> Edit {
         Edit {
             at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
             by: "Ada".into(),
@@ -257,25 +258,25 @@ mod tests {
         }
     }
 
-    fn verdict(verdict: Verdict) -> Change {
-        Change::Verdict { verdict }
+    fn verdict(verdict: DataQuality) -> EditChange {
+        EditChange::Verdict { verdict }
     }
 
     #[test]
     fn last_verdict_and_correction_count_and_all_edits_stay() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
-        let contact = |number, mm| Change::Contact {
+        let contact = |number, mm| EditChange::Contact {
             number,
             position_mm: Position(mm),
             was_mm: Position(41.0),
         };
         let edits = [
-            edit("it finished", verdict(Verdict::Valid)),
+            edit("it finished", verdict(DataQuality::Valid)),
             edit("by eye", contact(1, 41.25)),
-            edit("hair on the probe", verdict(Verdict::Rejected)),
+            edit("hair on the probe", verdict(DataQuality::Rejected)),
             edit("again, with the video", contact(1, 0.1 + 0.2)),
-            edit("the gel was warm", Change::Note),
+            edit("the gel was warm", EditChange::Note),
         ];
         for one in &edits {
             add_edit(at, "id", one).unwrap();
@@ -283,7 +284,7 @@ mod tests {
         let read = Edits::read(at, "id").unwrap();
         assert_eq!(read.all, edits);
         let (quality, edit) = read.verdict().unwrap();
-        assert_eq!((quality, edit.reason.as_str()), (Verdict::Rejected, "hair on the probe"));
+        assert_eq!((quality, edit.reason.as_str()), (DataQuality::Rejected, "hair on the probe"));
         assert_eq!(read.contact(1).unwrap().0, Position(0.1 + 0.2));
         assert!(read.contact(2).is_none());
         let notes: Vec<&str> = read.notes().map(|one| one.reason.as_str()).collect();
@@ -298,8 +299,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect();
-        let tags =
-            |add: &[&str], remove: &[&str]| Change::Tags { add: words(add), remove: words(remove) };
+        let tags = |add: &[&str], remove: &[&str]| EditChange::Tags {
+            add: words(add),
+            remove: words(remove),
+        };
         add_edit(at, "id", &edit("", tags(&["pilot", "µ-gel"], &[]))).unwrap();
         add_edit(at, "id", &edit("", tags(&["good"], &["pilot", "none"]))).unwrap();
         let read = Edits::read(at, "id").unwrap();
@@ -312,14 +315,15 @@ mod tests {
 
     #[test]
     fn review_is_outdated_when_a_reviewed_file_changes() {
-        let input = |what: &str, sha256: &str| Input { what: what.into(), sha256: sha256.into() };
+        let input =
+            |what: &str, sha256: &str| AnalysisInput { what: what.into(), sha256: sha256.into() };
         let seen = vec![input("000.mcap", "a"), input("analyses.jsonl", "b")];
-        let decision = Decision::Accepted;
-        let review = Change::Review { decision, seen: seen.clone() };
+        let decision = ReviewDecision::Accepted;
+        let review = EditChange::Review { decision, seen: seen.clone() };
         let mut edits = Edits::default();
         assert_eq!(edits.review(&seen), None);
-        edits.all = vec![edit("before", verdict(Verdict::Suspect)), edit("I looked", review)];
-        let changed = |edits: &Edits, now: &[Input]| edits.review(now).unwrap().changed;
+        edits.all = vec![edit("before", verdict(DataQuality::Suspect)), edit("I looked", review)];
+        let changed = |edits: &Edits, now: &[AnalysisInput]| edits.review(now).unwrap().changed;
         assert!(changed(&edits, &seen).is_empty());
         assert!(changed(&edits, &seen[1..]).is_empty());
         assert_eq!(changed(&edits, &seen[..1]), ["analyses.jsonl"]);
@@ -328,11 +332,11 @@ mod tests {
         assert_eq!(changed(&edits, &other), ["000.mcap", "001.mcap"]);
         let other = [input("001.mcap", "d"), seen[1].clone()];
         assert_eq!(changed(&edits, &other), ["001.mcap", "000.mcap"]);
-        let tags = Change::Tags { add: vec!["good".into()], remove: Vec::new() };
+        let tags = EditChange::Tags { add: vec!["good".into()], remove: Vec::new() };
         edits.all.push(edit("", tags));
-        edits.all.push(edit("seen by two", Change::Note));
+        edits.all.push(edit("seen by two", EditChange::Note));
         assert!(changed(&edits, &seen).is_empty());
-        edits.all.push(edit("after", verdict(Verdict::Valid)));
+        edits.all.push(edit("after", verdict(DataQuality::Valid)));
         assert_eq!(changed(&edits, &seen), [EDITS_FILE]);
     }
 
@@ -340,17 +344,17 @@ mod tests {
     fn edit_needs_a_reason_a_folder_and_an_ended_recording() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path();
-        let none = add_edit(at, "id", &edit(" ", verdict(Verdict::Valid))).unwrap_err();
+        let none = add_edit(at, "id", &edit(" ", verdict(DataQuality::Valid))).unwrap_err();
         assert!(none.to_string().contains("needs a reason"));
-        let no_folder = add_edit(&at.join("x"), "id", &edit("why", verdict(Verdict::Valid)));
+        let no_folder = add_edit(&at.join("x"), "id", &edit("why", verdict(DataQuality::Valid)));
         assert!(no_folder.unwrap_err().to_string().contains("name the folder"));
         let held = HolderLock::acquire(&at.join(LOCK_FILE)).unwrap();
-        let busy = add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap_err();
+        let busy = add_edit(at, "id", &edit("why", verdict(DataQuality::Valid))).unwrap_err();
         let id = std::process::id().to_string();
         assert!(busy.to_string().contains(&id), "{busy}");
         // A short lock of another edit is waited for.
         std::thread::scope(|scope| {
-            scope.spawn(|| add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap());
+            scope.spawn(|| add_edit(at, "id", &edit("why", verdict(DataQuality::Valid))).unwrap());
             std::thread::sleep(std::time::Duration::from_millis(100));
             drop(held);
         });

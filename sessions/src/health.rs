@@ -6,22 +6,22 @@ use serde::{Deserialize, Serialize};
 
 /// One message of the channel `/health`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Health {
+pub struct HealthMessage {
     #[serde(rename = "now_ns")]
     pub now: Nanos,
     #[serde(flatten)]
-    pub told: Told,
+    pub content: HealthContent,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Told {
+pub enum HealthContent {
     /// Each value is the worst since the last message of this kind.
     State(MachineState),
     /// Wall clock at a session time.
     Anchor {
         #[serde(rename = "why")]
-        why: Why,
+        reason: AnchorReason,
         wall: DateTime<Utc>,
         /// Advance of the wall clock over the monotonic clock since the last anchor, in s.
         shift_s: f64,
@@ -36,7 +36,7 @@ pub enum Told {
 /// Occasion of an anchor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Why {
+pub enum AnchorReason {
     Start,
     /// The clocks diverged by more than 0.5 s.
     Jump,
@@ -86,23 +86,24 @@ pub struct HealthSummary {
 const EVENTS_MAX: usize = 100;
 
 impl HealthSummary {
-    pub(crate) fn take(&mut self, health: &Health) {
+    pub(crate) fn take(&mut self, health: &HealthMessage) {
         self.messages += 1;
-        match &health.told {
-            Told::State(state) => match &mut self.worst {
+        match &health.content {
+            HealthContent::State(state) => match &mut self.worst {
                 Some(worst) => worst.worsen(state),
                 None => self.worst = Some(*state),
             },
-            Told::Anchor { why: Why::Jump, shift_s, .. } => {
+            HealthContent::Anchor { reason: AnchorReason::Jump, shift_s, .. } => {
                 self.clock_jumps += 1;
                 if shift_s.abs() > self.clock_jump_s.abs() {
                     self.clock_jump_s = *shift_s;
                 }
             }
-            Told::Event { text } if self.events.len() < EVENTS_MAX => {
+            HealthContent::Event { text } if self.events.len() < EVENTS_MAX => {
                 self.events.push((health.now.seconds().0, text.clone()));
             }
-            Told::Anchor { .. } | Told::Event { .. } | Told::Unknown => {}
+            HealthContent::Anchor { .. } | HealthContent::Event { .. } | HealthContent::Unknown => {
+            }
         }
     }
 }
@@ -111,8 +112,8 @@ impl HealthSummary {
 mod tests {
     use super::*;
 
-    fn at(now: u64, content: Told) -> Health {
-        Health { now: Nanos(now), told: content }
+    fn at(now: u64, content: HealthContent) -> HealthMessage {
+        HealthMessage { now: Nanos(now), content: content }
     }
 
     #[test]
@@ -124,20 +125,20 @@ mod tests {
             free_bytes: Some(u64::MAX),
             missed_readings: 3,
         };
-        let anchor = Told::Anchor {
-            why: Why::Jump,
+        let anchor = HealthContent::Anchor {
+            reason: AnchorReason::Jump,
             wall: DateTime::from_timestamp_nanos(1_772_720_107_123_456_789),
             shift_s: -3600.5,
         };
-        let event = Told::Event { text: "so".into() };
-        for content in [Told::State(state), anchor, event] {
+        let event = HealthContent::Event { text: "so".into() };
+        for content in [HealthContent::State(state), anchor, event] {
             let one = at(7, content);
             let text = serde_json::to_string(&one).unwrap();
-            assert_eq!(serde_json::from_str::<Health>(&text).unwrap(), one, "{text}");
+            assert_eq!(serde_json::from_str::<HealthMessage>(&text).unwrap(), one, "{text}");
         }
-        let later: Health =
+        let later: HealthMessage =
             serde_json::from_str(r#"{"now_ns":5,"kind":"temperature","kelvin":300}"#).unwrap();
-        assert_eq!(later.told, Told::Unknown);
+        assert_eq!(later.content, HealthContent::Unknown);
     }
 
     #[test]
@@ -148,7 +149,7 @@ mod tests {
         {
             summary.take(&at(
                 1,
-                Told::State(MachineState {
+                HealthContent::State(MachineState {
                     lateness_s,
                     free_bytes,
                     missed_readings,
@@ -156,9 +157,11 @@ mod tests {
                 }),
             ));
         }
-        for (why, shift_s) in [(Why::Start, 0.0), (Why::Jump, -2.0), (Why::Jump, 1.0)] {
+        for (why, shift_s) in
+            [(AnchorReason::Start, 0.0), (AnchorReason::Jump, -2.0), (AnchorReason::Jump, 1.0)]
+        {
             let wall = DateTime::UNIX_EPOCH;
-            summary.take(&at(2, Told::Anchor { why, wall, shift_s }));
+            summary.take(&at(2, HealthContent::Anchor { reason: why, wall, shift_s }));
         }
         let worst = summary.worst.unwrap();
         assert_eq!(worst.lateness_s, 0.3);

@@ -7,7 +7,7 @@ pub const ORIGINAL_FOLDER: &str = "original";
 
 /// One property of a foreign file, such as its delimiter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Reading {
+pub struct ImportReading {
     /// Name of the property, such as `delimiter`.
     pub what: String,
     /// Its value, in words.
@@ -19,7 +19,7 @@ pub struct Reading {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Imported {
+pub struct ImportOrigin {
     /// Name of the file in [`ORIGINAL_FOLDER`].
     pub file: String,
     pub bytes: u64,
@@ -32,7 +32,7 @@ pub struct Imported {
     pub part: String,
     /// Time of the first sample in the file, in s; session time counts from there.
     pub first_time_s: f64,
-    pub readings: Vec<Reading>,
+    pub readings: Vec<ImportReading>,
     /// Further lines of the file about this part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub facts: Vec<(String, String)>,
@@ -41,7 +41,7 @@ pub struct Imported {
     pub remarks: Vec<String>,
 }
 
-impl Imported {
+impl ImportOrigin {
     pub fn source(&self) -> String {
         let part = match self.part.as_str() {
             "" => String::new(),

@@ -40,7 +40,7 @@ pub enum JournalError {
 
 /// RFC 3339 in UTC, to the millisecond, as journals have it.
 #[must_use]
-pub fn stamp(at: SystemTime) -> String {
+pub fn format_time(at: SystemTime) -> String {
     format_utc(at.into())
 }
 

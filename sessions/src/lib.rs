@@ -19,6 +19,7 @@ mod chain;
 pub mod checks;
 pub mod compliances;
 pub mod contacts;
+pub mod document_store;
 pub mod edits;
 pub mod folder;
 pub mod health;
@@ -28,33 +29,35 @@ mod lock;
 pub mod log;
 pub mod manifest;
 mod packed;
+pub mod program_log;
 pub mod raw;
 pub mod record;
 pub mod recover;
-pub mod rotating;
 pub mod schema;
-pub mod shelf;
 pub mod text;
 pub mod ticks;
 
 pub use analyses::{ANALYSES_FILE, Analyses, AnalysisError};
-pub use block::Block;
-pub use calibrations::{Shelf, read_calibration};
+pub use block::SampleBlock;
+pub use calibrations::{CalibrationStore, read_calibration};
 pub use catalog::Catalog;
 pub use chain::{ChainError, ChainHead};
-pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
+pub use document_store::{LibraryError, age_days, save_document, supersede_document};
+pub use edits::{
+    DataQuality, EDITS_FILE, Edit, EditChange, EditError, Edits, Review, ReviewDecision, add_edit,
+};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
     spare_folder,
 };
-pub use health::{Health, HealthSummary, MachineState};
-pub use import_origin::{Imported, ORIGINAL_FOLDER};
+pub use health::{HealthMessage, HealthSummary, MachineState};
+pub use import_origin::{ImportOrigin, ORIGINAL_FOLDER};
 pub use log::{
-    Alteration, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace, Part,
-    Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
+    Alteration, AuxiliaryData, FileSink, FolderSegments, LogBatch, LogError, LogNotice, LogPart,
+    LogWriter, ReadError, RecordingPace, SegmentSource, Session, SessionOutline, SessionSummary,
+    SessionWriter, Sink,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use raw::RawBlock;
-pub use record::{EndRecord, Entry, EntryKind, Row};
-pub use shelf::{LibraryError, age_days, save, supersede};
+pub use record::{EndRecord, EntryKind, LogEntry, SampleRow};

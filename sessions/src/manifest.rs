@@ -1,9 +1,9 @@
 //! The first message of every session: operator, specimen, rig, settings and versions.
 
-use crate::import_origin::Imported;
+use crate::import_origin::ImportOrigin;
 use crate::recover::RecoveryOrigin;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_model::about::About;
+use palpate_model::metadata::SessionMetadata;
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
@@ -36,15 +36,15 @@ pub struct Manifest {
     pub specimen: String,
     /// Shape and size of the probe, in words.
     pub indenter: String,
-    /// Further facts about specimen, probe and series; see [`palpate_model::about::KEYS`].
-    #[serde(default, skip_serializing_if = "About::is_empty")]
-    pub about: About,
+    /// Further facts about specimen, probe and series; see [`palpate_model::metadata::KEYS`].
+    #[serde(default, skip_serializing_if = "SessionMetadata::is_empty")]
+    pub about: SessionMetadata,
     /// `None` in sessions of old versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signal: Option<SignalFacts>,
     /// `None` in a recorded session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub imported: Option<Imported>,
+    pub imported: Option<ImportOrigin>,
     /// The rig's description of itself; `None` in an imported session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rig: Option<RigDescription>,

@@ -1,18 +1,18 @@
 //! Samples and entries of a session. Samples are stored in [`Block`](crate::block::Block)s.
 
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, Phase};
+use palpate_model::rig::{Phase, SampleAge};
 use serde::{Deserialize, Serialize};
 
 /// One sample: raw values as reported, and values derived from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct SampleRow {
     /// Controller clock in its own counts; in an imported session, picoseconds since the first sample.
     pub tick: u64,
     /// Session time of arrival at the host.
     pub host: Nanos,
     /// Delay from acquisition to arrival; `None` if the link does not measure it.
-    pub age: Option<Age>,
+    pub age: Option<SampleAge>,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
     /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
@@ -30,7 +30,7 @@ pub struct Row {
     pub cycle: u32,
 }
 
-impl Row {
+impl SampleRow {
     /// Name of the first value that is not finite.
     pub fn non_finite(&self) -> Option<&'static str> {
         let values = [("signal", self.volts), ("force", self.force), ("depth", self.depth)];
@@ -50,7 +50,7 @@ pub enum EntryKind {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct LogEntry {
     pub kind: EntryKind,
     /// Position among all entries; strictly increasing.
     pub order: u64,

@@ -6,7 +6,7 @@
 //! loop's final state, and a hash of all lines. Without that line the recording was cut off and is valid to its last complete
 //! line.
 //!
-//! [`Recorder::push`] neither waits nor allocates: a bounded channel takes the ticks to a thread that writes them.
+//! [`TickRecorder::push`] neither waits nor allocates: a bounded channel takes the ticks to a thread that writes them.
 
 use crate::atomic;
 use std::fs::File;
@@ -18,8 +18,8 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-pub const SETTINGS: &str = "settings.toml";
-pub const TICKS: &str = "ticks.csv";
+pub const SETTINGS_FILE: &str = "settings.toml";
+pub const TICKS_FILE: &str = "ticks.csv";
 
 /// Capacity of the channel in ticks: 8 s at 1 kHz, far longer than a disk stalls.
 const CAPACITY: usize = 8192;
@@ -28,14 +28,14 @@ const CAPACITY: usize = 8192;
 const NAP: Duration = Duration::from_millis(5);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row<const W: usize, const R: usize> {
+pub struct TickRow<const W: usize, const R: usize> {
     pub whole: [u64; W],
     pub real: [f64; R],
 }
 
-impl<const W: usize, const R: usize> Row<W, R> {
+impl<const W: usize, const R: usize> TickRow<W, R> {
     /// Index of the first column that differs in any bit; integers come first.
-    pub fn differs(&self, other: &Self) -> Option<usize> {
+    pub fn first_difference(&self, other: &Self) -> Option<usize> {
         let whole = self.whole.iter().zip(&other.whole).map(|(a, b)| a != b);
         let real = self.real.iter().zip(&other.real);
         let real = real.map(|(a, b)| a.to_bits() != b.to_bits());
@@ -70,16 +70,16 @@ impl<const W: usize, const R: usize> Row<W, R> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Recorded {
+pub struct TickCounts {
     pub ticks: u64,
     /// Ticks dropped because the channel was full; a replay ends at the first of them.
-    pub lost: u64,
+    pub lost_ticks: u64,
 }
 
 /// Writes ticks while a loop runs.
 #[derive(Debug)]
-pub struct Recorder<const W: usize, const R: usize> {
-    ring: SyncSender<Row<W, R>>,
+pub struct TickRecorder<const W: usize, const R: usize> {
+    ring: SyncSender<TickRow<W, R>>,
     dropped: Arc<AtomicU64>,
     thread: JoinHandle<io::Result<TickFile>>,
     file: PathBuf,
@@ -108,14 +108,14 @@ fn extend_hash(hash: u64, bytes: &[u8]) -> u64 {
     bytes.iter().fold(hash, mix)
 }
 
-impl<const W: usize, const R: usize> Recorder<W, R> {
+impl<const W: usize, const R: usize> TickRecorder<W, R> {
     /// Begins a recording in a new folder.
     pub fn start(
         folder: &Path,
         settings: &str,
         (whole, real): ([&str; W], [&str; R]),
     ) -> Result<Self, String> {
-        let file = folder.join(TICKS);
+        let file = folder.join(TICKS_FILE);
         let failed = |err: io::Error| {
             format!(
                 "cannot record in {} ({err}); give a new folder that may be written",
@@ -123,7 +123,7 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
             )
         };
         std::fs::create_dir(folder).map_err(failed)?;
-        atomic::create(&folder.join(SETTINGS), settings.as_bytes()).map_err(failed)?;
+        atomic::create(&folder.join(SETTINGS_FILE), settings.as_bytes()).map_err(failed)?;
         let mut lines = TickFile {
             to: BufWriter::new(File::create_new(&file).map_err(failed)?),
             hash: BASIS,
@@ -140,14 +140,14 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
     }
 
     /// Sends a tick; if the channel is full, drops and counts it.
-    pub fn push(&self, row: Row<W, R>) {
+    pub fn push(&self, row: TickRow<W, R>) {
         if self.ring.try_send(row).is_err() {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
     /// Writes the remaining ticks and the end, with a hash of the loop's final state.
-    pub fn finish(self, state_hash: u64) -> Result<Recorded, String> {
+    pub fn finish(self, state_hash: u64) -> Result<TickCounts, String> {
         let Self { ring, dropped, thread, file } = self;
         drop(ring);
         let lost = dropped.load(Ordering::Relaxed);
@@ -158,7 +158,7 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
             let hash = extend_hash(lines.hash, end.as_bytes());
             lines.put(&format!("{end}{hash:016x}\n"))?;
             lines.to.flush()?;
-            Ok(Recorded { ticks: lines.ticks, lost })
+            Ok(TickCounts { ticks: lines.ticks, lost_ticks: lost })
         });
         ended.map_err(|err| {
             format!(
@@ -172,7 +172,7 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
 /// Writes until the sender is dropped. It polls, so that the sender never spends time on waking it.
 fn write<const W: usize, const R: usize>(
     mut lines: TickFile,
-    rows: &Receiver<Row<W, R>>,
+    rows: &Receiver<TickRow<W, R>>,
 ) -> io::Result<TickFile> {
     let mut line = String::new();
     loop {
@@ -193,30 +193,30 @@ fn write<const W: usize, const R: usize>(
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
+pub enum TickEnd {
     Whole {
-        lost: u64,
+        lost_ticks: u64,
         /// Hash of the loop's final state.
-        left: u64,
+        state_hash: u64,
     },
     CutOff,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recording<const W: usize, const R: usize> {
+pub struct TickRecording<const W: usize, const R: usize> {
     pub settings: String,
-    pub rows: Vec<Row<W, R>>,
-    pub end: End,
+    pub rows: Vec<TickRow<W, R>>,
+    pub end: TickEnd,
 }
 
 /// The settings of a recording, whose owner knows their format.
 pub fn read_settings(folder: &Path) -> Result<String, String> {
-    read_text(&folder.join(SETTINGS))
+    read_text(&folder.join(SETTINGS_FILE))
 }
 
 /// Whether the ticks of a recording have these columns.
 pub fn has_columns(folder: &Path, whole: &[&str], real: &[&str]) -> Result<bool, String> {
-    let file = folder.join(TICKS);
+    let file = folder.join(TICKS_FILE);
     let mut head = String::new();
     let read = File::open(&file).and_then(|ticks| BufReader::new(ticks).read_line(&mut head));
     read.map_err(|err| unreadable(&file, &err))?;
@@ -231,11 +231,11 @@ fn unreadable(file: &Path, err: &io::Error) -> String {
     format!("cannot read {} ({err}); give the folder of a recording", file.display())
 }
 
-impl<const W: usize, const R: usize> Recording<W, R> {
+impl<const W: usize, const R: usize> TickRecording<W, R> {
     /// Reads a recording with these columns.
     pub fn read(folder: &Path, (whole, real): ([&str; W], [&str; R])) -> Result<Self, String> {
         let settings = read_settings(folder)?;
-        let file = folder.join(TICKS);
+        let file = folder.join(TICKS_FILE);
         let all = read_text(&file)?;
         let damaged = |line: usize, what: &str| {
             format!(
@@ -266,14 +266,14 @@ impl<const W: usize, const R: usize> Recording<W, R> {
                 return Ok(Self { settings, rows, end });
             }
             hash = extend_hash(hash, line.as_bytes());
-            rows.push(Row::of(content).ok_or_else(|| damaged(number, "it is not a tick"))?);
+            rows.push(TickRow::of(content).ok_or_else(|| damaged(number, "it is not a tick"))?);
         }
-        Ok(Self { settings, rows, end: End::CutOff })
+        Ok(Self { settings, rows, end: TickEnd::CutOff })
     }
 }
 
 /// Parses the last line; `None` if its count or hash is wrong.
-fn parse_end(content: &str, hash: u64, count: usize) -> Option<End> {
+fn parse_end(content: &str, hash: u64, count: usize) -> Option<TickEnd> {
     let (counts, written) = content.rsplit_once(',')?;
     let mut parts = counts.strip_prefix("end,")?.split(',');
     let ticks: usize = parts.next()?.parse().ok()?;
@@ -281,7 +281,7 @@ fn parse_end(content: &str, hash: u64, count: usize) -> Option<End> {
     let left = u64::from_str_radix(parts.next()?, 16).ok()?;
     let hash = extend_hash(hash, format!("{counts},").as_bytes());
     let is_right = ticks == count && u64::from_str_radix(written, 16).ok()? == hash;
-    is_right.then_some(End::Whole { lost, left })
+    is_right.then_some(TickEnd::Whole { lost_ticks: lost, state_hash: left })
 }
 
 #[cfg(test)]
@@ -290,12 +290,12 @@ mod tests {
 
     const COLUMNS: ([&str; 1], [&str; 2]) = (["tick"], ["x", "y"]);
 
-    fn row(tick: u64, x: f64) -> Row<1, 2> {
-        Row { whole: [tick], real: [x, -1.0 / x] }
+    fn row(tick: u64, x: f64) -> TickRow<1, 2> {
+        TickRow { whole: [tick], real: [x, -1.0 / x] }
     }
 
-    fn recorded(at: &Path, values: &[f64]) -> Recorded {
-        let recorder = Recorder::start(at, "a = 1\n", COLUMNS).unwrap();
+    fn recorded(at: &Path, values: &[f64]) -> TickCounts {
+        let recorder = TickRecorder::start(at, "a = 1\n", COLUMNS).unwrap();
         for (tick, x) in values.iter().enumerate() {
             recorder.push(row(tick as u64, *x));
         }
@@ -308,16 +308,16 @@ mod tests {
         let folder = at.path().join("one");
         let values = [0.1, 1e-310, f64::MAX, -0.0, f64::INFINITY, 1.0 / 3.0];
         let counts = recorded(&folder, &values);
-        assert_eq!(counts, Recorded { ticks: 6, lost: 0 });
-        let found = Recording::read(&folder, COLUMNS).unwrap();
+        assert_eq!(counts, TickCounts { ticks: 6, lost_ticks: 0 });
+        let found = TickRecording::read(&folder, COLUMNS).unwrap();
         assert_eq!(found.settings, "a = 1\n");
-        assert_eq!(found.end, End::Whole { lost: 0, left: 77 });
+        assert_eq!(found.end, TickEnd::Whole { lost_ticks: 0, state_hash: 77 });
         for (tick, (found, x)) in found.rows.iter().zip(values).enumerate() {
-            assert_eq!(found.differs(&row(tick as u64, x)), None);
+            assert_eq!(found.first_difference(&row(tick as u64, x)), None);
         }
-        assert_eq!(row(0, 0.0).differs(&row(0, -0.0)), Some(1));
+        assert_eq!(row(0, 0.0).first_difference(&row(0, -0.0)), Some(1));
         // An existing recording is never overwritten.
-        assert!(Recorder::start(&folder, "", COLUMNS).is_err());
+        assert!(TickRecorder::start(&folder, "", COLUMNS).is_err());
     }
 
     #[test]
@@ -325,26 +325,26 @@ mod tests {
         let at = tempfile::tempdir().unwrap();
         let folder = at.path().join("one");
         recorded(&folder, &[0.1, 0.2, 0.3]);
-        let file = folder.join(TICKS);
+        let file = folder.join(TICKS_FILE);
         let whole = std::fs::read_to_string(&file).unwrap();
         let head = whole.find('\n').unwrap() + 1;
         for length in head..whole.len() {
             std::fs::write(&file, &whole[..length]).unwrap();
-            let found = Recording::<1, 2>::read(&folder, COLUMNS).unwrap();
-            assert_eq!(found.end, End::CutOff, "{length}");
+            let found = TickRecording::<1, 2>::read(&folder, COLUMNS).unwrap();
+            assert_eq!(found.end, TickEnd::CutOff, "{length}");
             let lines = whole[..length].matches('\n').count();
             assert_eq!(found.rows.len(), lines - 1, "{length}");
         }
         for (from, to) in [("0.2", "0.4"), ("end,3", "end,2"), ("end,3,0,", "end,3,1,")] {
             std::fs::write(&file, whole.replacen(from, to, 1)).unwrap();
-            let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+            let reason = TickRecording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
             assert!(reason.contains("line 5") && reason.contains("damaged"), "{reason}");
         }
         std::fs::write(&file, format!("{whole}3,0.4,-2.5")).unwrap();
-        let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+        let reason = TickRecording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
         assert!(reason.contains("line 6: a line follows"), "{reason}");
         std::fs::write(&file, whole.replacen("0.2", "x", 1)).unwrap();
-        let reason = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+        let reason = TickRecording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
         assert!(reason.contains("line 3"), "{reason}");
     }
 
@@ -352,7 +352,7 @@ mod tests {
     fn dropped_ticks_are_counted_and_push_never_waits() {
         let (ring, rows) = sync_channel(CAPACITY);
         let at = tempfile::tempdir().unwrap();
-        let file = at.path().join(TICKS);
+        let file = at.path().join(TICKS_FILE);
         let lines = TickFile {
             to: BufWriter::new(File::create_new(&file).unwrap()),
             hash: BASIS,
@@ -365,13 +365,13 @@ mod tests {
                 write::<1, 2>(lines, &rows)
             })
             .unwrap();
-        let recorder = Recorder { ring, dropped: Arc::default(), thread, file };
+        let recorder = TickRecorder { ring, dropped: Arc::default(), thread, file };
         for tick in 0..CAPACITY as u64 + 10 {
             recorder.push(row(tick, 1.0));
         }
         go.send(()).unwrap();
         let counts = recorder.finish(0).unwrap();
         let ticks = CAPACITY as u64;
-        assert_eq!(counts, Recorded { ticks, lost: 10 });
+        assert_eq!(counts, TickCounts { ticks, lost_ticks: 10 });
     }
 }

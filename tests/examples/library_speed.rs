@@ -7,22 +7,22 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_runner::{Stopwatch, TimeScale};
-use palpate_tests::flow::{Flow, Window};
-use palpate_tests::many::{original, write};
+use palpate_tests::flow::{TestWindow, WindowFlow};
+use palpate_tests::sample_library::{read_original, write};
 use std::time::Duration;
 
 /// Times each search is made.
 const TIMES: usize = 5;
 
 /// What the heading of the list says.
-fn heading(window: &Window) -> Option<String> {
+fn heading(window: &TestWindow) -> Option<String> {
     let found = window.query_all_by_label_contains("found in").next()?;
     let node = found.accesskit_node();
     node.value().or_else(|| node.label()).map(|text| text.to_owned())
 }
 
 /// Draws until the heading tells of so many sessions; tells the time since `watch` began in ms, and the heading.
-fn until(flow: &mut Flow, count: &str, watch: &Stopwatch) -> (f64, String) {
+fn until(flow: &mut WindowFlow, count: &str, watch: &Stopwatch) -> (f64, String) {
     loop {
         flow.window.step();
         if let Some(text) = heading(&flow.window).filter(|text| text.starts_with(count)) {
@@ -36,12 +36,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count = std::env::args().nth(1);
     let count: usize = count.map_or(Ok(10_000), |text| text.parse())?;
     let folder = tempfile::tempdir()?;
-    let (original, watch) = (original(), Stopwatch::start());
+    let (original, watch) = (read_original(), Stopwatch::start());
     for number in 0..count {
         write(folder.path(), &original, number);
     }
     println!("{count} sessions written: {:.1} s", watch.seconds());
-    let mut flow = Flow::open_in(folder, TimeScale::Max);
+    let mut flow = WindowFlow::open_in(folder, TimeScale::Max);
     let watch = Stopwatch::start();
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     let all = format!("{count} sessions");

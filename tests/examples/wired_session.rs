@@ -11,9 +11,9 @@ use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::RampHold;
 use palpate_runner::TimeScale;
 use palpate_sessions::{
-    FolderSegments, LogWriter, Part, Parts, RawBlock, Row, Session, SessionFolder,
+    FolderSegments, LogBatch, LogPart, LogWriter, RawBlock, SampleRow, Session, SessionFolder,
 };
-use palpate_tests::recorded;
+use palpate_tests::recorded_runs;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     record(&wired);
     rewrite(&wired, &rotated)?;
     Session::scan_parts(&rotated, &mut |part| {
-        if let Part::Raw(block) = part {
+        if let LogPart::Raw(block) = part {
             print(block);
         }
     })?;
@@ -45,7 +45,7 @@ fn record(out: &Path) {
     };
     let rig = Box::new(WiredRig::new(rig));
     let scale = TimeScale::Factor(60.0);
-    recorded::to_its_end(recorded::start(rig, calibration, plan.plan(), scale, out));
+    recorded_runs::wait_for_end(recorded_runs::start(rig, calibration, plan.plan(), scale, out));
 }
 
 /// The same session in many segments.
@@ -69,14 +69,17 @@ fn rewrite(from: &Path, to: &Path) -> Result<(), Box<dyn Error>> {
 
 fn put<S: palpate_sessions::Sink>(
     log: &mut LogWriter<S>,
-    part: Part<'_>,
+    part: LogPart<'_>,
 ) -> Result<(), palpate_sessions::LogError> {
     match part {
-        Part::Samples(block) => log.append(&block.rows().collect::<Vec<Row>>(), &[]),
-        Part::Raw(block) => log.append_parts(&Parts { raw: &pieces(block), ..Parts::default() }),
-        Part::Health(health) => {
-            log.append_parts(&Parts { health: std::slice::from_ref(health), ..Parts::default() })
+        LogPart::Samples(block) => log.append(&block.rows().collect::<Vec<SampleRow>>(), &[]),
+        LogPart::Raw(block) => {
+            log.append_batch(&LogBatch { raw: &pieces(block), ..LogBatch::default() })
         }
+        LogPart::Health(health) => log.append_batch(&LogBatch {
+            health: std::slice::from_ref(health),
+            ..LogBatch::default()
+        }),
     }
 }
 

@@ -9,9 +9,9 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_analysis::fit::Recipe;
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::report::text::{self, ParameterText};
-use palpate_analysis::source::Wanted;
+use palpate_analysis::source::SourceSelection;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
@@ -26,17 +26,17 @@ use std::path::PathBuf;
 use std::time::Duration;
 use tempfile::TempDir;
 
-pub type Window = Harness<'static, WorkbenchApp>;
+pub type TestWindow = Harness<'static, WorkbenchApp>;
 
 /// A screen of a window.
 #[must_use]
-pub fn screen_of<T: Screen>(window: &Window) -> &T {
+pub fn screen_of<T: Screen>(window: &TestWindow) -> &T {
     window.state().screen().unwrap()
 }
 
 /// Where the exact fit of the run on the screen stands.
 #[must_use]
-pub fn refit(window: &Window) -> Refit<'_> {
+pub fn refit(window: &TestWindow) -> Refit<'_> {
     let run = window.state().snapshot().run.as_ref();
     screen_of::<RunScreen>(window).refit(run)
 }
@@ -45,13 +45,13 @@ pub fn refit(window: &Window) -> Refit<'_> {
 pub const FRAME: Duration = Duration::from_millis(5);
 
 /// A window on a simulated rig, driven by accessible name.
-pub struct Flow {
-    pub window: Window,
+pub struct WindowFlow {
+    pub window: TestWindow,
     /// Where its sessions go.
     pub folder: TempDir,
 }
 
-impl Flow {
+impl WindowFlow {
     /// Opens a window; the rig answers.
     #[must_use]
     pub fn open(scale: TimeScale) -> Self {
@@ -78,7 +78,7 @@ impl Flow {
     }
 
     /// Draws frames until `is_done`.
-    pub fn wait(&mut self, what: &str, is_done: impl Fn(&Window) -> bool) {
+    pub fn wait(&mut self, what: &str, is_done: impl Fn(&TestWindow) -> bool) {
         let end = Deadline::new();
         loop {
             self.window.step();
@@ -164,10 +164,11 @@ impl Flow {
         });
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();
-        let result = match Recipe::new(FitOptions::default(), Wanted::default()).fit(&session) {
-            Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
-            Err(err) => Err(err.to_string()),
-        };
+        let result =
+            match FitRecipe::new(FitOptions::default(), SourceSelection::default()).fit(&session) {
+                Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
+                Err(err) => Err(err.to_string()),
+            };
         match result {
             Ok(report) => {
                 self.says_all_of(&report);

@@ -2,13 +2,14 @@
 
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{Limits, Phase, Reading, RigCommand};
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{
-    Config, Derived, Effect, Input, Operator, Outcome, Record, State, step,
+    DerivedValues, Effect, EngineConfig, EngineInput, EngineState, Operator, Record, RunOutcome,
+    step,
 };
-use palpate_protocols::plans::{FindContact, LEAVE, Plan, Step, approach};
+use palpate_protocols::plans::{FindContact, LEAVE_TISSUE, Plan, Step, approach_steps};
 use std::sync::Arc;
 
 /// Grid of the watchdog, as the runner has it.
@@ -16,9 +17,9 @@ const TICK: Nanos = Nanos::from_millis(10);
 
 /// A sample with what the engine made of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct LabSample {
     pub reading: Reading,
-    pub derived: Derived,
+    pub derived: DerivedValues,
     pub phase: Phase,
     pub cycle: u32,
     pub step_index: usize,
@@ -27,19 +28,19 @@ pub struct Seen {
 /// The usual first steps of a plan: self-test, home, tare, contact.
 #[must_use]
 pub fn set_up(tare: Seconds, contact: FindContact) -> Vec<Step> {
-    approach(tare, contact)
+    approach_steps(tare, contact)
 }
 
 /// The usual last step of a plan.
 #[must_use]
 pub fn retract() -> Step {
-    LEAVE
+    LEAVE_TISSUE
 }
 
 /// A run of the engine without a runner.
 pub struct Lab<R: Rig> {
     pub rig: R,
-    pub state: Option<State>,
+    pub state: Option<EngineState>,
     /// Time of the newest input.
     pub now: Nanos,
     next_tick: Nanos,
@@ -49,23 +50,23 @@ pub struct Lab<R: Rig> {
     /// Every record with its time.
     pub records: Vec<(Nanos, Record)>,
     /// Every sample, if they are kept.
-    pub seen: Vec<Seen>,
+    pub seen: Vec<LabSample>,
     is_keeping: bool,
     /// Whether prompts are answered at once.
     pub is_answering: bool,
-    pub outcome: Option<Outcome>,
+    pub outcome: Option<RunOutcome>,
 }
 
 impl<R: Rig> Lab<R> {
     /// A rig with a plan that has not started.
     #[must_use]
-    pub fn new(rig: R, curve: Curve, plan: Plan) -> Self {
+    pub fn new(rig: R, curve: CalibrationCurve, plan: Plan) -> Self {
         let limits = plan.limits.tighten(Limits::for_travel(rig.description().travel));
         let config =
-            Config { rig: rig.description().clone(), limits, curve, plan, is_homed: false };
+            EngineConfig { rig: rig.description().clone(), limits, curve, plan, is_homed: false };
         Self {
             rig,
-            state: Some(State::new(Arc::new(config))),
+            state: Some(EngineState::new(Arc::new(config))),
             now: Nanos::ZERO,
             next_tick: TICK,
             is_sample_seen: false,
@@ -83,7 +84,7 @@ impl<R: Rig> Lab<R> {
     pub fn within(mut self, limits: Limits) -> Self {
         let mut config = self.state().config().clone();
         config.limits = config.plan.limits.tighten(limits);
-        self.state = Some(State::new(Arc::new(config)));
+        self.state = Some(EngineState::new(Arc::new(config)));
         self
     }
 
@@ -99,14 +100,14 @@ impl<R: Rig> Lab<R> {
     /// # Panics
     /// Never between calls.
     #[must_use]
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &EngineState {
         self.state.as_ref().expect("a state between inputs")
     }
 
     /// Gives the engine one input and does what it asks.
-    pub fn give(&mut self, input: Input) {
+    pub fn give(&mut self, input: EngineInput) {
         let reading = match &input {
-            Input::Reading(reading) => Some(*reading),
+            EngineInput::Reading(reading) => Some(*reading),
             _ => None,
         };
         let Some(state) = self.state.take() else {
@@ -119,13 +120,13 @@ impl<R: Rig> Lab<R> {
                     self.commands.push((self.now, command));
                     self.rig.send(command);
                 }
-                Effect::ByHand(action) => self.rig.by_hand(action),
+                Effect::ByHand(action) => self.rig.apply_hand_action(action),
                 Effect::Record(record) => self.records.push((self.now, record)),
                 Effect::Finished(outcome) => self.outcome = Some(outcome),
             }
         }
         if let (Some(reading), true) = (reading, self.is_keeping) {
-            self.seen.push(Seen {
+            self.seen.push(LabSample {
                 reading,
                 derived: *state.derived(),
                 phase: state.phase(),
@@ -141,7 +142,7 @@ impl<R: Rig> Lab<R> {
     }
 
     pub fn operator(&mut self, choice: Operator) {
-        self.give(Input::Operator { choice });
+        self.give(EngineInput::Operator { choice });
     }
 
     /// The next event of the rig, or a tick of the watchdog where none came.
@@ -151,26 +152,26 @@ impl<R: Rig> Lab<R> {
             let input = match event.body {
                 RigEventBody::Reading(reading) => {
                     self.is_sample_seen = true;
-                    Input::Reading(reading)
+                    EngineInput::Reading(reading)
                 }
-                RigEventBody::Ack(ack) => Input::Ack(ack),
-                RigEventBody::Fault(fault) => Input::Fault(fault),
+                RigEventBody::Ack(ack) => EngineInput::Ack(ack),
+                RigEventBody::Fault(fault) => EngineInput::Fault(fault),
             };
             self.give(input);
             for value in self.rig.take_sensors() {
-                self.give(Input::Sensor { value });
+                self.give(EngineInput::Sensor { value });
             }
         } else {
             self.now = self.next_tick;
             self.next_tick = self.next_tick + TICK;
             if !std::mem::take(&mut self.is_sample_seen) {
-                self.give(Input::Tick);
+                self.give(EngineInput::Tick);
             }
         }
     }
 
     /// Goes on until the run ends, holds after a stop, or `is_reached` says so. False if `most` passed first.
-    pub fn run_until(&mut self, most: Seconds, is_reached: impl Fn(&State) -> bool) -> bool {
+    pub fn run_until(&mut self, most: Seconds, is_reached: impl Fn(&EngineState) -> bool) -> bool {
         let end = self.now + Nanos::from_seconds(most);
         while self.now < end {
             let state = self.state();

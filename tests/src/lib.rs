@@ -1,10 +1,10 @@
 //! Fixtures shared by the tests that cross crates.
 
+pub mod contact_search;
 pub mod flow;
 pub mod lab;
-pub mod many;
-pub mod recorded;
-pub mod searching;
+pub mod recorded_runs;
+pub mod sample_library;
 pub mod simulated;
 
 use palpate_protocols::file::built_in;
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// # Panics
 /// If there is no such protocol, or it does not take these values.
 #[must_use]
-pub fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
+pub fn built_in_plan(name: &str, values: &[(&str, &str)]) -> Plan {
     let values = values.iter().map(|(key, value)| ((*key).into(), (*value).into()));
     let protocol = built_in(name).expect("a sound protocol").expect("a built-in protocol");
     protocol.plan(&values.collect::<BTreeMap<String, String>>()).expect("values that it takes")

@@ -1,46 +1,46 @@
 //! Reading, assessing and storing the library's calibrations, away from the window's thread.
 
-use crate::report::calibration::{Entry, Told};
+use crate::report::calibration::{CalibrationDetails, CalibrationEntry};
 use crate::report::calibration_plot::plots;
 use palpate_figures::figure::Plot;
-use palpate_model::calibration::{Bench, Calibration};
-use palpate_runner::programme::calibration_of;
+use palpate_model::calibration::{Calibration, CalibrationUse};
+use palpate_runner::programme::calibration_from_session;
 use palpate_runner::wall_now;
-use palpate_sessions::{Session, Shelf, age_days, save, supersede};
+use palpate_sessions::{CalibrationStore, Session, age_days, save_document, supersede_document};
 use std::path::Path;
 
 /// Calibrations of the library with their assessment, and the one just stored.
-pub struct Shelved {
+pub struct CalibrationOverview {
     /// The rig's own first, then those of the library by identifier.
-    pub shown: Vec<Shown>,
+    pub calibrations: Vec<CalibrationView>,
     /// Reasons for each calibration that cannot be read.
     pub unreadable: Vec<String>,
     /// Identifier of the one just stored, or the reason it was not.
-    pub kept: Option<Result<String, String>>,
+    pub stored: Option<Result<String, String>>,
 }
 
 /// One calibration with its details.
-pub struct Shown {
-    pub entry: Entry,
+pub struct CalibrationView {
+    pub entry: CalibrationEntry,
     pub calibration: Calibration,
     /// Details and plots, or the reason there are none.
-    pub told: Result<(Told, [Plot; 4]), String>,
+    pub details: Result<(CalibrationDetails, [Plot; 4]), String>,
     /// Reasons against using it on its rig.
     pub doubts: Vec<String>,
 }
 
-impl Shown {
-    fn of(entry: Entry, calibration: Calibration, rig: &str) -> Self {
-        let details = Told::of(&calibration).and_then(|details| {
+impl CalibrationView {
+    fn of(entry: CalibrationEntry, calibration: Calibration, rig: &str) -> Self {
+        let details = CalibrationDetails::of(&calibration).and_then(|details| {
             let plots = plots(&calibration, &details)?;
             Ok((details, plots))
         });
         Self {
-            told: details.map_err(|err| err.to_string()),
-            doubts: calibration.doubts(&Bench {
+            details: details.map_err(|err| err.to_string()),
+            doubts: calibration.validity_warnings(&CalibrationUse {
                 rig,
                 age_days: entry.age_days,
-                ..Bench::default()
+                ..CalibrationUse::default()
             }),
             entry,
             calibration,
@@ -53,31 +53,39 @@ pub fn read(
     library: &Path,
     own: (Calibration, String),
     kept: Option<Result<String, String>>,
-) -> Shelved {
+) -> CalibrationOverview {
     let (own, rig) = own;
     let now = wall_now();
-    let shelf = Shelf::open(library);
-    let entry = Entry::built_in(&own);
-    let mut shown = vec![Shown {
+    let shelf = CalibrationStore::open(library);
+    let entry = CalibrationEntry::built_in(&own);
+    let mut shown = vec![CalibrationView {
         // What comes with the rig needs no date.
         doubts: Vec::new(),
-        ..Shown::of(entry, own, &rig)
+        ..CalibrationView::of(entry, own, &rig)
     }];
-    shown.extend(shelf.kept.iter().map(|stored| {
+    shown.extend(shelf.documents.iter().map(|stored| {
         let age = age_days(&stored.document, now.into());
-        Shown::of(Entry::of(&shelf, stored, age), stored.document.clone(), &rig)
+        CalibrationView::of(
+            CalibrationEntry::of(&shelf, stored, age),
+            stored.document.clone(),
+            &rig,
+        )
     }));
-    Shelved { shown, unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(), kept }
+    CalibrationOverview {
+        calibrations: shown,
+        unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(),
+        stored: kept,
+    }
 }
 
 /// Stores the calibration a session measured, in the place of the one in force for its rig; tells its id.
-pub fn keep(library: &Path, session: &Path, name: &str) -> Result<String, String> {
+pub fn store_calibration(library: &Path, session: &Path, name: &str) -> Result<String, String> {
     let session = Session::open(session).map_err(|err| err.to_string())?;
-    let calibration = calibration_of(&session, name).map_err(|err| err.to_string())?;
-    let shelf = Shelf::open(library);
+    let calibration = calibration_from_session(&session, name).map_err(|err| err.to_string())?;
+    let shelf = CalibrationStore::open(library);
     let stored = match shelf.in_force(&calibration.rig) {
-        Some(old) => supersede(library, &old.id, &calibration),
-        None => save(library, &calibration),
+        Some(old) => supersede_document(library, &old.id, &calibration),
+        None => save_document(library, &calibration),
     };
     stored.map(|stored| stored.id).map_err(|err| err.to_string())
 }

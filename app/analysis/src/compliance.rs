@@ -12,18 +12,18 @@ use palpate_model::units::{Depth, Newtons, Position};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
 use palpate_rheology::fit::FitSample;
-use palpate_sessions::compliances::{Kept, Shelf};
-use palpate_sessions::{LibraryError, Row, Session};
-use palpate_tables::export::Beside;
+use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
+use palpate_sessions::{LibraryError, SampleRow, Session};
+use palpate_tables::export::ExtraColumns;
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
 
 /// Name that stands for the compliance in force for a session's rig.
-pub const LAST: &str = "last";
+pub const LATEST_COMPLIANCE: &str = "last";
 
 #[derive(Debug, Error)]
-pub enum MeasureError {
+pub enum ComplianceMeasurementError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
@@ -44,18 +44,18 @@ pub enum MeasureError {
 
 /// The compliance that a session of the protocol `stiff-surface` tells, from the ways in of all presses at or
 /// above `seating`; without it from 0.3 of the highest force, as the search for the surface takes it.
-pub fn measured(
+pub fn compliance_from_session(
     session: &Session,
     seating: Option<Newtons>,
-) -> Result<RigCompliance, MeasureError> {
+) -> Result<RigCompliance, ComplianceMeasurementError> {
     if session.manifest.imported.is_some() {
-        return Err(MeasureError::Imported);
+        return Err(ComplianceMeasurementError::Imported);
     }
     let presses = presses(session)?;
     let forces = presses.iter().flat_map(|(_, samples)| samples);
     let highest = forces.map(|sample| sample.force.0).fold(0.0, f64::max);
     if presses.is_empty() {
-        return Err(MeasureError::NoPress);
+        return Err(ComplianceMeasurementError::NoPress);
     }
     let seating = seating.unwrap_or(Newtons(FindBase::SEATED_SHARE * highest));
     let manifest = &session.manifest;
@@ -71,15 +71,15 @@ pub fn measured(
 }
 
 /// Loading samples after a stiff surface was found, press by press.
-fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureError> {
+fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, ComplianceMeasurementError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
-    let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
+    let noise = noise_of(&decisions).ok_or(ComplianceMeasurementError::NoPress)?;
     let found = records(&decisions).rev().find_map(|(after, record)| match record {
         Record::BaseFound { position, .. } => Some((after as usize, *position)),
         _ => None,
     });
-    let (after, surface) = found.ok_or(MeasureError::NoSurface)?;
+    let (after, surface) = found.ok_or(ComplianceMeasurementError::NoSurface)?;
     let trusted = trusted_samples(&decisions);
     let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
     let rows = session.rows.iter().enumerate().take(trusted).skip(after);
@@ -102,7 +102,7 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
 }
 
 #[derive(Debug, Error)]
-pub enum CorrectionError {
+pub enum ComplianceCorrectionError {
     #[error(transparent)]
     Library(#[from] LibraryError),
     #[error(
@@ -125,35 +125,38 @@ enum CorrectionChoice {
     Raw,
     /// The one in force for the rig of each record.
     InForce,
-    This(Box<Kept>),
+    This(Box<StoredCompliance>),
 }
 
 /// Compliance for each record.
 #[derive(Debug)]
-pub struct Corrections {
+pub struct ComplianceCorrections {
     choice: CorrectionChoice,
-    shelf: Shelf,
+    shelf: ComplianceStore,
 }
 
-impl Corrections {
+impl ComplianceCorrections {
     /// Depths stay raw; with a library, [`Self::apply`] computes what the compliance in force would change.
     #[must_use]
     pub fn none(library: Option<&Path>) -> Self {
-        Self { choice: CorrectionChoice::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
+        Self {
+            choice: CorrectionChoice::Raw,
+            shelf: library.map(ComplianceStore::open).unwrap_or_default(),
+        }
     }
 
-    /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
-    pub fn named(name: &str, library: Option<&Path>) -> Result<Self, CorrectionError> {
-        let shelf = library.map(Shelf::open).unwrap_or_default();
+    /// What a user names: [`LATEST_COMPLIANCE`] for the one in force for each record's rig, a file, or an id of the library.
+    pub fn named(name: &str, library: Option<&Path>) -> Result<Self, ComplianceCorrectionError> {
+        let shelf = library.map(ComplianceStore::open).unwrap_or_default();
         let path = Path::new(name);
-        let choice = if name == LAST {
+        let choice = if name == LATEST_COMPLIANCE {
             CorrectionChoice::InForce
         } else if path.is_file() {
             let stem = path.file_stem().unwrap_or_default();
-            CorrectionChoice::This(Box::new(Kept {
+            CorrectionChoice::This(Box::new(StoredCompliance {
                 id: stem.to_string_lossy().into_owned(),
                 path: path.into(),
-                document: palpate_sessions::shelf::read(path)?,
+                document: palpate_sessions::document_store::read_document(path)?,
             }))
         } else {
             CorrectionChoice::This(Box::new(shelf.find(name)?.clone()))
@@ -162,19 +165,22 @@ impl Corrections {
     }
 
     /// The document for a record of a rig, and whether depths are corrected with it; a table has no rig.
-    pub fn of_rig(&self, rig: Option<&str>) -> Result<Option<(&Kept, bool)>, CorrectionError> {
+    pub fn of_rig(
+        &self,
+        rig: Option<&str>,
+    ) -> Result<Option<(&StoredCompliance, bool)>, ComplianceCorrectionError> {
         let in_force = |rig: &str| self.shelf.in_force(rig);
         match (&self.choice, rig) {
             (CorrectionChoice::Raw, rig) => {
                 Ok(rig.and_then(in_force).map(|stored| (stored, false)))
             }
-            (CorrectionChoice::InForce, None) => Err(CorrectionError::NoRig),
+            (CorrectionChoice::InForce, None) => Err(ComplianceCorrectionError::NoRig),
             (CorrectionChoice::InForce, Some(rig)) => match in_force(rig) {
                 Some(stored) => Ok(Some((stored, true))),
-                None => Err(CorrectionError::NoneInForce { rig: rig.into() }),
+                None => Err(ComplianceCorrectionError::NoneInForce { rig: rig.into() }),
             },
             (CorrectionChoice::This(stored), Some(rig)) if stored.document.rig != rig => {
-                Err(CorrectionError::OtherRig {
+                Err(ComplianceCorrectionError::OtherRig {
                     id: stored.id.clone(),
                     of: stored.document.rig.clone(),
                     rig: rig.into(),
@@ -186,11 +192,14 @@ impl Corrections {
 
     /// Corrects what is to be fitted, where that is choice, and tells what the compliance does to it; `None`
     /// where none is choice and none is kept.
-    pub fn apply(&self, source: &mut FitSource) -> Result<Option<Correction>, CorrectionError> {
+    pub fn apply(
+        &self,
+        source: &mut FitSource,
+    ) -> Result<Option<ComplianceCorrection>, ComplianceCorrectionError> {
         let Some((stored, is_applied)) = self.of_rig(source.rig.as_deref())? else {
             return Ok(None);
         };
-        let correction = Correction::of(stored, is_applied, &source.samples);
+        let correction = ComplianceCorrection::of(stored, is_applied, &source.samples);
         if is_applied {
             correct_samples(&mut source.samples, &stored.document.compliance());
             source.notes.extend(correction.doubt.clone());
@@ -206,7 +215,7 @@ impl Corrections {
 
 /// Effect of a compliance on the depths of a record.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Correction {
+pub struct ComplianceCorrection {
     pub id: String,
     /// Machine compliance in mm/N.
     pub mm_per_n: f64,
@@ -224,8 +233,8 @@ pub struct Correction {
     pub doubt: Option<String>,
 }
 
-impl Correction {
-    fn of(stored: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
+impl ComplianceCorrection {
+    fn of(stored: &StoredCompliance, is_applied: bool, samples: &[FitSample]) -> Self {
         let known = samples.iter().filter(|sample| sample.is_measured());
         let peak = known.map(|sample| sample.force.0).fold(0.0, f64::max);
         let document = &stored.document;
@@ -297,13 +306,16 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
 
 /// The corrected depths of a session as columns beside its own: empty before contact, and where the converter
 /// was at an end of its range or an interlock had tripped, for there the force is not known.
-pub fn columns(session: &Session, stored: &Kept) -> Result<Beside, SourceError> {
+pub fn corrected_depth_columns(
+    session: &Session,
+    stored: &StoredCompliance,
+) -> Result<ExtraColumns, SourceError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let noise = noise_of(&decisions);
     let compliance = stored.document.compliance();
-    let one = |(index, row): (usize, &Row)| -> Option<CorrectedDepth> {
+    let one = |(index, row): (usize, &SampleRow)| -> Option<CorrectedDepth> {
         let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
         if index >= trusted || is_saturated(session, row) {
             return None;
@@ -322,7 +334,7 @@ pub fn columns(session: &Session, stored: &Kept) -> Result<Beside, SourceError> 
         "mm_per_n": stored.document.mm_per_n,
         "std_error_mm_per_n": stored.document.std_error_mm_per_n,
     });
-    Ok(Beside {
+    Ok(ExtraColumns {
         columns: vec![
             ("depth_corrected_mm", "mm", column(|one| one.depth.0)),
             ("depth_corrected_sigma_mm", "mm", column(|one| one.sigma_mm)),

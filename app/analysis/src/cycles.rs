@@ -1,18 +1,18 @@
 //! Reads sessions and foreign tables for a cycle analysis.
 
-use crate::edited;
+use crate::edited_session;
+use crate::recordings::is_session;
 use crate::source::{
     SourceError, calibration_of, decisions, is_saturated, records, table_of_imported,
     trusted_samples,
 };
-use crate::sources::is_session;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
 use palpate_protocols::engine::{Effect, Record};
-use palpate_rheology::cycles::{CycleSample, by_depth};
-use palpate_sessions::{Row, Session};
-use palpate_tables::import::{ColumnNames, Table, read_table};
+use palpate_rheology::cycles::{CycleSample, split_by_depth};
+use palpate_sessions::{SampleRow, Session};
+use palpate_tables::import::{ColumnNames, MeasurementTable, read_table};
 use std::path::Path;
 
 /// Samples of a record in cycles, with remarks on them.
@@ -43,17 +43,17 @@ impl CycleSource {
 /// Reads a session folder, a session file or a table; `columns` names the columns of a table without a header.
 pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, SourceError> {
     if is_session(path) {
-        return of_session(&edited::open(path)?.session);
+        return of_session(&edited_session::open(path)?.session);
     }
     let mut table = read_table(path, columns)?;
     let notes = std::mem::take(&mut table.notes);
     Ok(of_table(&table, notes))
 }
 
-fn of_table(table: &Table, mut notes: Vec<String>) -> CycleSource {
+fn of_table(table: &MeasurementTable, mut notes: Vec<String>) -> CycleSource {
     notes.push("a table: its cycles, holds and unloading are found from the depth".into());
     CycleSource {
-        samples: by_depth(&table.t, &table.depth, &table.force),
+        samples: split_by_depth(&table.t, &table.depth, &table.force),
         notes,
         ..CycleSource::default()
     }
@@ -167,8 +167,8 @@ fn oscillations(decisions: &[(u64, Effect)]) -> impl Iterator<Item = (usize, Osc
 }
 
 /// Rows of the first motion after so many samples; `None` if there is none.
-fn motion_after(rows: &[Row], after: usize) -> Option<std::ops::Range<usize>> {
-    let is_moving = |row: &Row| AxisStatus(row.status).has(AxisStatus::MOVING);
+fn motion_after(rows: &[SampleRow], after: usize) -> Option<std::ops::Range<usize>> {
+    let is_moving = |row: &SampleRow| AxisStatus(row.status).has(AxisStatus::MOVING);
     let later = rows.get(after..)?;
     let start = after + later.iter().position(is_moving)?;
     let count = rows[start..].iter().take_while(|row| is_moving(row)).count();
@@ -179,15 +179,15 @@ fn motion_after(rows: &[Row], after: usize) -> Option<std::ops::Range<usize>> {
 mod tests {
     use super::*;
     use palpate_model::Nanos;
-    use palpate_sessions::record::{Entry, EntryKind};
+    use palpate_sessions::record::{EntryKind, LogEntry};
 
     fn recorded() -> Session {
         let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         Session::open(&sessions.join("ramp-hold-lab")).unwrap()
     }
 
-    fn decided(effect: &Effect, after_sample: usize) -> Entry {
-        Entry {
+    fn decided(effect: &Effect, after_sample: usize) -> LogEntry {
+        LogEntry {
             kind: EntryKind::Decision,
             order: u64::MAX,
             after_sample: after_sample as u64,

@@ -1,15 +1,15 @@
 //! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
 //! tissue unless the operator acknowledges it.
 
-use crate::find::session_folders;
+use crate::catalog_search::session_folders;
 use crate::progress::Progress;
 use crate::source::{SourceError, calibration_of, decisions, records};
-use palpate_model::calibration::{Calibration, CheckResult, KnownWeight};
+use palpate_model::calibration::{Calibration, KnownWeight, WeightCheck};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
-use palpate_protocols::weighed::{Readings, Weighed};
-use palpate_sessions::checks::{CheckPart, DailyCheck, last_of_day, read_checks};
+use palpate_protocols::weight_readings::{WeightReading, WeightReadings};
+use palpate_sessions::checks::{CheckPart, DailyCheck, last_check_of_day, read_checks};
 use palpate_sessions::{ChainError, Session};
 use std::path::Path;
 use std::time::SystemTime;
@@ -32,8 +32,8 @@ fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
 pub struct PastCheck {
     pub check: DailyCheck,
     /// The empty cell, and the known weight; none where the session is not in the library or lacks the reading.
-    pub zero: Option<Deviation>,
-    pub weight: Option<Deviation>,
+    pub zero: Option<DailyCheckDeviation>,
+    pub weight: Option<DailyCheckDeviation>,
 }
 
 /// The newest checks of a rig, oldest first, so many at most, each with what its session in the library measured.
@@ -52,7 +52,7 @@ pub fn past_checks(
     let count = checks.len();
     let mut past = Vec::with_capacity(count);
     for (done, check) in checks.into_iter().enumerate() {
-        if progress.tell(done, count, "the sessions of the checks").is_break() {
+        if progress.report(done, count, "the sessions of the checks").is_break() {
             break;
         }
         let folder = folders.get(&check.session_id);
@@ -63,7 +63,7 @@ pub fn past_checks(
 }
 
 /// What a session measured of zero and weight, as far as it can be read.
-fn deviations(session: &Path) -> [Option<Deviation>; 2] {
+fn deviations(session: &Path) -> [Option<DailyCheckDeviation>; 2] {
     let read = || -> Option<_> {
         let session = Session::open(session).ok()?;
         Some((calibration_of(&session).ok()?, decisions(&session).ok()?))
@@ -73,7 +73,7 @@ fn deviations(session: &Path) -> [Option<Deviation>; 2] {
     let weight = weight_of(&calibration, &records).ok();
     [
         zero_of(&calibration, &records).ok().map(|(_, zero)| zero),
-        weight.map(|weight| Deviation { newtons: weight.error_n, limit: weight.limit_n }),
+        weight.map(|weight| DailyCheckDeviation { newtons: weight.error_n, limit: weight.limit_n }),
     ]
 }
 
@@ -82,7 +82,7 @@ fn records_of(decisions: &[(u64, Effect)]) -> Vec<&Record> {
 }
 
 /// Judges a session of the daily check. What was not done has not passed.
-pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
+pub fn assess_daily_check(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
     let calibration = calibration_of(session)?;
     let decisions = decisions(session)?;
     let records = records_of(&decisions);
@@ -102,14 +102,14 @@ pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
 
 /// Mass in g and signal of every reading, in order.
 fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
-    let readings = Readings::of(records.iter().copied());
-    let pair = |one: &Weighed| (one.mass_g(), one.volts());
+    let readings = WeightReadings::of(records.iter().copied());
+    let pair = |one: &WeightReading| (one.mass_g(), one.volts());
     readings.all().iter().map(pair).collect()
 }
 
 /// How far a force is from what it should be, and how far it may be, both in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Deviation {
+pub struct DailyCheckDeviation {
     /// Measured less expected.
     pub newtons: f64,
     /// Largest magnitude that passes.
@@ -117,20 +117,25 @@ pub struct Deviation {
 }
 
 /// The signal of the empty cell and how far its force is from zero.
-fn zero_of(calibration: &Calibration, records: &[&Record]) -> Result<(Volts, Deviation), String> {
+fn zero_of(
+    calibration: &Calibration,
+    records: &[&Record],
+) -> Result<(Volts, DailyCheckDeviation), String> {
     let (_, volts) = readings(records)
         .into_iter()
         .find(|(mass_g, _)| *mass_g == 0.0)
         .ok_or("the empty cell was not read; make the check again")?;
     let curve = calibration.curve().map_err(|err| err.to_string())?;
     let (_, heaviest) = curve.force_range();
-    let deviation =
-        Deviation { newtons: curve.newtons_from_volts(volts).0, limit: ZERO_SHARE * heaviest.0 };
+    let deviation = DailyCheckDeviation {
+        newtons: curve.newtons_from_volts(volts).0,
+        limit: ZERO_SHARE * heaviest.0,
+    };
     Ok((volts, deviation))
 }
 
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
-    let (volts, Deviation { newtons, limit }) = zero_of(calibration, records)?;
+    let (volts, DailyCheckDeviation { newtons, limit }) = zero_of(calibration, records)?;
     let is_passed = newtons.abs() <= limit;
     let side = if is_passed { "within" } else { "beyond" };
     let sentence = format!(
@@ -145,7 +150,7 @@ fn advised(is_passed: bool, sentence: String, advice: &str) -> (bool, String) {
     (is_passed, if is_passed { sentence } else { format!("{sentence}; {advice}") })
 }
 
-fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<CheckResult, String> {
+fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<WeightCheck, String> {
     let mut tare = None;
     let known = readings(records).into_iter().find(|(mass_g, volts)| {
         if *mass_g == 0.0 {
@@ -185,7 +190,7 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
 
 /// Effect of the daily check on a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Gate {
+pub enum DailyCheckGate {
     Open,
     Note(String),
     /// The operator must acknowledge it, which is recorded.
@@ -194,13 +199,13 @@ pub enum Gate {
 
 /// Whether a plan may touch something, so that the rig's daily check has a say in it.
 #[must_use]
-pub fn is_gated(plan: &Plan) -> bool {
+pub fn needs_daily_check(plan: &Plan) -> bool {
     let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
     let is_touching = |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog(_)));
     plan.steps.iter().any(|planned| is_touching(&planned.step))
 }
 
-impl Gate {
+impl DailyCheckGate {
     /// What to tell before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
     pub fn of(
@@ -210,19 +215,21 @@ impl Gate {
         is_virtual: bool,
         now: SystemTime,
     ) -> Result<Self, ChainError> {
-        if !is_gated(plan) {
+        if !needs_daily_check(plan) {
             return Ok(Self::Open);
         }
         let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;
         let none = format!("rig {rig} had no daily check today");
-        Ok(match last_of_day(&checks, now.into()) {
+        Ok(match last_check_of_day(&checks, now.into()) {
             Some(check) if check.is_passed => Self::Open,
             Some(check) => Self::Acknowledge(format!(
-                "rig {rig} failed its daily check today ({}); mend it and repeat '{HOW}'",
+                "rig {rig} failed its daily check today ({}); mend it and repeat '{DAILY_CHECK_COMMAND}'",
                 check.failures()
             )),
-            None if is_virtual => Self::Note(format!("{none}; '{HOW}' makes one")),
-            None => Self::Acknowledge(format!("{none}; make one with '{HOW}' first")),
+            None if is_virtual => Self::Note(format!("{none}; '{DAILY_CHECK_COMMAND}' makes one")),
+            None => {
+                Self::Acknowledge(format!("{none}; make one with '{DAILY_CHECK_COMMAND}' first"))
+            }
         })
     }
 
@@ -234,7 +241,7 @@ impl Gate {
     }
 }
 
-pub const HOW: &str = "palpate daily-check";
+pub const DAILY_CHECK_COMMAND: &str = "palpate daily-check";
 
 #[cfg(test)]
 mod tests {
@@ -333,9 +340,9 @@ mod tests {
         let at = Some(library.path());
         let now = palpate_runner::wall_now();
         let plan = RampHold::default().plan();
-        let gate = |is_virtual| Gate::of(&plan, at, "bench", is_virtual, now).unwrap();
-        assert!(matches!(gate(true), Gate::Note(_)));
-        assert!(matches!(gate(false), Gate::Acknowledge(_)));
+        let gate = |is_virtual| DailyCheckGate::of(&plan, at, "bench", is_virtual, now).unwrap();
+        assert!(matches!(gate(true), DailyCheckGate::Note(_)));
+        assert!(matches!(gate(false), DailyCheckGate::Acknowledge(_)));
         let mut check = DailyCheck {
             at: now.into(),
             rig: "bench".into(),
@@ -346,13 +353,16 @@ mod tests {
             parts: vec![part("home", Ok((false, "two homings differ".into())))],
         };
         add_check(library.path(), &check).unwrap();
-        let Gate::Acknowledge(why) = gate(true) else {
+        let DailyCheckGate::Acknowledge(why) = gate(true) else {
             panic!("a failed check is to be acknowledged");
         };
         assert!(why.contains("two homings differ") && why.contains("palpate daily-check"), "{why}");
         // The remedy itself is never refused.
         let calibration = Plan::of("load-cell-calibration", 1, Vec::new());
-        assert_eq!(Gate::of(&calibration, at, "bench", false, now).unwrap(), Gate::Open);
+        assert_eq!(
+            DailyCheckGate::of(&calibration, at, "bench", false, now).unwrap(),
+            DailyCheckGate::Open
+        );
         // Of the built-in protocols, those that cannot touch stay open.
         let built_in = |name: &str, values: &[(&str, &str)]| {
             let protocol = palpate_protocols::file::built_in(name).unwrap().unwrap();
@@ -360,8 +370,8 @@ mod tests {
             protocol.plan(&values.iter().map(own).collect()).unwrap()
         };
         let is_open = |plan: &Plan| {
-            let gate = Gate::of(plan, at, "bench", false, now).unwrap();
-            gate == Gate::Open
+            let gate = DailyCheckGate::of(plan, at, "bench", false, now).unwrap();
+            gate == DailyCheckGate::Open
         };
         let names = palpate_protocols::file::BUILT_IN.iter().map(|(name, _)| *name);
         let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
@@ -372,6 +382,6 @@ mod tests {
         assert!(!is_open(&plan));
         check.is_passed = true;
         add_check(library.path(), &check).unwrap();
-        assert_eq!(gate(false), Gate::Open);
+        assert_eq!(gate(false), DailyCheckGate::Open);
     }
 }

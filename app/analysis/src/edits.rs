@@ -1,12 +1,13 @@
 //! Edits of sessions: tags, notes, data quality and reviews. Each is a record beside the log and overwrites nothing.
 
 use crate::progress::Progress;
-use crate::report::said::tags;
+use crate::report::session_text::tags;
 use chrono::{DateTime, Utc};
 use palpate_runner::wall_now;
-use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
+use palpate_sessions::analyses::{Analyses, AnalysisError, read_session_inputs};
 use palpate_sessions::{
-    Change, Decision, EDITS_FILE, Edit, EditError, Edits, ReadError, Summary, Verdict, add_edit,
+    DataQuality, EDITS_FILE, Edit, EditChange, EditError, Edits, ReadError, ReviewDecision,
+    SessionSummary, add_edit,
 };
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -19,7 +20,7 @@ pub fn author(given: Option<&str>) -> String {
 }
 
 #[derive(Debug, Error)]
-pub enum SayFailure {
+pub enum EditFailure {
     #[error(transparent)]
     Read(#[from] ReadError),
     #[error(transparent)]
@@ -30,19 +31,24 @@ pub enum SayFailure {
 
 /// A session to be edited.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct EditTarget {
     pub folder: PathBuf,
     pub id: String,
     pub edits: Edits,
 }
 
-impl Subject {
-    pub fn read(folder: &Path) -> Result<Self, SayFailure> {
-        let id = Summary::read(folder)?.manifest.session_id;
+impl EditTarget {
+    pub fn read(folder: &Path) -> Result<Self, EditFailure> {
+        let id = SessionSummary::read(folder)?.manifest.session_id;
         Ok(Self { edits: Edits::read(folder, &id)?, folder: folder.to_owned(), id })
     }
 
-    pub fn say(&self, by: &str, reason: &str, change: Change) -> Result<Edit, SayFailure> {
+    pub fn add_edit(
+        &self,
+        by: &str,
+        reason: &str,
+        change: EditChange,
+    ) -> Result<Edit, EditFailure> {
         let edit = Edit {
             at: wall_now().into(),
             by: by.to_owned(),
@@ -54,30 +60,30 @@ impl Subject {
     }
 
     /// A review of the session as it is now: with the hash of every file of the log and of the analyses.
-    pub fn review(&self, decision: Decision) -> Result<Change, SayFailure> {
-        let mut seen = inputs_of(&self.folder)?;
+    pub fn review(&self, decision: ReviewDecision) -> Result<EditChange, EditFailure> {
+        let mut seen = read_session_inputs(&self.folder)?;
         // The order of the edits shows which came before; the review itself is among them.
         seen.retain(|one| one.what != EDITS_FILE);
         seen.extend(Analyses::read(&self.folder, &self.id)?.input());
-        Ok(Change::Review { decision, seen })
+        Ok(EditChange::Review { decision, seen })
     }
 }
 
 /// An edit of one or several sessions.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Saying {
+pub enum SessionEdit {
     Tags {
         add: Vec<String>,
         remove: Vec<String>,
     },
     Note(String),
     /// Data quality, and the reason.
-    Verdict(Verdict, String),
+    Verdict(DataQuality, String),
     /// A reviewer's decision, and the reason.
-    Review(Decision, String),
+    Review(ReviewDecision, String),
 }
 
-impl Saying {
+impl SessionEdit {
     pub fn words(&self) -> String {
         match self {
             Self::Tags { add, remove } => tags(add, remove),
@@ -93,22 +99,22 @@ impl Saying {
 struct Step {
     folder: PathBuf,
     wrote: DateTime<Utc>,
-    written: (Change, String),
-    opposite: (Change, String),
+    written: (EditChange, String),
+    opposite: (EditChange, String),
 }
 
 /// Edits made together, which are undone together.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Act {
+pub struct UndoableEdits {
     pub words: String,
     steps: Vec<Step>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Said {
+pub struct EditOutcome {
     pub words: String,
     /// The part that can be undone.
-    pub act: Option<Act>,
+    pub undo: Option<UndoableEdits>,
     /// A sentence for each session that could not be edited.
     pub failed: Vec<String>,
 }
@@ -127,11 +133,11 @@ fn each<T>(
     progress: &dyn Progress,
     folder: impl Fn(&T) -> &Path,
     one: impl Fn(&T) -> Result<(Option<Step>, bool), String>,
-) -> Said {
+) -> EditOutcome {
     let (mut steps, mut failed, mut written) = (Vec::new(), Vec::new(), 0);
     for (done, item) in of.iter().enumerate() {
         let name = folder(item).file_name().unwrap_or_default();
-        if progress.tell(done, of.len(), &name.to_string_lossy()).is_break() {
+        if progress.report(done, of.len(), &name.to_string_lossy()).is_break() {
             let remaining = sessions(of.len() - done);
             failed.push(format!("{remaining} not changed: cancelled"));
             break;
@@ -145,20 +151,33 @@ fn each<T>(
         }
     }
     let words = format!("{words} on {}", sessions(written));
-    Said { act: (!steps.is_empty()).then(|| Act { words: words.clone(), steps }), words, failed }
+    EditOutcome {
+        undo: (!steps.is_empty()).then(|| UndoableEdits { words: words.clone(), steps }),
+        words,
+        failed,
+    }
 }
 
 /// Edits sessions. Notes and reviews stay: only tags and data quality can be undone.
 #[must_use]
-pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &dyn Progress) -> Said {
+pub fn edit_sessions(
+    saying: &SessionEdit,
+    folders: &[PathBuf],
+    by: &str,
+    progress: &dyn Progress,
+) -> EditOutcome {
     let one = |folder: &PathBuf| say_one(saying, folder, by).map_err(|err| err.to_string());
     each(&saying.words(), folders, progress, |it| it.as_path(), one)
 }
 
-fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bool), SayFailure> {
-    let subject = Subject::read(folder)?;
+fn say_one(
+    saying: &SessionEdit,
+    folder: &Path,
+    by: &str,
+) -> Result<(Option<Step>, bool), EditFailure> {
+    let subject = EditTarget::read(folder)?;
     let (change, reason, opposite) = match saying {
-        Saying::Tags { add, remove } => {
+        SessionEdit::Tags { add, remove } => {
             let has = subject.edits.tags();
             // Only what changes is written, so that only that is undone.
             let (mut add, mut remove) = (add.clone(), remove.clone());
@@ -167,20 +186,22 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
             if add.is_empty() && remove.is_empty() {
                 return Ok((None, false));
             }
-            let opposite = Change::Tags { add: remove.clone(), remove: add.clone() };
-            (Change::Tags { add, remove }, "", Some((opposite, String::new())))
+            let opposite = EditChange::Tags { add: remove.clone(), remove: add.clone() };
+            (EditChange::Tags { add, remove }, "", Some((opposite, String::new())))
         }
-        Saying::Note(text) => (Change::Note, text.as_str(), None),
-        Saying::Review(decision, reason) => (subject.review(*decision)?, reason.as_str(), None),
-        Saying::Verdict(verdict, reason) => {
+        SessionEdit::Note(text) => (EditChange::Note, text.as_str(), None),
+        SessionEdit::Review(decision, reason) => {
+            (subject.review(*decision)?, reason.as_str(), None)
+        }
+        SessionEdit::Verdict(verdict, reason) => {
             let opposite = subject
                 .edits
                 .verdict()
-                .map(|(verdict, edit)| (Change::Verdict { verdict }, edit.reason.clone()));
-            (Change::Verdict { verdict: *verdict }, reason.as_str(), opposite)
+                .map(|(verdict, edit)| (EditChange::Verdict { verdict }, edit.reason.clone()));
+            (EditChange::Verdict { verdict: *verdict }, reason.as_str(), opposite)
         }
     };
-    let wrote = subject.say(by, reason, change.clone())?.at;
+    let wrote = subject.add_edit(by, reason, change.clone())?.at;
     let written = (change, reason.to_owned());
     let folder = folder.to_owned();
     Ok((opposite.map(|opposite| Step { folder, wrote, written, opposite }), true))
@@ -188,27 +209,27 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
 
 /// Writes the opposite of edits, as records of their own. Undoing the result repeats the edits.
 #[must_use]
-pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
+pub fn undo_edits(act: &UndoableEdits, by: &str, progress: &dyn Progress) -> EditOutcome {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
     let mut outcome = each("", &act.steps, progress, |step| &step.folder, one);
-    outcome.words = match outcome.act {
+    outcome.words = match outcome.undo {
         Some(_) => act.words.clone(),
         None => "nothing was written".into(),
     };
-    if let Some(opposite) = &mut outcome.act {
+    if let Some(opposite) = &mut outcome.undo {
         opposite.words.clone_from(&act.words);
     }
     outcome
 }
 
 fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
-    let subject = Subject::read(&step.folder).map_err(|err| err.to_string())?;
+    let subject = EditTarget::read(&step.folder).map_err(|err| err.to_string())?;
     let (change, reason) = &step.opposite;
     let is_newest = subject.edits.verdict().is_some_and(|(_, edit)| edit.at == step.wrote);
-    if matches!(change, Change::Verdict { .. }) && !is_newest {
+    if matches!(change, EditChange::Verdict { .. }) && !is_newest {
         return Err("its verdict was given again since, so it is not undone".into());
     }
-    let edit = subject.say(by, reason, change.clone()).map_err(|err| err.to_string())?;
+    let edit = subject.add_edit(by, reason, change.clone()).map_err(|err| err.to_string())?;
     Ok(Step {
         folder: step.folder.clone(),
         wrote: edit.at,

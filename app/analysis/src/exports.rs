@@ -1,12 +1,14 @@
 //! Sessions as tables and into lakes, as the command line and the window both write them.
 
-use crate::edited;
+use crate::edited_session;
 use crate::progress::Progress;
 use crate::source::SourceError;
 use palpate_sessions::recover::is_in_use;
-use palpate_sessions::{Manifest, Summary, atomic};
-use palpate_tables::export::{Beside, ExportError, Feed, Format, Selection, Table};
-use palpate_tables::lake::{self, Added, Told};
+use palpate_sessions::{Manifest, SessionSummary, atomic};
+use palpate_tables::export::{
+    ExportError, ExtraColumns, RowFeed, SampleSelection, TableExport, TableFormat,
+};
+use palpate_tables::lake::{self, LakeAddition, LakeQuality};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -24,33 +26,38 @@ pub enum ExportFailure {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Target {
+pub enum ExportTarget {
     /// A table in this folder that takes the session folder's name.
-    Table(Format, PathBuf),
+    Table(TableFormat, PathBuf),
     /// One message per sample in this new file.
     Messages(PathBuf),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Written {
+pub struct ExportedFile {
     pub path: PathBuf,
     /// Rows or messages in it.
     pub rows: u64,
     pub notes: Vec<String>,
 }
 
-impl Target {
+impl ExportTarget {
     /// Removes leftovers of killed exports from the target folder.
     pub fn sweep(&self) {
         let folder = match self {
             Self::Table(_, folder) => Some(folder.as_path()),
             Self::Messages(path) => path.parent(),
         };
-        folder.map(|folder| atomic::sweep(folder, 1));
+        folder.map(|folder| atomic::remove_leftovers(folder, 1));
     }
 
     /// Writes a table whose rows `feed` hands out.
-    pub fn write(&self, session: &Path, table: &Table, feed: Feed) -> Result<Written, ExportError> {
+    pub fn write(
+        &self,
+        session: &Path,
+        table: &TableExport,
+        feed: RowFeed,
+    ) -> Result<ExportedFile, ExportError> {
         let (path, rows) = match self {
             Self::Messages(path) => (path.clone(), table.write_messages(path, feed)?),
             Self::Table(format, folder) => {
@@ -61,7 +68,7 @@ impl Target {
                 (path, rows)
             }
         };
-        Ok(Written { path, rows, notes: table.notes.to_vec() })
+        Ok(ExportedFile { path, rows, notes: table.notes.to_vec() })
     }
 }
 
@@ -69,15 +76,15 @@ impl Target {
 /// how many samples how many are done.
 pub fn export(
     session: &Path,
-    selection: &Selection,
-    target: &Target,
+    selection: &SampleSelection,
+    target: &ExportTarget,
     tell: &mut dyn FnMut(u64, u64),
-) -> Result<Written, ExportFailure> {
-    let passing = edited::outline(session)?;
-    let table = Table {
+) -> Result<ExportedFile, ExportFailure> {
+    let passing = edited_session::stream_edited(session)?;
+    let table = TableExport {
         manifest: &passing.outline.manifest,
         notes: &passing.outline.notes,
-        beside: &Beside::default(),
+        extra: &ExtraColumns::default(),
         selection,
     };
     let (mut done, of) = (0, passing.outline.samples);
@@ -104,31 +111,32 @@ fn stem(session: &Path, manifest: &Manifest) -> String {
 
 /// Removes leftovers of killed exports from a lake.
 pub fn sweep_lake(lake: &Path) {
-    atomic::sweep(lake, usize::MAX);
+    atomic::remove_leftovers(lake, usize::MAX);
 }
 
-pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
-    // Looked at before it is read: a run that ends in between would be there without its end.
+pub fn add_to_lake(lake: &Path, session: &Path) -> Result<LakeAddition, ExportFailure> {
+    // ReviewSource at before it is read: a run that ends in between would be there without its end.
     let is_in_use = is_in_use(session);
-    let passing = edited::outline(session)?;
+    let passing = edited_session::stream_edited(session)?;
     if is_in_use && passing.outline.end.is_none() {
         return Err(ExportFailure::BeingRecorded(session.into()));
     }
     let verdict = passing.edits.verdict();
-    let quality = Told { verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
+    let quality =
+        LakeQuality { quality: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())) };
     let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
-    Ok(lake::add(lake, &passing.outline, quality, &mut feed)?)
+    Ok(lake::add_session(lake, &passing.outline, quality, &mut feed)?)
 }
 
 /// The sessions and tables without those sessions whose recovered copy is among them, so that samples count once; then
 /// those left out. `is_session` tells which can be sessions at all.
 #[must_use]
-pub fn without_copied(
+pub fn remove_recovered_originals(
     found: Vec<PathBuf>,
     is_session: impl Fn(&Path) -> bool,
 ) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let id = |path: &PathBuf| {
-        let manifest = Summary::read(path).ok().filter(|_| is_session(path))?.manifest;
+        let manifest = SessionSummary::read(path).ok().filter(|_| is_session(path))?.manifest;
         Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
     };
     let ids: Vec<Option<(String, Option<String>)>> = found.iter().map(id).collect();
@@ -142,58 +150,62 @@ pub fn without_copied(
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Destination {
-    Tables(Format, PathBuf),
+pub enum ExportDestination {
+    Tables(TableFormat, PathBuf),
     Lake(PathBuf),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Exported {
+pub struct ExportSummary {
     pub sentence: String,
     /// What was not, and why, a sentence each; and what a user of the data must know.
     pub remarks: Vec<String>,
 }
 
 /// Writes every session, one after the other. An existing file is never overwritten; a remark names it.
-pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progress) -> Exported {
+pub fn export_all(
+    sessions: Vec<PathBuf>,
+    to: &ExportDestination,
+    progress: &dyn Progress,
+) -> ExportSummary {
     let of = sessions.len();
     let (sessions, copied) = match to {
-        Destination::Tables(..) => (sessions, Vec::new()),
-        Destination::Lake(_) => without_copied(sessions, |_| true),
+        ExportDestination::Tables(..) => (sessions, Vec::new()),
+        ExportDestination::Lake(_) => remove_recovered_originals(sessions, |_| true),
     };
     let left_out =
         |path: &PathBuf| format!("{}: left out, its recovered copy is chosen too", name(path));
     let mut remarks: Vec<String> = copied.iter().map(left_out).collect();
     match to {
-        Destination::Lake(lake) => sweep_lake(lake),
-        Destination::Tables(format, folder) => {
+        ExportDestination::Lake(lake) => sweep_lake(lake),
+        ExportDestination::Tables(format, folder) => {
             if let Err(err) = std::fs::create_dir_all(folder) {
                 let folder = folder.display();
                 let sentence = format!("{folder} cannot be made ({err}); nothing was written");
-                return Exported { sentence, remarks };
+                return ExportSummary { sentence, remarks };
             }
-            Target::Table(*format, folder.clone()).sweep();
+            ExportTarget::Table(*format, folder.clone()).sweep();
         }
     }
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {
         let name = name(session);
-        if progress.tell(done, of, &name).is_break() {
+        if progress.report(done, of, &name).is_break() {
             remarks.push(format!("cancelled: {} were not begun", sessions.len() - done));
             break;
         }
         let notes = match to {
-            Destination::Lake(lake) => into_lake(lake, session).map(|added| {
+            ExportDestination::Lake(lake) => add_to_lake(lake, session).map(|added| {
                 were_there += usize::from(added.was_there);
                 Vec::new()
             }),
-            Destination::Tables(format, folder) => {
-                let target = Target::Table(*format, folder.clone());
+            ExportDestination::Tables(format, folder) => {
+                let target = ExportTarget::Table(*format, folder.clone());
                 let mut tell = |rows, all| {
                     // One session is written whole once it is begun.
-                    let _ = progress.tell(done, of, &format!("{name}: {rows} of {all} samples"));
+                    let _ = progress.report(done, of, &format!("{name}: {rows} of {all} samples"));
                 };
-                let exported = export(session, &Selection::default(), &target, &mut tell);
+                let exported = export(session, &SampleSelection::default(), &target, &mut tell);
                 exported.map(|written| written.notes)
             }
         };
@@ -202,18 +214,18 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progr
         remarks.extend(notes.iter().map(|note| format!("{name}: {note}")));
     }
     let sentence = match to {
-        Destination::Tables(format, folder) => format!(
+        ExportDestination::Tables(format, folder) => format!(
             "{written} of {of} sessions written as {} to {}",
             format.ending(),
             folder.display()
         ),
-        Destination::Lake(lake) => format!(
+        ExportDestination::Lake(lake) => format!(
             "{} of {of} sessions added to {}, {were_there} were there",
             written - were_there,
             lake.display()
         ),
     };
-    Exported { sentence, remarks }
+    ExportSummary { sentence, remarks }
 }
 
 fn name(session: &Path) -> String {

@@ -20,20 +20,20 @@ pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
     let mut next = decisions.iter().peekable();
     for (index, row) in session.rows.iter().enumerate() {
         while let Some((_, effect)) = next.next_if(|(after, _)| *after <= index as u64 + 1) {
-            meter.effect(effect);
+            meter.push_effect(effect);
         }
-        meter.row(row);
+        meter.push_row(row);
     }
-    next.for_each(|(_, effect)| meter.effect(effect));
-    Ok(meter.into_found())
+    next.for_each(|(_, effect)| meter.push_effect(effect));
+    Ok(meter.into_fidelity())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use palpate_model::rig::Phase;
-    use palpate_runner::fidelity::Achieved;
-    use palpate_sessions::record::Row;
+    use palpate_runner::fidelity::TargetResult;
+    use palpate_sessions::record::SampleRow;
     use std::path::Path;
 
     fn recorded() -> Session {
@@ -41,8 +41,8 @@ mod tests {
         Session::open(&sessions.join("ramp-hold-lab")).unwrap()
     }
 
-    fn of(found: &Fidelity, step: &str, quantity: &str) -> Achieved {
-        let is_it = |one: &&Achieved| (one.step, one.quantity) == (step, quantity);
+    fn of(found: &Fidelity, step: &str, quantity: &str) -> TargetResult {
+        let is_it = |one: &&TargetResult| (one.step, one.quantity) == (step, quantity);
         found.targets.iter().find(is_it).cloned().unwrap_or_else(|| panic!("{found:?}"))
     }
 
@@ -51,7 +51,7 @@ mod tests {
         let session = recorded();
         let found = of_session(&session).unwrap();
         assert_eq!(found.samples, session.rows.len() as u64);
-        assert_eq!((found.dropped, found.late, found.missed().count()), (0, 0, 0));
+        assert_eq!((found.dropped, found.late, found.missed_targets().count()), (0, 0, 0));
         for quantity in ["speed", "speed by pulses", "depth"] {
             of(&found, "ramp", quantity);
         }
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn what_is_missing_late_or_short_is_found() {
         let mut session = recorded();
-        let phase = |phase| move |row: &Row| row.phase == phase;
+        let phase = |phase| move |row: &SampleRow| row.phase == phase;
         let ramp = session.rows.iter().position(phase(Phase::Ramp)).unwrap();
         let hold = session.rows.iter().position(phase(Phase::Hold)).unwrap();
         let depth = of(&of_session(&session).unwrap(), "ramp", "depth").achieved;

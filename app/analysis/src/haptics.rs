@@ -1,22 +1,24 @@
 //! What a device makes of a body: the margin before play, what the loop does without its guards and with them, and
 //! how the loop keeps its time on this computer.
 
-use super::fit::Fitted;
+use super::fit::SourceFit;
 use super::margin::{MarginPoint, margin_curve};
-use super::recorded::RecordedTicks;
+use super::tick_replay::RecordedTicks;
 use crate::source::read;
 use palpate_figures::thin::thin;
-use palpate_haptics::check::{CheckSample, CheckSettings, calibration_points, check as run_check};
-use palpate_haptics::margin::Verdict;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::check::{
+    FeedbackCheckSample, FeedbackCheckSettings, calibration_points, check as run_check,
+};
+use palpate_haptics::margin::MarginReport;
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_haptics::{BiasCalibration, Buzz, DriveKind, Flags, Period, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{FitOptions, FitReport, FitSample, fit};
-use palpate_runner::haptics::taped::{TapeRecorder, Taped};
-use palpate_runner::haptics::timing::Kept;
-use palpate_runner::haptics::{Beat, Simulated, Ticking};
+use palpate_runner::haptics::device_recording::{DeviceRecorder, RecordedDevice};
+use palpate_runner::haptics::timing::LoopTiming;
+use palpate_runner::haptics::{LoopTask, RealTimeLoop, SimulatedMasterSlave};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +33,7 @@ const GRIP_DAMPING: f64 = 0.002;
 
 /// A body to render, from a fit or the source thesis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Source {
+pub struct HapticBody {
     pub body: ModifiedKelvin,
     /// Largest depth of the fitted record.
     pub deepest: Depth,
@@ -39,16 +41,16 @@ pub struct Source {
 }
 
 /// The body of a session or a table by its fit, or the source thesis's.
-pub fn body_of(source: &Path) -> Result<Source, String> {
+pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
     if source == Path::new(THESIS) {
-        return Ok(Source {
+        return Ok(HapticBody {
             body: ModifiedKelvin::THESIS,
             deepest: Depth(30.0),
             notes: Vec::new(),
         });
     }
     let options = FitOptions::default();
-    let fitted = Fitted::of(read(source).map_err(|err| err.to_string())?, &options);
+    let fitted = SourceFit::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
     let body = report.kelvin().ok_or_else(|| {
         format!("the fit of {} is not of the modified Kelvin model", source.display())
@@ -56,12 +58,12 @@ pub fn body_of(source: &Path) -> Result<Source, String> {
     let depths = fitted.samples.iter().map(|sample| sample.depth.0);
     let mut notes = fitted.notes;
     notes.extend(report.warnings.iter().cloned());
-    Ok(Source { body, deepest: Depth(depths.fold(0.0, f64::max)), notes })
+    Ok(HapticBody { body, deepest: Depth(depths.fold(0.0, f64::max)), notes })
 }
 
-impl Source {
+impl HapticBody {
     /// That a stroke goes beyond what was measured, if it does by more than a pulse of the source's slider.
-    pub fn beyond(&self, deepest: Depth) -> Option<String> {
+    pub fn extrapolation_warning(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
                 "the record goes to {:.3}; from there to {deepest:.3} the model is extrapolated without any evidence",
@@ -73,7 +75,7 @@ impl Source {
 
 /// Settings of a device, its loop and the simulated hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
+pub struct HapticSettings {
     pub period: Period,
     pub drive: DriveKind,
     /// Damping of the device without its motor, in N s/mm.
@@ -86,7 +88,7 @@ pub struct Setting {
     pub speed: MmPerS,
 }
 
-impl Setting {
+impl HapticSettings {
     /// Longest stroke offered, in mm.
     pub const DEPTH_MAX: f64 = 100.0;
     /// Fastest hand offered, in mm/s.
@@ -111,7 +113,7 @@ impl Setting {
     /// The simulation of a body with a firm hand that presses to the end of the stroke and holds there.
     pub fn simulation(&self, body: ModifiedKelvin, is_guarded: bool) -> SimulationSettings {
         let path = HandPath::RampHold { from: 0.0, to: self.deepest.0, speed: self.speed.0 };
-        let hand = Hand { damping: GRIP_DAMPING, ..Hand::firm(path) };
+        let hand = SimulatedHand { damping: GRIP_DAMPING, ..SimulatedHand::firm(path) };
         let mut all = SimulationSettings::of(body, self.period, hand);
         all.plant.damping = self.damping;
         all.plant.delay = self.delay;
@@ -143,7 +145,7 @@ const COLUMNS: usize = 1000;
 
 /// Result of a simulated stroke.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tried {
+pub struct SimulatedTrial {
     pub is_guarded: bool,
     /// Share of the ticks of the hold in which it buzzed.
     pub buzz_share: f64,
@@ -167,12 +169,13 @@ pub struct Tried {
 
 /// Stability margin of a body on a device, and its simulation.
 #[derive(Clone, Debug, Serialize)]
-pub struct Checked {
+pub struct HapticCheck {
     pub body: ModifiedKelvin,
-    pub margin: Verdict,
+    pub margin: MarginReport,
     pub sentences: Vec<String>,
     /// Without guards, then with them.
-    pub tried: [Tried; 2],
+    #[serde(rename = "tried")]
+    pub trials: [SimulatedTrial; 2],
     /// Damping needed over depth, in its parts; for pictures.
     #[serde(skip)]
     pub curve: Vec<MarginPoint>,
@@ -182,30 +185,30 @@ pub struct Checked {
 /// the share done and ends it early.
 pub fn check(
     body: ModifiedKelvin,
-    setting: &Setting,
+    setting: &HapticSettings,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Checked, String> {
+) -> Result<HapticCheck, String> {
     let watch = setting.simulation(body, true).system.watch();
-    let margin = watch.before_play(setting.deepest, setting.speed);
+    let margin = watch.assess_stroke(setting.deepest, setting.speed);
     let without = try_out(body, setting, false, &mut |share| is_going(0.5 * share))?;
     let with = try_out(body, setting, true, &mut |share| is_going(0.5 + 0.5 * share))?;
-    Ok(Checked {
+    Ok(HapticCheck {
         body,
         sentences: margin.sentences(),
         margin,
-        tried: [without, with],
+        trials: [without, with],
         curve: margin_curve(&watch, setting.deepest, setting.speed),
     })
 }
 
 fn try_out(
     body: ModifiedKelvin,
-    setting: &Setting,
+    setting: &HapticSettings,
     is_guarded: bool,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Tried, String> {
+) -> Result<SimulatedTrial, String> {
     let settings = setting.simulation(body, is_guarded);
-    let mut device = Simulated::new(&settings).map_err(|err| err.to_string())?;
+    let mut device = SimulatedMasterSlave::new(&settings).map_err(|err| err.to_string())?;
     let arrives = setting.deepest.0 / setting.speed.0;
     let ticks = setting.period.ticks_in(Seconds(arrives + HOLD));
     let last_second = ticks.saturating_sub(setting.period.ticks_in(Seconds(1.0)));
@@ -243,7 +246,7 @@ fn try_out(
             return Err("ended before it was done".into());
         }
     }
-    Ok(Tried {
+    Ok(SimulatedTrial {
         is_guarded,
         buzz_share: buzzed as f64 / held.max(1) as f64,
         buzz_until_s: until,
@@ -259,13 +262,13 @@ fn try_out(
 
 /// Timing of a loop at one rate.
 #[derive(Clone, Debug, Serialize)]
-pub struct Paced {
+pub struct LoopMeasurement {
     pub rate_hz: f64,
     /// Threads that did nothing but keep the processors busy meanwhile.
     pub busy_threads: usize,
     pub priority: String,
     #[serde(flatten)]
-    pub kept: Kept,
+    pub statistics: LoopTiming,
     pub recorded: Option<RecordedTicks>,
 }
 
@@ -274,9 +277,9 @@ pub fn pace(
     settings: &SimulationSettings,
     seconds: f64,
     busy: usize,
-    recorder: Option<TapeRecorder>,
+    recorder: Option<DeviceRecorder>,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Paced, String> {
+) -> Result<LoopMeasurement, String> {
     let period = settings.system.law.period;
     let is_over = Arc::new(AtomicBool::new(false));
     let mut others = Vec::new();
@@ -290,9 +293,9 @@ pub fn pace(
         let thread = std::thread::Builder::new().name("busy".into()).spawn(work);
         others.push(thread.map_err(|err| err.to_string())?);
     }
-    let device = Simulated::new(settings).map_err(|err| err.to_string())?;
+    let device = SimulatedMasterSlave::new(settings).map_err(|err| err.to_string())?;
     let first = *device.last();
-    let beat = Beat::start(Taped { device, recorder }, period, first)
+    let beat = RealTimeLoop::start(RecordedDevice { device, recorder }, period, first)
         .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
     let parts = (seconds / PART.as_secs_f64()).ceil().max(1.0);
     for part in 0..parts as u64 {
@@ -301,8 +304,8 @@ pub fn pace(
             break;
         }
     }
-    let kept = beat.kept();
-    let priority = beat.granted().to_string();
+    let kept = beat.timing();
+    let priority = beat.granted_priority().to_string();
     let taped = beat.end();
     is_over.store(true, Ordering::Relaxed);
     for thread in others {
@@ -312,12 +315,12 @@ pub fn pace(
     let taped = taped.ok_or("the loop failed; this is a mistake in palpate")?;
     let hash = taped.device.last().snapshot.sum();
     let recorded = taped.recorder.map(|recorder| recorder.finish(hash));
-    Ok(Paced {
+    Ok(LoopMeasurement {
         recorded: recorded.transpose()?.map(RecordedTicks::from),
         rate_hz: 1.0 / period.seconds().0,
         busy_threads: busy,
         priority,
-        kept,
+        statistics: kept,
     })
 }
 
@@ -326,12 +329,12 @@ const PART: Duration = Duration::from_millis(100);
 
 /// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
 #[derive(Clone, Debug, Serialize)]
-pub struct Followed {
+pub struct FeedbackCheck {
     #[serde(skip)]
-    pub settings: CheckSettings,
+    pub settings: FeedbackCheckSettings,
     /// What was measured; in a table of its own.
     #[serde(skip)]
-    pub samples: Vec<CheckSample>,
+    pub samples: Vec<FeedbackCheckSample>,
     pub body: ModifiedKelvin,
     #[serde(rename = "samples")]
     pub count: usize,
@@ -355,21 +358,24 @@ pub struct Followed {
     pub refusals: Vec<String>,
 }
 
-pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result<Followed, String> {
+pub fn check_feedback(
+    settings: &FeedbackCheckSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<FeedbackCheck, String> {
     let mut samples = Vec::new();
     run_check(settings, |one| samples.push(*one), progress).map_err(|err| err.to_string())?;
-    let until = settings.ramp();
+    let until = settings.ramp_end();
     let ramp = || samples.iter().filter(|one| one.t <= until);
     let count = ramp().count().max(1) as f64;
-    let error = |one: &CheckSample| one.measured.0 - one.commanded.0;
+    let error = |one: &FeedbackCheckSample| one.measured.0 - one.commanded.0;
     let offset = ramp().map(error).sum::<f64>() / count;
     let squares: f64 = ramp().map(|one| (error(one) - offset).powi(2)).sum();
-    let peak = |of: fn(&CheckSample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
+    let peak = |of: fn(&FeedbackCheckSample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
     let points = calibration_points(&samples, until);
     let mut refusals = Vec::new();
     let calibration = BiasCalibration::fit(&points);
     let calibration = calibration.map_err(|err| refusals.push(format!("no calibration: {err}")));
-    let mut fitted = |force: fn(&CheckSample) -> Newtons, which: &str| {
+    let mut fitted = |force: fn(&FeedbackCheckSample) -> Newtons, which: &str| {
         let record = samples.iter().map(|one| FitSample {
             t: one.t,
             depth: one.depth,
@@ -384,7 +390,7 @@ pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result
     let fit = fitted(|one| one.measured, "measured");
     let fit_commanded = fitted(|one| one.commanded, "commanded");
     let torque = settings.torque();
-    Ok(Followed {
+    Ok(FeedbackCheck {
         settings: *settings,
         body: settings.body,
         count: samples.len(),

@@ -1,11 +1,14 @@
 //! Files of other programs made into sessions, as the command line and the window both do it.
 
 use crate::progress::Progress;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_runner::wall_now;
-use palpate_sessions::{FolderError, Imported, library_folder, new_session_folder, new_session_id};
+use palpate_sessions::{
+    FolderError, ImportOrigin, library_folder, new_session_folder, new_session_id,
+};
 use palpate_tables::import::{
-    Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
+    ForeignError, ForeignFile, ForeignPart, ImportOptions, ImportTarget, StoreImportError,
+    folder_name, open_foreign, store_import,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -17,7 +20,7 @@ pub enum ImportFailure {
     #[error(transparent)]
     Foreign(#[from] ForeignError),
     #[error(transparent)]
-    Keep(#[from] KeepError),
+    Keep(#[from] StoreImportError),
     #[error(transparent)]
     Library(#[from] FolderError),
     #[error("{} is there already or would be made twice; choose another folder", .0.display())]
@@ -28,11 +31,11 @@ pub enum ImportFailure {
 
 /// Files to import, and where their sessions go.
 #[derive(Clone, Debug, Default)]
-pub struct Request {
+pub struct ImportRequest {
     pub files: Vec<PathBuf>,
     /// Layout that the user states; all else is detected.
-    pub told: Told,
-    pub labels: Labels,
+    pub layout: ImportOptions,
+    pub labels: SessionLabels,
     /// Folder for the new session folders, each named after its file.
     pub into: Option<PathBuf>,
     /// The library, where no folder is given; the user's own without it.
@@ -42,7 +45,7 @@ pub struct Request {
 }
 
 #[derive(Debug, Serialize)]
-pub struct FileReport {
+pub struct ImportedFile {
     pub file: PathBuf,
     /// Sheets, blocks or intervals of the file.
     pub parts: Vec<PartReport>,
@@ -57,20 +60,20 @@ pub struct PartReport {
     /// From the first to the last of them, in s.
     pub duration_s: f64,
     #[serde(flatten)]
-    pub imported: Imported,
+    pub imported: ImportOrigin,
 }
 
 /// Makes sessions of files. `progress` hears which file is next, and may end it before the first session is made.
 pub fn import(
-    request: &Request,
+    request: &ImportRequest,
     progress: &dyn Progress,
-) -> Result<Vec<FileReport>, ImportFailure> {
-    let read = |path: &PathBuf| open_foreign(path, &request.told).map_err(ImportFailure::Foreign);
+) -> Result<Vec<ImportedFile>, ImportFailure> {
+    let read = |path: &PathBuf| open_foreign(path, &request.layout).map_err(ImportFailure::Foreign);
     // Every file is read before the first session is made: a refusal leaves nothing behind.
     let of = request.files.len() * if request.is_dry_run { 1 } else { 2 };
     let (mut taken, mut reports) = (BTreeSet::new(), Vec::new());
     for (done, path) in request.files.iter().enumerate() {
-        if progress.tell(done, of, &path.display().to_string()).is_break() {
+        if progress.report(done, of, &path.display().to_string()).is_break() {
             return Err(ImportFailure::Cancelled);
         }
         let foreign = read(path)?;
@@ -81,7 +84,7 @@ pub fn import(
         for (done, (path, file)) in request.files.iter().zip(&mut reports).enumerate() {
             // Sessions that are made stay.
             let name = path.display().to_string();
-            let _ = progress.tell(request.files.len() + done, of, &name);
+            let _ = progress.report(request.files.len() + done, of, &name);
             let foreign = read(path)?;
             for (part, report) in foreign.parts.iter().zip(&mut file.parts) {
                 report.session = Some(make(part, &foreign.bytes, request)?);
@@ -94,7 +97,7 @@ pub fn import(
 /// Refuses folders that are there already or would be made twice.
 fn check_folders(
     into: Option<&Path>,
-    foreign: &Foreign,
+    foreign: &ForeignFile,
     taken: &mut BTreeSet<PathBuf>,
 ) -> Result<(), ImportFailure> {
     let Some(into) = into else { return Ok(()) };
@@ -107,7 +110,11 @@ fn check_folders(
     Ok(())
 }
 
-fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBuf, ImportFailure> {
+fn make(
+    part: &ForeignPart,
+    original: &[u8],
+    request: &ImportRequest,
+) -> Result<PathBuf, ImportFailure> {
     let at = wall_now().into();
     let session_id = new_session_id(at);
     let folder = match (&request.into, &request.library) {
@@ -118,7 +125,7 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
             new_session_folder(&library, &session_id)
         }
     };
-    let target = Kept {
+    let target = ImportTarget {
         folder: &folder,
         original,
         session_id,
@@ -126,11 +133,11 @@ fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBu
         software_version: env!("CARGO_PKG_VERSION"),
         labels: request.labels.clone(),
     };
-    keep(part, target).map_err(ImportFailure::Keep)?;
+    store_import(part, target).map_err(ImportFailure::Keep)?;
     Ok(folder)
 }
 
-fn report_of(path: &Path, foreign: Foreign) -> FileReport {
+fn report_of(path: &Path, foreign: ForeignFile) -> ImportedFile {
     let parts = foreign.parts.into_iter().map(|part| {
         let ends = [part.samples.first(), part.samples.last()];
         let [first, last] = ends.map(|one| one.map_or(0.0, |one| one.t));
@@ -141,11 +148,11 @@ fn report_of(path: &Path, foreign: Foreign) -> FileReport {
             imported: part.imported,
         }
     });
-    FileReport { file: path.into(), parts: parts.collect(), left_out: foreign.left_out }
+    ImportedFile { file: path.into(), parts: parts.collect(), left_out: foreign.left_out }
 }
 
 #[must_use]
-pub fn text(file: &FileReport) -> String {
+pub fn text(file: &ImportedFile) -> String {
     let mut lines = vec![file.file.display().to_string()];
     for part in &file.parts {
         let rows = format!("{} over {:.3} s", part.samples, part.duration_s);
@@ -161,12 +168,15 @@ pub fn text(file: &FileReport) -> String {
 }
 
 /// Makes sessions of files and tells what was made of each, in lines; for the window.
-pub fn import_and_tell(request: &Request, progress: &dyn Progress) -> Result<Vec<String>, String> {
+pub fn import_with_summary(
+    request: &ImportRequest,
+    progress: &dyn Progress,
+) -> Result<Vec<String>, String> {
     Ok(import(request, progress).map_err(|err| err.to_string())?.iter().map(text).collect())
 }
 
 /// One line for each thing that was taken for something, with the option that says it otherwise.
-fn import_lines(imported: &Imported, rows: &str) -> Vec<String> {
+fn import_lines(imported: &ImportOrigin, rows: &str) -> Vec<String> {
     let line = |what: &str, text: &str| format!("  {what:<13} {text}");
     let mut lines =
         vec![line("file", &format!("{} bytes, CRC-32 {}", imported.bytes, imported.checksum))];

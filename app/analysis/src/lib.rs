@@ -6,23 +6,22 @@
 //! Start reading at [`source`], which makes samples of a session or a table, and [`fit`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
-pub mod analyse;
-pub mod analysed;
-pub mod analyses;
+pub mod analysed_session;
 pub mod calibrations;
+pub mod catalog_search;
 pub mod compliance;
+pub mod cycle_analysis;
 pub mod cycles;
 pub mod daily;
-pub mod edited;
+pub mod edited_session;
 pub mod edits;
 pub mod exports;
 #[cfg(feature = "extremes")]
 pub mod extremes;
-pub mod fidelity;
-pub mod find;
-pub mod fit;
 #[cfg(feature = "haptics")]
-pub mod follow_session;
+pub mod feedback_session;
+pub mod fidelity;
+pub mod fit;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 #[cfg(feature = "haptics")]
@@ -30,18 +29,19 @@ pub mod haptics_tape;
 pub mod imports;
 #[cfg(feature = "haptics")]
 pub mod margin;
-pub mod opening;
 pub mod plan;
 pub mod pool;
 pub mod progress;
-pub mod recorded;
+pub mod recordings;
 pub mod report;
 #[cfg(feature = "haptics")]
 pub mod scene;
 #[cfg(feature = "haptics")]
 pub mod scene_bench;
 pub mod select;
+pub mod session_actions;
 pub mod source;
-pub mod sources;
 pub mod support_bundle;
+pub mod tick_replay;
 pub mod trade;
+pub mod window_requests;

@@ -1,6 +1,6 @@
 //! The damping that a body needs over the depths of a stroke, in its parts.
 
-use palpate_haptics::margin::{Device, Linear, Watch};
+use palpate_haptics::margin::{LinearisedBody, LoopDevice, MarginSettings};
 use palpate_model::units::{Depth, MmPerS};
 
 /// Number of depths: as many as a plot is wide.
@@ -21,16 +21,17 @@ pub struct MarginPoint {
 
 /// Over a stroke entered at a speed, with the criterion that the check has.
 #[must_use]
-pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginPoint> {
-    let prompt = Watch { device: Device { delay_ticks: 0.0, ..watch.device }, ..*watch };
+pub fn margin_curve(watch: &MarginSettings, deepest: Depth, speed: MmPerS) -> Vec<MarginPoint> {
+    let prompt =
+        MarginSettings { device: LoopDevice { delay_ticks: 0.0, ..watch.device }, ..*watch };
     let point = |i: u32| {
         // Closer together near the surface, where most changes.
         let share = f64::from(i) / f64::from(DEPTHS);
         let depth = Depth(deepest.0 * share * share);
         // A body that brings its own damping needs none.
-        let lag = Linear::of(&watch.body, depth).lag().max(0.0);
-        let tick = prompt.exactly_at(depth, speed).needed.max(lag);
-        let delay = watch.exactly_at(depth, speed).needed.max(tick);
+        let lag = LinearisedBody::of(&watch.body, depth).lag().max(0.0);
+        let tick = prompt.exact_margin_at(depth, speed).needed.max(lag);
+        let delay = watch.exact_margin_at(depth, speed).needed.max(tick);
         // N s/m, as catalogues have it.
         MarginPoint { depth: depth.0, lag: 1e3 * lag, tick: 1e3 * tick, delay: 1e3 * delay }
     };
@@ -40,14 +41,15 @@ pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginP
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::haptics::Setting;
+    use crate::haptics::HapticSettings;
     use palpate_haptics::Period;
     use palpate_model::viscoelastic::ModifiedKelvin;
 
     fn curve(rate: f64, delay: usize) -> (Vec<MarginPoint>, f64) {
-        let setting = Setting { delay, ..Setting::source(Period::of_rate(rate).unwrap()) };
+        let setting =
+            HapticSettings { delay, ..HapticSettings::source(Period::of_rate(rate).unwrap()) };
         let watch = setting.simulation(ModifiedKelvin::THESIS, true).system.watch();
-        let verdict = watch.before_play(setting.deepest, setting.speed);
+        let verdict = watch.assess_stroke(setting.deepest, setting.speed);
         let curve = margin_curve(&watch, setting.deepest, setting.speed);
         (curve, 1e3 * verdict.worst.needed)
     }

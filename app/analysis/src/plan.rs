@@ -1,14 +1,16 @@
 //! The shortest protocol that determines given parameters to given precision, for a body like a known one.
 
-use crate::fit::{KnownFit, KnownFitError, is_hardly_known};
-use palpate_model::calibration::Curve;
+use crate::fit::{KnownFit, KnownFitError, is_poorly_identified};
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_rheology::expected::{
-    Curves, ExpectedError, Family, Memory, Noise, Proposal, Rig, Target, Unknowns, curves, shortest,
+    CorrelatedNoise, DesignLimits, ExpectedError, FreeOffsets, MeasurementNoise, PrecisionCurves,
+    PrecisionTarget, ProtocolFamily, ProtocolProposal, compute_precision_curves,
+    find_shortest_protocols,
 };
 use serde::Serialize;
 use std::path::Path;
@@ -21,21 +23,21 @@ const STIFFER: f64 = 1.35;
 const NOISE_ASSUMED: Newtons = Newtons(0.02);
 
 #[derive(Clone, Copy, Debug)]
-pub struct Bench<'a> {
+pub struct PlanningRig<'a> {
     pub rig: &'a RigDescription,
     pub limits: &'a Limits,
     /// Volts to newtons of its load cell.
-    pub curve: &'a Curve,
+    pub curve: &'a CalibrationCurve,
 }
 
 /// The precision to reach, and the limits of the rig.
 pub struct PlanRequest<'a> {
-    pub targets: Vec<Target>,
+    pub targets: Vec<PrecisionTarget>,
     /// Offsets that are fitted as well.
-    pub unknowns: Unknowns,
+    pub unknowns: FreeOffsets,
     /// Noise that is independent from sample to sample; without it that of the fit.
     pub white: Option<Newtons>,
-    pub memory: Option<Memory>,
+    pub memory: Option<CorrelatedNoise>,
     pub sample_rate_hz: f64,
     pub depth: Depth,
     /// Highest force; without it what leaves a specimen a third stiffer below the interlock.
@@ -70,7 +72,7 @@ pub struct PlanAssumptions {
 }
 
 /// What a plan assumes: a recording or a fit; without one the last fit, and without that the source thesis.
-pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
+pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
     let (known, source, notes) = if let Some(like) = like {
         let (known, notes) = KnownFit::of(like, None)?;
         (known, like.display().to_string(), notes)
@@ -90,7 +92,7 @@ pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
     Ok(PlanAssumptions {
         body: known.body()?,
         noise: Newtons(known.rmse_n),
-        is_hardly_known: is_hardly_known(&known.parameters),
+        is_hardly_known: is_poorly_identified(&known.parameters),
         source,
         notes,
     })
@@ -101,20 +103,20 @@ pub fn assumed(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
 pub struct PlanReport {
     pub body: ModifiedKelvin,
     pub body_source: String,
-    pub noise: Noise,
-    pub unknowns: Unknowns,
-    pub rig: Rig,
-    pub targets: Vec<Target>,
-    pub proposals: Vec<Offer>,
+    pub noise: MeasurementNoise,
+    pub unknowns: FreeOffsets,
+    pub rig: DesignLimits,
+    pub targets: Vec<PrecisionTarget>,
+    pub proposals: Vec<PlanOffer>,
     /// Intervals against hold, cycles and sampling rate.
-    pub curves: Curves,
+    pub curves: PrecisionCurves,
 }
 
 /// A proposal with the commands that run it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Offer {
+pub struct PlanOffer {
     #[serde(flatten)]
-    pub proposal: Proposal,
+    pub proposal: ProtocolProposal,
     /// One for every press; empty where no plan exists.
     pub commands: Vec<String>,
     pub acknowledgements: Vec<String>,
@@ -125,13 +127,14 @@ pub struct Offer {
 pub fn plan(
     request: PlanRequest<'_>,
     assumed: PlanAssumptions,
-    bench: Bench<'_>,
+    bench: PlanningRig<'_>,
 ) -> Result<PlanReport, PlanFailure> {
     let rig = request.rig(bench)?;
-    let noise = Noise { white: request.white.unwrap_or(assumed.noise), memory: request.memory };
+    let noise =
+        MeasurementNoise { white: request.white.unwrap_or(assumed.noise), memory: request.memory };
     let (body, unknowns) = (assumed.body, request.unknowns);
-    let proposals = shortest(&body, &noise, unknowns, &request.targets, &rig)?;
-    let curves = curves(&body, &noise, unknowns, &rig, drawn(&proposals))?;
+    let proposals = find_shortest_protocols(&body, &noise, unknowns, &request.targets, &rig)?;
+    let curves = compute_precision_curves(&body, &noise, unknowns, &rig, drawn(&proposals))?;
     let offers = proposals.into_iter();
     let offers = offers.map(|proposal| offer(proposal, bench, rig.depth, request.command));
     Ok(PlanReport {
@@ -147,10 +150,10 @@ pub fn plan(
 }
 
 impl PlanRequest<'_> {
-    fn rig(&self, bench: Bench<'_>) -> Result<Rig, PlanFailure> {
+    fn rig(&self, bench: PlanningRig<'_>) -> Result<DesignLimits, PlanFailure> {
         let (fastest, interlock) = (bench.rig.speed_max, bench.limits.force_max);
         let third = Newtons(interlock.0 / STIFFER);
-        let rig = Rig {
+        let rig = DesignLimits {
             speed_quantum: bench.rig.speed_quantum,
             speed_max: self.speed_max.unwrap_or(fastest),
             depth: self.depth,
@@ -173,9 +176,9 @@ impl PlanRequest<'_> {
 }
 
 /// The ramp and hold whose sampling rate is drawn: the proposed one, else that of the thesis.
-fn drawn(proposals: &[Proposal]) -> (MmPerS, Seconds) {
+fn drawn(proposals: &[ProtocolProposal]) -> (MmPerS, Seconds) {
     let proposed = proposals.iter().find_map(|proposal| match proposal.family {
-        Family::RampHold { speed, hold } => Some((speed, hold)),
+        ProtocolFamily::RampHold { speed, hold } => Some((speed, hold)),
         _ => None,
     });
     let usual = RampHold::default();
@@ -183,15 +186,17 @@ fn drawn(proposals: &[Proposal]) -> (MmPerS, Seconds) {
 }
 
 fn offer(
-    proposal: Proposal,
-    bench: Bench<'_>,
+    proposal: ProtocolProposal,
+    bench: PlanningRig<'_>,
     depth: Depth,
     command: &dyn Fn(&RampHold) -> String,
-) -> Offer {
+) -> PlanOffer {
     let presses = match proposal.family {
-        Family::RampHold { speed, hold } => vec![(speed, hold)],
-        Family::TwoSpeeds { speeds, hold, .. } => speeds.map(|speed| (speed, hold)).to_vec(),
-        Family::Cycles { .. } => Vec::new(),
+        ProtocolFamily::RampHold { speed, hold } => vec![(speed, hold)],
+        ProtocolFamily::TwoSpeeds { speeds, hold, .. } => {
+            speeds.map(|speed| (speed, hold)).to_vec()
+        }
+        ProtocolFamily::Cycles { .. } => Vec::new(),
     };
     // A proposal of which the rig refuses one press cannot be run.
     let run = |(speed, hold)| {
@@ -206,7 +211,7 @@ fn offer(
     let mut acknowledgements: Vec<String> = all.collect();
     acknowledgements.dedup();
     let secs = previews.iter().map(|preview| preview.expected.0);
-    Offer {
+    PlanOffer {
         run_s: (!previews.is_empty()).then(|| secs.sum()),
         commands,
         acknowledgements,

@@ -1,6 +1,6 @@
 //! Many pieces of work on a few named threads, with answers in the order of the pieces.
 
-use palpate_model::contained::contained;
+use palpate_model::panics::catch_panic;
 use rayon::ThreadPoolBuilder;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::io;
@@ -14,7 +14,7 @@ pub enum WorkFailure {
 }
 
 /// An event of the work, on the calling thread.
-pub enum News<R> {
+pub enum WorkEvent<R> {
     /// Number of pieces done.
     Done(usize),
     /// The answer to the next piece, in order.
@@ -31,7 +31,7 @@ pub fn in_order<T: Sync, R: Send>(
     pieces: &[T],
     is_ending: &AtomicBool,
     work: impl Fn(&T) -> R + Sync,
-    mut hear: impl FnMut(News<R>),
+    mut hear: impl FnMut(WorkEvent<R>),
 ) -> io::Result<()> {
     let jobs = jobs.clamp(1, pieces.len().max(1));
     let pool = ThreadPoolBuilder::new()
@@ -39,12 +39,12 @@ pub fn in_order<T: Sync, R: Send>(
         .thread_name(|index| format!("fit-{}", index + 1))
         .build()
         .map_err(io::Error::other)?;
-    // Pieces leave the bridge one by one, in order.
+    // ContactPieces leave the bridge one by one, in order.
     let one = |piece: &T| match is_ending.load(Ordering::Relaxed) {
         true => Err(WorkFailure::NotBegun),
         false => {
             let _in = tracing::info_span!("worker").entered();
-            contained(|| work(piece)).map_err(|_| WorkFailure::Died)
+            catch_panic(|| work(piece)).map_err(|_| WorkFailure::Died)
         }
     };
     let (sender, receiver) = sync_channel(jobs);
@@ -61,11 +61,11 @@ pub fn in_order<T: Sync, R: Send>(
         for (index, answer) in receiver {
             if answer.is_ok() {
                 done += 1;
-                hear(News::Done(done));
+                hear(WorkEvent::Done(done));
             }
             answers[index] = Some(answer);
             while let Some(answer) = answers.get_mut(delivered).and_then(Option::take) {
-                hear(News::Next(answer));
+                hear(WorkEvent::Next(answer));
                 delivered += 1;
             }
         }
@@ -86,8 +86,8 @@ mod tests {
     ) -> (Vec<Result<R, WorkFailure>>, usize) {
         let (mut answers, mut most) = (Vec::new(), 0);
         in_order(jobs, pieces, is_ending, work, |news| match news {
-            News::Done(count) => most = count,
-            News::Next(answer) => answers.push(answer),
+            WorkEvent::Done(count) => most = count,
+            WorkEvent::Next(answer) => answers.push(answer),
         })
         .unwrap();
         (answers, most)

@@ -7,12 +7,12 @@ use std::sync::{Mutex, PoisonError};
 /// Receives the progress of work: a bar, a window, a test.
 pub trait Progress {
     /// `done` of `of` pieces of like length are done and `what` comes next. Break cancels the rest.
-    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()>;
+    fn report(&self, done: usize, of: usize, what: &str) -> ControlFlow<()>;
 
     /// This share of the whole is done, 0 to 1. False cancels the rest.
     fn share(&self, share: f64, what: &str) -> bool {
         let done = (SHARES as f64 * share) as usize;
-        self.tell(done, SHARES, what).is_continue()
+        self.report(done, SHARES, what).is_continue()
     }
 }
 
@@ -20,17 +20,17 @@ pub trait Progress {
 const SHARES: usize = 1000;
 
 impl<F: Fn(usize, usize, &str) -> ControlFlow<()>> Progress for F {
-    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+    fn report(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
         self(done, of, what)
     }
 }
 
 /// Progress that is shown nowhere and never cancelled.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Unwatched;
+pub struct NoProgress;
 
-impl Progress for Unwatched {
-    fn tell(&self, _: usize, _: usize, _: &str) -> ControlFlow<()> {
+impl Progress for NoProgress {
+    fn report(&self, _: usize, _: usize, _: &str) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
@@ -43,7 +43,7 @@ pub struct TaskProgress {
 }
 
 impl Progress for TaskProgress {
-    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+    fn report(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
         *self.state.lock().unwrap_or_else(PoisonError::into_inner) = (done, of, what.to_owned());
         if self.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
@@ -59,7 +59,7 @@ impl TaskProgress {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// Pieces done, pieces in all, and what comes next.
+    /// ContactPieces done, pieces in all, and what comes next.
     pub fn read(&self) -> (usize, usize, String) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -1,14 +1,16 @@
 //! A scene in real time, its recording and its replay.
 
-use super::haptics::{Paced, body_of};
-use super::recorded::{Ended, RecordedTicks, Replayable, Replayed, replay_ticks};
-use palpate_haptics::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
+use super::haptics::{LoopMeasurement, fit_haptic_body};
+use super::tick_replay::{
+    FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
+};
+use palpate_haptics::scene::{HandLedScene, HandPose, NoForceReason, Pose, Scene, ScenePath};
 use palpate_runner::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
 use palpate_runner::haptics::scene_file::SceneFile;
 use palpate_runner::haptics::{SceneEnd, SceneLoop};
-use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
+use palpate_sessions::ticks::{SETTINGS_FILE, TickRecording, has_columns};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
@@ -17,7 +19,7 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(8);
 
 /// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
-pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
+pub fn read_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
     let Some(path) = file else { return Ok((SceneFile::default(), Vec::new())) };
     let called = path.display().to_string();
     let text = std::fs::read_to_string(path)
@@ -27,7 +29,7 @@ pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String>
     if let Some(source) = scene.source.take() {
         // A source is named from where its file is.
         let folder = path.parent().unwrap_or(Path::new(""));
-        let found = body_of(&folder.join(&source))?;
+        let found = fit_haptic_body(&folder.join(&source))?;
         scene.body = found.body;
         notes = found.notes;
     }
@@ -36,7 +38,7 @@ pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String>
 
 /// Result of a scene that ran in real time.
 #[derive(Clone, Debug, Serialize)]
-pub struct Played {
+pub struct SceneRun {
     pub name: String,
     /// The hand's path.
     pub path: &'static str,
@@ -55,35 +57,35 @@ pub struct Played {
     pub tick_us: f64,
     pub is_within_budget: bool,
     #[serde(flatten)]
-    pub paced: Paced,
+    pub paced: LoopMeasurement,
 }
 
 /// Runs a scene, its mesh known, in real time along a path, `laps` times, and records it in a new folder if one is given.
-pub fn play(
+pub fn play_scene(
     file: &SceneFile,
     (path, laps): (ScenePath, u32),
     record: Option<&Path>,
     progress: &mut dyn FnMut(f64),
-) -> Result<Played, String> {
+) -> Result<SceneRun, String> {
     let nodes =
         file.nodes.ok_or("a scene without nodes was played; this is a mistake in palpate")?;
     let scene = file.scene(nodes)?;
     let settings = *scene.settings();
     let recorder = record.map(|folder| SceneRecorder::start(folder, &file.text(), COLUMNS));
     let mut live = SceneLoop::start_laps(scene, (Some(path), laps), recorder.transpose()?)?;
-    let priority = live.granted().to_string();
+    let priority = live.granted_priority().to_string();
     let whole = path.seconds() * f64::from(laps);
     let (mut depth_max_mm, mut force_max_n) = (0.0_f64, 0.0_f64);
-    let mut seen: Vec<(WhyNoForce, u64)> = Vec::new();
+    let mut seen: Vec<(NoForceReason, u64)> = Vec::new();
     while !live.is_over() && live.is_alive() {
         std::thread::sleep(LOOK);
         let tick = live.view().tick;
         depth_max_mm = depth_max_mm.max(tick.depth);
         let [x, y, z] = tick.force;
         force_max_n = force_max_n.max(x.hypot(y).hypot(z));
-        match seen.iter_mut().find(|(why, _)| *why == tick.why) {
+        match seen.iter_mut().find(|(why, _)| *why == tick.no_force_reason) {
             Some((_, count)) => *count += 1,
-            None => seen.push((tick.why, 1)),
+            None => seen.push((tick.no_force_reason, 1)),
         }
         progress(settings.period.time_of(tick.tick).seconds().0 / whole);
     }
@@ -92,7 +94,7 @@ pub fn play(
     seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let frames = seen.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
     let tick_us = file.tolerances.tick_us;
-    Ok(Played {
+    Ok(SceneRun {
         name: file.name.clone(),
         path: path.name(),
         nodes: settings.nodes,
@@ -102,18 +104,18 @@ pub fn play(
         why: seen.iter().map(|(why, count)| (why.name(), *count as f64 / frames)).collect(),
         surface_hash: format!("{:016x}", end.scene.hash()),
         tick_us,
-        is_within_budget: 1e6 * end.kept.work.p99_9.0 <= tick_us,
-        paced: Paced {
+        is_within_budget: 1e6 * end.timing.work.p99_9.0 <= tick_us,
+        paced: LoopMeasurement {
             rate_hz: settings.period.hz(),
             busy_threads: 0,
             priority,
-            kept: end.kept,
+            statistics: end.timing,
             recorded: recorded.map(RecordedTicks::from),
         },
     })
 }
 
-impl Replayable<3, 10> for LedScene {
+impl Replayable<3, 10> for HandLedScene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (hand, elapsed) = scene_input(row);
         let tick = self.tick_after(hand, elapsed);
@@ -127,7 +129,7 @@ impl Replayable<3, 10> for LedScene {
 
 /// What became of the recording of a scene that was ended, if it has one.
 #[must_use]
-pub fn recorded(end: SceneEnd) -> Ended {
+pub fn finish_scene_recording(end: SceneEnd) -> FinishedRecording {
     let hash = end.scene.hash();
     Some(end.recorded?.map(|counts| (counts, hash)))
 }
@@ -136,8 +138,8 @@ pub fn recorded(end: SceneEnd) -> Ended {
 impl Replayable<3, 10> for Scene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (sensed, elapsed) = scene_input(row);
-        let Hand6 { at, turn } = sensed;
-        let tick = self.feel(Pose { at, turn }, elapsed);
+        let HandPose { at, turn } = sensed;
+        let tick = self.render(Pose { at, turn }, elapsed);
         scene_row(sensed, elapsed, &tick)
     }
 
@@ -147,7 +149,10 @@ impl Replayable<3, 10> for Scene {
 }
 
 /// Replays every tick of a recording from its inputs.
-pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
+pub fn replay(
+    folder: &Path,
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<ReplayResult, String> {
     let (whole, sensed) = SENSED_COLUMNS;
     let is_sensed = has_columns(folder, &whole, &sensed)?;
     let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
@@ -157,8 +162,8 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
             folder.display()
         ));
     }
-    let found = Recording::read(folder, columns)?;
-    let called = folder.join(SETTINGS).display().to_string();
+    let found = TickRecording::read(folder, columns)?;
+    let called = folder.join(SETTINGS_FILE).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;
     let nodes = file
         .nodes
@@ -168,6 +173,6 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
     if is_sensed {
         return replay_ticks(&name, &found, columns, &mut scene, is_going);
     }
-    let mut led = LedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
+    let mut led = HandLedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
     replay_ticks(&name, &found, columns, &mut led, is_going)
 }

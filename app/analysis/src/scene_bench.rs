@@ -1,13 +1,13 @@
 //! The cost of accuracy in a scene on this computer, and the cheapest settings that a scene's tolerances allow.
 
 use crate::progress::Progress;
-use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
+use crate::trade::{self, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, TradeExtent, measure_scene};
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Needs, NoPlan, Recovery, SceneCurves, ScenePlan, Side,
-    StepPoint, Surface, plan, slower,
+    ContactSide, Cut, Grid, HeightField, SceneCurves, ScenePlan, ScenePlanError, SceneRequirements,
+    StepPoint, Surface, SurfaceContact, SurfaceMethod, SurfaceRecovery, plan, updated_cost_factor,
 };
 use palpate_rheology::tolerance::Tolerance;
-use palpate_rheology::trade::{Machine, pareto};
+use palpate_rheology::trade::{Machine, mark_pareto_optimal};
 use palpate_runner::Stopwatch;
 use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
@@ -29,7 +29,7 @@ pub struct MethodSpeed {
 
 /// Measured curves of a scene, and the plan from them.
 #[derive(Clone, Debug, Serialize)]
-pub struct Bench {
+pub struct SceneBench {
     pub machine: Machine,
     pub quick: bool,
     /// Errors against times.
@@ -42,32 +42,34 @@ pub struct Bench {
     pub methods: Vec<MethodSpeed>,
     pub plan: Option<ScenePlan>,
     /// Why there is no plan that holds everything.
-    pub no_plan: Option<NoPlan>,
+    pub no_plan: Option<ScenePlanError>,
 }
 
 /// `None` if `progress` cancelled it.
 pub fn bench(
     file: &SceneFile,
-    extent: Extent,
+    extent: TradeExtent,
     progress: &dyn Progress,
-) -> Result<Option<Bench>, String> {
+) -> Result<Option<SceneBench>, String> {
     let Some(curves) = measure_scene(extent, progress)? else { return Ok(None) };
     let methods = [201, 401]
         .into_iter()
-        .flat_map(|nodes| [Method::Envelope, Method::Chain].map(|method| (nodes, method)))
+        .flat_map(|nodes| {
+            [SurfaceMethod::Envelope, SurfaceMethod::Chain].map(|method| (nodes, method))
+        })
         .map(|(nodes, method)| speed(nodes, method))
         .collect::<Result<_, _>>()?;
-    let (plan, no_plan) = match planned(file, &curves, 1.0) {
+    let (plan, no_plan) = match plan_scene(file, &curves, 1.0) {
         Ok(plan) => (Some(plan), None),
         Err(why) => (None, Some(why)),
     };
     let meshes = curves.meshes.iter().map(|p| (Some(p.error_mm), p.cost_us));
     let steps = curves.steps.iter().map(|p| (Some(p.error_n), p.cost_us));
-    Ok(Some(Bench {
+    Ok(Some(SceneBench {
         machine: trade::this_machine(),
-        quick: extent == Extent::Quick,
-        meshes_on_front: pareto(&meshes.collect::<Vec<_>>()),
-        steps_on_front: pareto(&steps.collect::<Vec<_>>()),
+        quick: extent == TradeExtent::Quick,
+        meshes_on_front: mark_pareto_optimal(&meshes.collect::<Vec<_>>()),
+        steps_on_front: mark_pareto_optimal(&steps.collect::<Vec<_>>()),
         curves,
         methods,
         plan,
@@ -81,7 +83,11 @@ pub fn bench(
 /// body's own alone are left. A scene of another side and slope with as many nodes is the measured one drawn larger, and its errors of
 /// shape are larger in proportion. A cut after so many nodes is another length on every mesh and is not planned; one by movement is off
 /// by no more than that movement on any.
-pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<ScenePlan, NoPlan> {
+pub fn plan_scene(
+    file: &SceneFile,
+    curves: &SceneCurves,
+    slower: f64,
+) -> Result<ScenePlan, ScenePlanError> {
     let tick = 1.0 / file.rate_hz;
     let off = |step: &StepPoint| (step.step_s / tick).ln().abs();
     let nearest = curves.steps.iter().map(off).fold(f64::INFINITY, f64::min);
@@ -94,7 +100,7 @@ pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<Sc
         cut.error_mm = cut.threshold_mm;
     }
     own.families.retain(|family| family.family == FAMILY);
-    let needs = Needs {
+    let needs = SceneRequirements {
         force: Tolerance::PercentOfThreshold(file.tolerances.force_percent),
         peak: SCENE_PEAK,
         shape_mm: file.tolerances.shape_mm,
@@ -104,7 +110,7 @@ pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<Sc
 }
 
 #[must_use]
-pub fn made_after(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
+pub fn scene_from_plan(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
     SceneFile {
         nodes: Some(plan.mesh.nodes as usize),
         cut_nodes: None,
@@ -115,22 +121,23 @@ pub fn made_after(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
 }
 
 /// The plan after a tick took longer than it should.
-pub fn planned_again(
+pub fn replan_scene(
     file: &SceneFile,
     curves: &SceneCurves,
     before: &ScenePlan,
     measured_us: f64,
-) -> Result<ScenePlan, NoPlan> {
-    planned(file, curves, slower(before, 1.0, measured_us))
+) -> Result<ScenePlan, ScenePlanError> {
+    plan_scene(file, curves, updated_cost_factor(before, 1.0, measured_us))
 }
 
 /// A poke that reaches half of the way to the border, repeated in every tick.
-fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
+fn speed(nodes: usize, method: SurfaceMethod) -> Result<MethodSpeed, String> {
     let grid = Grid::new(nodes, nodes, 1.0).map_err(|err| err.to_string())?;
     let middle = 0.5 * (nodes - 1) as f64;
-    let contact = [Contact { x: middle, y: middle, z: -0.5 * middle, side: Side::Push }];
+    let contact =
+        [SurfaceContact { x: middle, y: middle, z: -0.5 * middle, side: ContactSide::Push }];
     let field = HeightField::flat(grid, 1.0).map_err(|err| err.to_string())?;
-    let mut surface = Surface::new(field, method, Recovery::ELASTIC, Cut::NONE);
+    let mut surface = Surface::new(field, method, SurfaceRecovery::ELASTIC, Cut::NONE);
     let watch = Stopwatch::start();
     let mut moved = 0;
     while watch.seconds() < TIMED_S {

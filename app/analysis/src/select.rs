@@ -1,10 +1,10 @@
 //! Comparison of models on recordings on disk.
 
-use crate::compliance::Corrections;
+use crate::compliance::ComplianceCorrections;
 use crate::progress::Progress;
-use crate::source::Wanted;
-use crate::sources::{self, Naming, Reading, Recordings, SourcesError};
-use palpate_rheology::select::{SelectError, SelectOptions, Selection, select};
+use crate::recordings::{self, RecordingNames, RecordingOptions, Recordings, RecordingsError};
+use crate::source::SourceSelection;
+use palpate_rheology::select::{ModelSelection, SelectError, SelectOptions, select};
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
@@ -17,17 +17,17 @@ pub struct SelectRequest {
     /// Names of the columns of tables without a header.
     pub columns: Option<ColumnNames>,
     /// Which part of each, and whether rejected ones are taken.
-    pub wanted: Wanted,
+    pub wanted: SourceSelection,
     /// Families, tolerance and what is held out; specimens are those of `specimens`.
     pub options: SelectOptions,
     /// The specimen of each recording in turn; without it what they say of themselves.
     pub specimens: Option<Vec<String>>,
-    pub naming: Naming,
+    pub naming: RecordingNames,
 }
 
 #[derive(Clone, Debug)]
-pub struct Selected {
-    pub selection: Selection,
+pub struct SelectionReport {
+    pub selection: ModelSelection,
     /// Remarks about the recordings, each with the name of its own.
     pub notes: Vec<String>,
     /// Wall seconds of the comparison alone.
@@ -35,9 +35,9 @@ pub struct Selected {
 }
 
 #[derive(Debug, Error)]
-pub enum SelectFailure {
+pub enum ModelSelectionError {
     #[error(transparent)]
-    Sources(#[from] SourcesError),
+    Sources(#[from] RecordingsError),
     #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
     Specimens { names: usize, sources: usize },
     #[error(transparent)]
@@ -48,21 +48,21 @@ pub enum SelectFailure {
 pub fn select_sources(
     mut request: SelectRequest,
     progress: &dyn Progress,
-) -> Result<Selected, SelectFailure> {
-    let found = sources::find(&request.paths)?;
-    let how = Reading {
+) -> Result<SelectionReport, ModelSelectionError> {
+    let found = recordings::find(&request.paths)?;
+    let how = RecordingOptions {
         columns: request.columns.as_ref(),
         wanted: request.wanted,
-        corrections: &Corrections::none(None),
+        corrections: &ComplianceCorrections::none(None),
         naming: request.naming,
     };
-    let records = sources::read(&found.paths, how)?;
+    let records = recordings::read(&found.paths, how)?;
     request.options.specimens = specimens(request.specimens.take(), &records)?;
     let watch = Stopwatch::start();
     let selection = select(&records.borrowed(), &request.options, &|news| {
-        progress.tell(news.done, news.total, &news.family)
+        progress.report(news.done, news.total, &news.family)
     })?;
-    Ok(Selected {
+    Ok(SelectionReport {
         selection,
         seconds: watch.seconds(),
         notes: found.note().into_iter().chain(records.notes).collect(),
@@ -72,13 +72,13 @@ pub fn select_sources(
 fn specimens(
     names: Option<Vec<String>>,
     records: &Recordings,
-) -> Result<Vec<Option<String>>, SelectFailure> {
+) -> Result<Vec<Option<String>>, ModelSelectionError> {
     let Some(names) = names else {
         return Ok(records.all.iter().map(|one| one.specimen.clone()).collect());
     };
     let known = names.iter().filter(|name| !name.is_empty()).count();
     if known != names.len() || known != records.all.len() {
-        return Err(SelectFailure::Specimens { names: known, sources: records.all.len() });
+        return Err(ModelSelectionError::Specimens { names: known, sources: records.all.len() });
     }
     Ok(names.into_iter().map(Some).collect())
 }

@@ -1,11 +1,11 @@
 //! What remote support needs, in one zip file: the program's log, versions, settings, rig files
 //! without secrets and what the doctor says. Nothing that was measured, unless a session is named.
 
-use crate::opening::SETTINGS_FILE;
+use crate::window_requests::SETTINGS_FILE;
 use palpate_protocols::engine::ENGINE_VERSION;
-use palpate_sessions::atomic::{Draft, Existing};
-use palpate_sessions::rotating::{log_files, log_folder};
-use palpate_sessions::{RECORD_VERSION, Summary};
+use palpate_sessions::atomic::{Draft, ExistingFile};
+use palpate_sessions::program_log::{log_files, log_folder};
+use palpate_sessions::{RECORD_VERSION, SessionSummary};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -37,7 +37,7 @@ pub struct BundleRequest {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Bundled {
+pub struct BundledFile {
     /// Its name in the bundle.
     pub name: String,
     /// Its size before it is compressed.
@@ -56,15 +56,15 @@ pub enum BundleError {
 }
 
 /// Writes a bundle and lists its files.
-pub fn make_bundle(request: &BundleRequest) -> Result<Vec<Bundled>, BundleError> {
+pub fn make_bundle(request: &BundleRequest) -> Result<Vec<BundledFile>, BundleError> {
     let unwritable = |source| BundleError::Write { path: request.to.display().to_string(), source };
     let draft = Draft::new(&request.to).map_err(unwritable)?;
     let files = fill(request, &draft)?;
-    draft.persist(Existing::Keep).map_err(unwritable)?;
+    draft.persist(ExistingFile::Keep).map_err(unwritable)?;
     Ok(files)
 }
 
-fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleError> {
+fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<BundledFile>, BundleError> {
     let mut bundle = BundleWriter {
         zip: ZipWriter::new(draft.writer()).set_auto_large_file(),
         files: Vec::new(),
@@ -101,7 +101,7 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<Bundled>, BundleEr
 
 struct BundleWriter<'a> {
     zip: ZipWriter<BufWriter<&'a File>>,
-    files: Vec<Bundled>,
+    files: Vec<BundledFile>,
     to: String,
 }
 
@@ -127,7 +127,7 @@ impl BundleWriter<'_> {
             .map_err(io::Error::from)
             .and_then(|()| io::copy(content, &mut self.zip))
             .map_err(|source| BundleError::Write { path: self.to.clone(), source })?;
-        self.files.push(Bundled { name: name.into(), bytes, what });
+        self.files.push(BundledFile { name: name.into(), bytes, what });
         Ok(())
     }
 
@@ -136,7 +136,7 @@ impl BundleWriter<'_> {
         let folders = WalkDir::new(&sessions).min_depth(1).max_depth(1);
         for folder in folders.sort_by_file_name().into_iter().flatten() {
             // One that cannot be read has its line among the findings.
-            let Ok(summary) = Summary::read(folder.path()) else { continue };
+            let Ok(summary) = SessionSummary::read(folder.path()) else { continue };
             let text = serde_json::to_string_pretty(&summary.manifest).unwrap_or_default();
             let name = format!("manifests/{}.json", file_name(folder.path()));
             self.text(&name, "a session's manifest", &text)?;
@@ -145,7 +145,7 @@ impl BundleWriter<'_> {
     }
 
     fn session(&mut self, session: &Path) -> Result<(), BundleError> {
-        Summary::read(session).map_err(|err| BundleError::Session(err.to_string()))?;
+        SessionSummary::read(session).map_err(|err| BundleError::Session(err.to_string()))?;
         let base = session.parent().unwrap_or(Path::new(""));
         for entry in WalkDir::new(session).sort_by_file_name() {
             let entry = entry.map_err(|err| unreadable(session, err.into()))?;

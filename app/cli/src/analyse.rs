@@ -4,9 +4,9 @@ use super::arguments::parse_columns;
 use super::output::Output;
 use super::{Failure, known_fit_failure, new_file, source_failure};
 use clap::Args;
-use palpate_analysis::analyse::{AnalyseFailure, analyse};
+use palpate_analysis::cycle_analysis::{CycleAnalysisError, analyse};
 use palpate_analysis::fit::KnownFit;
-use palpate_analysis::report::cycles::{Question, object, picture, whole};
+use palpate_analysis::report::cycles::{CycleSettings, cycles_text, object, picture};
 use palpate_model::units::Depth;
 use palpate_rheology::cycles::SteadyRule;
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     let columns = parse_columns(args.columns.as_deref())?;
     let fitted = args.validate.as_deref();
     let fitted = fitted.map(|path| KnownFit::of(path, columns.as_ref())?.0.body());
-    let question = Question {
+    let question = CycleSettings {
         at: args.at.map(Depth),
         rule: SteadyRule { percent: args.steady, ..SteadyRule::default() },
         frequency: args.frequency,
@@ -62,13 +62,13 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     let reports = analyse(&args.sources, columns.as_ref(), &question, &bar);
     drop(bar);
     let reports = reports.map_err(|err| match err {
-        AnalyseFailure::Source(err) => source_failure(err),
+        CycleAnalysisError::Source(err) => source_failure(err),
         err => Failure::failed(err),
     })?;
     let fitted = args.validate.as_ref().map(|path| path.display().to_string());
     output.object(&object(&reports, fitted.as_deref()));
     output.text_only(|| {
-        let parts: Vec<String> = reports.iter().map(whole).collect();
+        let parts: Vec<String> = reports.iter().map(cycles_text).collect();
         parts.join("\n\n")
     });
     new_file::write("plot", args.plot.as_deref(), || picture(&reports[0]))

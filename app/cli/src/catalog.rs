@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::{Bar, Output, merged};
 use clap::Subcommand;
 use palpate_runner::Stopwatch;
-use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, Doubt};
+use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, CatalogMismatch};
 use palpate_sessions::library_folder;
 use serde::Serialize;
 use std::path::Path;
@@ -67,7 +67,7 @@ fn check(library: &Path, output: &Output) -> Result<(), Failure> {
     output.answer("catalog check", &object, || match doubts.as_slice() {
         [] => format!("the catalog agrees with its {sessions} sessions"),
         doubts => {
-            let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
+            let line = |one: &CatalogMismatch| format!("{}: {}", one.folder, one.sentence);
             doubts.iter().map(line).collect::<Vec<_>>().join("\n")
         }
     });

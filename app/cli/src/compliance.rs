@@ -3,13 +3,16 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::compliance::{Correction, Corrections, LAST, MeasureError, measured};
-use palpate_analysis::edited;
+use palpate_analysis::compliance::{
+    ComplianceCorrection, ComplianceCorrections, ComplianceMeasurementError, LATEST_COMPLIANCE,
+    compliance_from_session,
+};
+use palpate_analysis::edited_session;
 use palpate_model::rig::RigCompliance;
 use palpate_model::units::Newtons;
-use palpate_sessions::compliances::{Kept, Shelf};
+use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
+use palpate_sessions::document_store::{LibraryError, save_document, supersede_document};
 use palpate_sessions::library_folder;
-use palpate_sessions::shelf::{LibraryError, save, supersede};
 use std::path::PathBuf;
 
 /// Measure the machine compliance of a rig, from a session of stiff-surface
@@ -33,14 +36,15 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
             "a seating force of {seating} N is not possible; give one above 0 N"
         )));
     }
-    let edited = edited::open(&args.session).map_err(super::source_failure)?;
+    let edited = edited_session::open(&args.session).map_err(super::source_failure)?;
     edited.session.notes.iter().for_each(|note| output.note(note));
     if let Some(reason) = edited.rejection() {
         return Err(Failure::usage(format!(
             "the session was rejected ({reason}), so it gives no compliance; 'palpate verdict' changes the verdict"
         )));
     }
-    let found = measured(&edited.session, args.seating.map(Newtons)).map_err(failure)?;
+    let found =
+        compliance_from_session(&edited.session, args.seating.map(Newtons)).map_err(failure)?;
     let saved = args.save.then(|| save_compliance(&found)).transpose()?;
     let document = saved.as_ref().map_or(&found, |saved| &saved.document);
     let object = serde_json::json!({
@@ -55,14 +59,14 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
 }
 
 /// Saves the compliance and supersedes the one in force for its rig.
-fn save_compliance(found: &RigCompliance) -> Result<Kept, Failure> {
+fn save_compliance(found: &RigCompliance) -> Result<StoredCompliance, Failure> {
     let library = library_folder().map_err(Failure::usage)?;
-    let saved = match Shelf::open(&library).in_force(&found.rig) {
+    let saved = match ComplianceStore::open(&library).in_force(&found.rig) {
         Some(old) if is_same(&old.document, found) => {
             Err(LibraryError::AlreadyThere { kind: "compliance", id: old.id.clone() })
         }
-        Some(old) => supersede(&library, &old.id, found),
-        None => save(&library, found),
+        Some(old) => supersede_document(&library, &old.id, found),
+        None => save_document(&library, found),
     };
     saved.map_err(|err| match err {
         LibraryError::Io { .. } => Failure::failed(err),
@@ -76,7 +80,7 @@ fn is_same(saved: &RigCompliance, found: &RigCompliance) -> bool {
     saved == *found
 }
 
-fn text(found: &RigCompliance, saved: Option<&Kept>) -> String {
+fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
     let um = |mm: f64| 1e3 * mm;
     let mut lines = vec![
         format!(
@@ -118,28 +122,31 @@ fn text(found: &RigCompliance, saved: Option<&Kept>) -> String {
 }
 
 /// A session of another kind is wrong use; a run without a result is a failure.
-fn failure(err: MeasureError) -> Failure {
+fn failure(err: ComplianceMeasurementError) -> Failure {
     match err {
-        MeasureError::Source(err) => super::source_failure(err),
-        MeasureError::NoSurface | MeasureError::Imported => Failure::usage(err),
+        ComplianceMeasurementError::Source(err) => super::source_failure(err),
+        ComplianceMeasurementError::NoSurface | ComplianceMeasurementError::Imported => {
+            Failure::usage(err)
+        }
         _ => Failure::failed(err),
     }
 }
 
 /// The correction of `--compliance`; without it depths stay raw, and a missing library is no error.
-pub(super) fn corrections(name: Option<&str>) -> Result<Corrections, Failure> {
+pub(super) fn corrections(name: Option<&str>) -> Result<ComplianceCorrections, Failure> {
     let library = library_folder();
     let Some(name) = name else {
-        return Ok(Corrections::none(library.ok().as_deref()));
+        return Ok(ComplianceCorrections::none(library.ok().as_deref()));
     };
     let library = library.map_err(Failure::usage)?;
-    Corrections::named(name, Some(&library)).map_err(|err| super::source_failure(err.into()))
+    ComplianceCorrections::named(name, Some(&library))
+        .map_err(|err| super::source_failure(err.into()))
 }
 
 /// How a compliance changes depths, and the flag that applies it.
-pub(super) fn correction_sentence(correction: &Correction) -> String {
+pub(super) fn correction_sentence(correction: &ComplianceCorrection) -> String {
     match correction.is_applied {
         true => correction.sentence(),
-        false => format!("{} (--compliance {LAST})", correction.sentence()),
+        false => format!("{} (--compliance {LATEST_COMPLIANCE})", correction.sentence()),
     }
 }

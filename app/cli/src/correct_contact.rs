@@ -6,7 +6,7 @@ use super::output::Output;
 use super::recalibrate::analysis_edit_failure;
 use super::verdict::ReasonArgs;
 use clap::Args;
-use palpate_analysis::analyses;
+use palpate_analysis::session_actions;
 use palpate_model::units::Position;
 use std::path::PathBuf;
 
@@ -27,7 +27,8 @@ pub struct CorrectArgs {
 
 pub(super) fn run(args: &CorrectArgs, output: &Output) -> Result<(), Failure> {
     let (session, position) = (&args.session, Position(args.position));
-    let done = analyses::correct(session, args.contact, position, &args.reason.author());
+    let done =
+        session_actions::correct_contact(session, args.contact, position, &args.reason.author());
     let done = done.map_err(analysis_edit_failure)?;
     let object = serde_json::json!({
         "session": session, "contact": done.number, "position_mm": position.0,

@@ -5,13 +5,13 @@ use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::RigArgs;
 use clap::Args;
-use palpate_analysis::daily::{DAILY_CHECK, judge};
-use palpate_model::about::About;
-use palpate_model::about::Labels;
+use palpate_analysis::daily::{DAILY_CHECK, assess_daily_check};
+use palpate_model::metadata::SessionLabels;
+use palpate_model::metadata::SessionMetadata;
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::Plan;
-use palpate_runner::{AfterStop, Answers, RunRequest, wall_now};
+use palpate_runner::{AfterStop, PromptResponder, RunRequest, wall_now};
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check};
 use palpate_sessions::{Session, library_folder};
 use std::collections::BTreeMap;
@@ -35,11 +35,11 @@ pub struct DailyCheckArgs {
 
 pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
-    let labels = Labels {
+    let labels = SessionLabels {
         operator: args.operator.clone(),
         specimen: String::new(),
         indenter: String::new(),
-        about: About::default(),
+        about: SessionMetadata::default(),
     };
     let plan = plan(args.mass, &labels)?;
     let bench = super::rig::open(&args.rig)?;
@@ -59,7 +59,11 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         is_acknowledged: false,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
-        answers: if bench.rig.is_virtual() { Answers::Confirm } else { Answers::Operator },
+        answers: if bench.rig.is_virtual() {
+            PromptResponder::Confirm
+        } else {
+            PromptResponder::Operator
+        },
         leader: None,
     };
     let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
@@ -75,7 +79,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         )));
     }
     let session = Session::open(&view.folder).map_err(super::read_failure)?;
-    let parts = judge(&session).map_err(super::source_failure)?;
+    let parts = assess_daily_check(&session).map_err(super::source_failure)?;
     let check = DailyCheck {
         at: wall_now().into(),
         rig,
@@ -102,7 +106,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     }
 }
 
-fn plan(mass_g: f64, labels: &Labels) -> Result<Plan, Failure> {
+fn plan(mass_g: f64, labels: &SessionLabels) -> Result<Plan, Failure> {
     let values = BTreeMap::from([("mass".to_owned(), format!("{mass_g} g"))]);
     let Some(protocol) = built_in(DAILY_CHECK) else {
         return Err(Failure::failed("this palpate has no daily check built in"));
@@ -140,7 +144,7 @@ mod tests {
         }
         let line = Line::parse_from(["daily-check"]);
         let protocol = built_in(DAILY_CHECK).unwrap().unwrap();
-        let named = |one: &&palpate_protocols::file::Parameter| one.name == "mass";
+        let named = |one: &&palpate_protocols::file::ProtocolParameter| one.name == "mass";
         let mass = protocol.parameters.iter().find(named).unwrap();
         assert_eq!(mass.default.text, format!("{} g", line.args.mass));
     }

@@ -3,9 +3,9 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_sessions::atomic::leftovers;
+use palpate_sessions::atomic::find_leftovers;
 use palpate_sessions::library_folder;
-use palpate_sessions::recover::{Health, Patient, examine};
+use palpate_sessions::recover::{SessionExamination, SessionHealth, examine_session};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct DoctorArgs {
 
 #[derive(Serialize)]
 struct DoctorReport {
-    sessions: Vec<Patient>,
+    sessions: Vec<SessionExamination>,
     unwell: usize,
     /// Unfinished files of a program that was killed.
     leftovers: Vec<PathBuf>,
@@ -53,8 +53,8 @@ pub(super) fn findings(library: &Path, output: &Output) -> Result<String, Failur
 }
 
 fn examine_all(paths: &[PathBuf], places: &[(PathBuf, usize)], output: &Output) -> DoctorReport {
-    let sessions = for_each(paths, output, examine);
-    let remains = places.iter().flat_map(|(place, depth)| leftovers(place, *depth));
+    let sessions = for_each(paths, output, examine_session);
+    let remains = places.iter().flat_map(|(place, depth)| find_leftovers(place, *depth));
     DoctorReport {
         unwell: sessions.iter().filter(|one| is_unusable(one)).count(),
         sessions,
@@ -96,22 +96,24 @@ pub(super) fn for_each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Pat
     done
 }
 
-fn is_unusable(session: &Patient) -> bool {
-    !matches!(session.health, Health::Healthy | Health::BeingRecorded | Health::Interrupted)
-        || !session.wrong_beside.is_empty()
+fn is_unusable(session: &SessionExamination) -> bool {
+    !matches!(
+        session.health,
+        SessionHealth::Healthy | SessionHealth::BeingRecorded | SessionHealth::Interrupted
+    ) || !session.damaged_companions.is_empty()
 }
 
-fn session_text(session: &Patient) -> String {
+fn session_text(session: &SessionExamination) -> String {
     let state = match &session.health {
-        Health::Healthy if !session.wrong_beside.is_empty() => "its log is healthy",
-        Health::Healthy => "healthy",
-        Health::BeingRecorded => "being recorded",
-        Health::Interrupted => "interrupted",
-        Health::Incomplete => "incomplete",
-        Health::Damaged { .. } => "damaged",
-        Health::Lost => "lost",
-        Health::Newer => "newer",
-        Health::Foreign => "not a session",
+        SessionHealth::Healthy if !session.damaged_companions.is_empty() => "its log is healthy",
+        SessionHealth::Healthy => "healthy",
+        SessionHealth::BeingRecorded => "being recorded",
+        SessionHealth::Interrupted => "interrupted",
+        SessionHealth::Incomplete => "incomplete",
+        SessionHealth::Damaged { .. } => "damaged",
+        SessionHealth::Lost => "lost",
+        SessionHealth::Newer => "newer",
+        SessionHealth::Foreign => "not a session",
     };
     let mut lines = vec![match session.samples {
         0 => format!("{}: {state}", session.path.display()),
@@ -121,9 +123,10 @@ fn session_text(session: &Patient) -> String {
             session.until_s
         ),
     }];
-    let sentences = session.findings.iter().chain(&session.wrong_beside);
+    let sentences = session.findings.iter().chain(&session.damaged_companions);
     lines.extend(sentences.map(|one| format!("  {one}")));
-    let can_be_kept = matches!(session.health, Health::Damaged { .. } | Health::Interrupted);
+    let can_be_kept =
+        matches!(session.health, SessionHealth::Damaged { .. } | SessionHealth::Interrupted);
     match &session.recovered {
         Some(folder) => {
             lines.push(format!("  the intact part was recovered into {}", folder.display()))

@@ -9,10 +9,10 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
-use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
 use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
-use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
 use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
 use std::net::SocketAddr;
@@ -177,7 +177,7 @@ pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failu
 fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
     let usual = if args.model.is_21x3() { None } else { Some(16) };
     let is_serial = args.wire.tcp.is_none();
-    let mut device = GalilEmulator::new(GalilSettings {
+    let mut device = GalilEmulator::new(EmulatedGalilSettings {
         sim: args.bench.settings(),
         model: args.model,
         converter: args.adc.map_or(usual, |bits| bits.0),
@@ -249,13 +249,13 @@ fn emulate(
 ) -> Result<(), Failure> {
     let link = wire.pty.clone().flatten();
     let place = match (wire.tcp, cell_link) {
-        (Some(address), None) => Place::Tcp(address),
-        (Some(address), Some(cell)) => Place::TcpAndPtys(address, vec![cell]),
-        (None, None) => Place::Pty(link),
-        (None, Some(cell)) => Place::Ptys(vec![link, cell]),
+        (Some(address), None) => EmulatorAddress::Tcp(address),
+        (Some(address), Some(cell)) => EmulatorAddress::TcpAndPtys(address, vec![cell]),
+        (None, None) => EmulatorAddress::Pty(link),
+        (None, Some(cell)) => EmulatorAddress::Ptys(vec![link, cell]),
     };
     let options = ServeOptions {
-        place,
+        address: place,
         baud: wire.baud,
         latency: Nanos(u64::from(wire.latency_ms) * 1_000_000),
         faults: wire.fault.clone(),
@@ -263,18 +263,18 @@ fn emulate(
     };
     let stop = ctrl_c_flag()?;
     let orders = read_lines("orders")?;
-    let mut notify = |event: Told| match event {
-        Told::Ready(at) => announcement.print(&at, wire.tcp.is_none(), output),
-        Told::Fault(turn) => {
+    let mut notify = |event: ServeEvent| match event {
+        ServeEvent::Ready(at) => announcement.print(&at, wire.tcp.is_none(), output),
+        ServeEvent::Fault(turn) => {
             let verb = if turn.is_on { "begins" } else { "ends" };
             output.note(&format!("{} {verb}", turn.kind));
         }
-        Told::Done(order) => {
+        ServeEvent::Done(order) => {
             if let Some(sentence) = order.confirmation() {
                 output.note(&sentence);
             }
         }
-        Told::Refused(sentence) => output.note(&sentence),
+        ServeEvent::Refused(sentence) => output.note(&sentence),
     };
     serve(device, &options, &orders, &stop, &mut notify).map_err(Failure::failed)
 }

@@ -6,7 +6,7 @@ use super::output::Output;
 use clap::Args;
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{PAGE_HEAD, page, text};
-use palpate_rheology::extremes::{Extent, Verdict};
+use palpate_rheology::extremes::{ExtremesExtent, ExtremesVerdict};
 use std::path::{Path, PathBuf};
 
 /// Test numerical stability at the extremes, every family, integrator and fit
@@ -28,9 +28,9 @@ pub struct ExtremesArgs {
 
 pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     let (extent, name) = match (args.quick, args.soak) {
-        (true, _) => (Extent::Quick, "quick"),
-        (false, true) => (Extent::Soak, "soak"),
-        (false, false) => (Extent::Whole, "whole"),
+        (true, _) => (ExtremesExtent::Quick, "quick"),
+        (false, true) => (ExtremesExtent::Soak, "soak"),
+        (false, false) => (ExtremesExtent::Whole, "whole"),
     };
     if !args.page.as_deref().is_some_and(is_own_page) {
         new_file::check("page", args.page.as_deref())?;
@@ -39,10 +39,10 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     // Only cancelling gives no rows, and a progress bar never cancels.
     let rows = rows.map_err(Failure::usage)?.unwrap_or_default();
     let count = |verdict| rows.iter().filter(|row| row.verdict == verdict).count();
-    let wrong = count(Verdict::Wrong);
+    let wrong = count(ExtremesVerdict::Wrong);
     let object = serde_json::json!({
-        "extent": name, "right": count(Verdict::Right), "refused": count(Verdict::Refused),
-        "flagged": count(Verdict::Flagged), "wrong": wrong, "rows": rows,
+        "extent": name, "right": count(ExtremesVerdict::Right), "refused": count(ExtremesVerdict::Refused),
+        "flagged": count(ExtremesVerdict::Flagged), "wrong": wrong, "rows": rows,
     });
     output.answer("extremes", &object, || text(&rows));
     new_file::write("page", args.page.as_deref(), || page(&rows))?;

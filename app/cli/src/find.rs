@@ -7,7 +7,9 @@ use super::output::Output;
 use chrono::{DateTime, Utc};
 use clap::Args;
 use palpate_analysis::report::catalog as report;
-use palpate_sessions::catalog::{Condition, Order, Query, ReviewIs, VerdictIs, beginning, ending};
+use palpate_sessions::catalog::{
+    CatalogOrder, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end, parse_start,
+};
 use palpate_sessions::library_folder;
 use std::num::NonZeroUsize;
 
@@ -33,10 +35,10 @@ pub struct FindArgs {
     #[arg(long, value_name = "NUMBER")]
     cell: Option<String>,
     /// Started on this day or later, UTC, or at a time such as 2026-03-05T14:00:00Z
-    #[arg(long, value_name = "DAY", value_parser = beginning)]
+    #[arg(long, value_name = "DAY", value_parser = parse_start)]
     since: Option<DateTime<Utc>>,
     /// Started on this day or before, UTC, or before a time
-    #[arg(long, value_name = "DAY", value_parser = ending)]
+    #[arg(long, value_name = "DAY", value_parser = parse_end)]
     until: Option<DateTime<Utc>>,
     /// A condition on a value of the protocol, on details of the session or on a saved fit, as in
     /// depth>=2mm, specimen.thickness_mm<12 or fit.tau_eps>1.5; may be repeated
@@ -44,16 +46,16 @@ pub struct FindArgs {
     conditions: Vec<Condition>,
     /// valid, suspect, rejected or none
     #[arg(long)]
-    verdict: Option<VerdictIs>,
+    verdict: Option<QualityFilter>,
     /// A tag; may be repeated
     #[arg(long = "tag", value_name = "TAG")]
     tags: Vec<String>,
     /// accepted, rejected, repeat, outdated or none
     #[arg(long)]
-    review: Option<ReviewIs>,
+    review: Option<ReviewFilter>,
     /// Sort order
     #[arg(long, value_parser = choice(&SORTS), default_value = "started")]
-    sort: Order,
+    sort: CatalogOrder,
     /// Reverse the order
     #[arg(long)]
     reverse: bool,
@@ -65,20 +67,20 @@ pub struct FindArgs {
     page: NonZeroUsize,
 }
 
-const SORTS: [Choice<Order>; 7] = [
-    ("started", Order::Started, "Latest first"),
-    ("specimen", Order::Specimen, "By specimen"),
-    ("operator", Order::Operator, "By operator"),
-    ("protocol", Order::Protocol, "By protocol"),
-    ("duration", Order::Duration, "Longest first"),
-    ("verdict", Order::Verdict, "By verdict, in alphabetical order"),
-    ("review", Order::Review, "By review, in alphabetical order"),
+const SORTS: [Choice<CatalogOrder>; 7] = [
+    ("started", CatalogOrder::Started, "Latest first"),
+    ("specimen", CatalogOrder::Specimen, "By specimen"),
+    ("operator", CatalogOrder::Operator, "By operator"),
+    ("protocol", CatalogOrder::Protocol, "By protocol"),
+    ("duration", CatalogOrder::Duration, "Longest first"),
+    ("verdict", CatalogOrder::Verdict, "By verdict, in alphabetical order"),
+    ("review", CatalogOrder::Review, "By review, in alphabetical order"),
 ];
 
 pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let (limit, page) = (args.limit.get(), args.page.get());
-    let query = Query {
+    let query = CatalogQuery {
         words: args.words.join(" "),
         specimen: args.specimen.clone(),
         operator: args.operator.clone(),
@@ -99,7 +101,8 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let (found, doubts) = use_updated_catalog(&library, output, |catalog| {
         let found = catalog.find(&query)?;
         let is_none = found.count == 0;
-        let doubts = if is_none { catalog.doubts(&query.conditions)? } else { Vec::new() };
+        let doubts =
+            if is_none { catalog.condition_warnings(&query.conditions)? } else { Vec::new() };
         Ok((found, doubts))
     })?;
     doubts.iter().for_each(|doubt| output.note(doubt));

@@ -7,14 +7,14 @@ use super::output::Output;
 use super::scene::{RecordingReplayArgs, report_replay};
 use super::slave::{self, SlaveArgs};
 use clap::{Args, Subcommand, ValueEnum};
-use palpate_analysis::follow_session::keep_followed;
-use palpate_analysis::haptics::{Setting, body_of, check, follow, pace};
+use palpate_analysis::feedback_session::store_feedback_check;
+use palpate_analysis::haptics::{HapticSettings, check, check_feedback, fit_haptic_body, pace};
 use palpate_analysis::haptics_tape::{recorder, replay};
 use palpate_analysis::progress::Progress;
 use palpate_analysis::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
-use palpate_haptics::check::CheckSettings;
+use palpate_haptics::check::FeedbackCheckSettings;
 use palpate_haptics::{DriveKind, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -62,7 +62,7 @@ struct DeviceArgs {
     #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "N")]
     friction: Option<f64>,
     /// Delay from an encoder count to its force, in ticks
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=i64::from(Setting::DELAY_MAX)), value_name = "TICKS")]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=i64::from(HapticSettings::DELAY_MAX)), value_name = "TICKS")]
     delay: u8,
     /// End of the stroke in mm
     #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM")]
@@ -73,7 +73,7 @@ struct DeviceArgs {
 }
 
 impl DeviceArgs {
-    fn setting(&self) -> Result<Setting, Failure> {
+    fn setting(&self) -> Result<HapticSettings, Failure> {
         let not_negative = |name: &str, value: f64| {
             (value >= 0.0).then_some(value).ok_or_else(|| {
                 Failure::usage(format!("--{name} {value} is not possible; give 0 or more"))
@@ -81,8 +81,8 @@ impl DeviceArgs {
         };
         let friction = self.friction.map(|friction| not_negative("friction", friction));
         let period = Period::of_rate(self.rate).map_err(Failure::usage)?;
-        let usual = Setting::source(period);
-        Ok(Setting {
+        let usual = HapticSettings::source(period);
+        Ok(HapticSettings {
             period,
             drive: match self.drive {
                 DriveArg::Voltage => usual.drive,
@@ -92,8 +92,8 @@ impl DeviceArgs {
             damping: 1e-3 * not_negative("damping", self.damping)?,
             friction: friction.transpose()?.map(Newtons),
             delay: usize::from(self.delay),
-            deepest: Depth(above_zero("depth", self.depth, Setting::DEPTH_MAX, "mm")?),
-            speed: MmPerS(above_zero("speed", self.speed, Setting::SPEED_MAX, "mm/s")?),
+            deepest: Depth(above_zero("depth", self.depth, HapticSettings::DEPTH_MAX, "mm")?),
+            speed: MmPerS(above_zero("speed", self.speed, HapticSettings::SPEED_MAX, "mm/s")?),
         })
     }
 }
@@ -187,9 +187,9 @@ pub(super) fn body(
     deepest: Depth,
     output: &Output,
 ) -> Result<ModifiedKelvin, Failure> {
-    let found = body_of(source).map_err(Failure::usage)?;
+    let found = fit_haptic_body(source).map_err(Failure::usage)?;
     let notes = found.notes.iter().cloned();
-    notes.chain(found.beyond(deepest)).for_each(|note| output.note(&note));
+    notes.chain(found.extrapolation_warning(deepest)).for_each(|note| output.note(&note));
     Ok(found.body)
 }
 
@@ -208,16 +208,16 @@ fn run_follow(args: &HapticsFollowArgs, output: &Output) -> Result<(), Failure> 
     new_file::check("table", args.table.as_deref())?;
     new_file::check("session", args.out.as_deref())?;
     let body = body(&args.source, Depth(args.depth), output)?;
-    let settings = CheckSettings {
+    let settings = FeedbackCheckSettings {
         speed: MmPerS(args.speed),
         depth: Depth(args.depth),
         hold: Seconds(args.hold),
         friction_share: f64::from(args.help_friction) / 100.0,
-        ..CheckSettings::source(body)
+        ..FeedbackCheckSettings::source(body)
     };
     let followed = output
         .with_share_bar(|bar| {
-            follow(&settings, &mut |share| {
+            check_feedback(&settings, &mut |share| {
                 bar.share(share, "");
             })
         })
@@ -227,7 +227,7 @@ fn run_follow(args: &HapticsFollowArgs, output: &Output) -> Result<(), Failure> 
     new_file::write("picture", args.plot.as_deref(), || follow_plot(&source, &followed))?;
     new_file::write("table", args.table.as_deref(), || follow_table(&followed))?;
     match &args.out {
-        Some(folder) => keep_followed(&followed, &source, folder).map_err(Failure::failed),
+        Some(folder) => store_feedback_check(&followed, &source, folder).map_err(Failure::failed),
         None => Ok(()),
     }
 }
@@ -262,7 +262,7 @@ fn run_bench(args: &HapticsBenchArgs, output: &Output) -> Result<(), Failure> {
     let mut loops = Vec::new();
     for &busy in &loads {
         for &period in &periods {
-            let setting = Setting::source(period);
+            let setting = HapticSettings::source(period);
             let done = loops.len() as f64;
             let settings = setting.simulation(ModifiedKelvin::THESIS, true);
             let paced = pace(&settings, seconds, busy, None, &mut |share| {

@@ -6,7 +6,7 @@ use super::catalog::use_updated_catalog;
 use super::output::Output;
 use clap::Args;
 use palpate_analysis::report::catalog as report;
-use palpate_sessions::catalog::Subject;
+use palpate_sessions::catalog::HistorySubject;
 use palpate_sessions::library_folder;
 
 /// Show the history of a specimen, a rig or a load cell
@@ -14,15 +14,15 @@ use palpate_sessions::library_folder;
 pub struct HistoryArgs {
     /// Kind of subject
     #[arg(value_parser = choice(&SUBJECTS))]
-    subject: Subject,
+    subject: HistorySubject,
     /// Its name; a load cell's serial number
     name: String,
 }
 
-const SUBJECTS: [Choice<Subject>; 3] = [
-    ("specimen", Subject::Specimen, "What was indented"),
-    ("rig", Subject::Rig, "A rig"),
-    ("cell", Subject::Cell, "A load cell"),
+const SUBJECTS: [Choice<HistorySubject>; 3] = [
+    ("specimen", HistorySubject::Specimen, "What was indented"),
+    ("rig", HistorySubject::Rig, "A rig"),
+    ("cell", HistorySubject::Cell, "A load cell"),
 ];
 
 pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {

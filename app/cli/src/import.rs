@@ -3,18 +3,18 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::imports::{ImportFailure, Request, import, text};
-use palpate_model::about::Labels;
+use palpate_analysis::imports::{ImportFailure, ImportRequest, import, text};
+use palpate_model::metadata::SessionLabels;
 use palpate_tables::import::{
-    ColumnChoice, Decimal, Delimiter, Fault, ForeignError, Format, KeepError, TextEncoding, Told,
-    UnitChoice, ZeroChoice,
+    ColumnChoice, DecimalSign, Delimiter, ForeignError, ForeignFormat, ImportOptions, RowFault,
+    StoreImportError, TextEncoding, UnitChoice, ZeroChoice,
 };
 use std::path::PathBuf;
 
 /// Import files of other programs as sessions
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    #[arg(required = true, help = format!("Files: {}", Format::sources()))]
+    #[arg(required = true, help = format!("Files: {}", ForeignFormat::sources()))]
     files: Vec<PathBuf>,
     /// Folder for the new session folders; without it they go to the library (~/palpate or PALPATE_HOME)
     #[arg(long, value_name = "FOLDER")]
@@ -41,17 +41,17 @@ pub struct ImportArgs {
 /// What is given about the layout of the files; all else is detected.
 #[derive(Debug, Args)]
 struct LayoutArgs {
-    #[arg(long, help = format!("Layout: {}", Format::names()))]
-    format: Option<Format>,
+    #[arg(long, help = format!("Layout: {}", ForeignFormat::names()))]
+    format: Option<ForeignFormat>,
     /// Separator of cells: tab, comma, semicolon, space or one character
     #[arg(long, value_name = "NAME")]
     delimiter: Option<Delimiter>,
     /// Encoding, such as utf-8, utf-16le or windows-1252
     #[arg(long, value_name = "NAME")]
     encoding: Option<TextEncoding>,
-    /// Decimal sign: point or comma
+    /// DecimalSign sign: point or comma
     #[arg(long, value_name = "SIGN")]
-    decimal: Option<Decimal>,
+    decimal: Option<DecimalSign>,
     /// Names of all columns in order, where the file has none, as in t_s,depth_mm,force_N
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     columns: Vec<String>,
@@ -75,12 +75,12 @@ struct LayoutArgs {
     part: Vec<String>,
     /// Rows to skip instead of refusing the file: missing, repeated, backward
     #[arg(long, value_name = "FAULT,...", value_delimiter = ',')]
-    skip: Vec<Fault>,
+    skip: Vec<RowFault>,
 }
 
 impl LayoutArgs {
-    fn known_layout(&self) -> Told {
-        Told {
+    fn known_layout(&self) -> ImportOptions {
+        ImportOptions {
             format: self.format,
             delimiter: self.delimiter,
             encoding: self.encoding,
@@ -98,9 +98,9 @@ impl LayoutArgs {
 }
 
 pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
-    let request = Request {
+    let request = ImportRequest {
         files: args.files.clone(),
-        told: args.layout.known_layout(),
+        layout: args.layout.known_layout(),
         labels: labels(args)?,
         into: args.into.clone(),
         library: None,
@@ -113,12 +113,12 @@ pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn labels(args: &ImportArgs) -> Result<Labels, Failure> {
-    let mut labels = Labels {
+fn labels(args: &ImportArgs) -> Result<SessionLabels, Failure> {
+    let mut labels = SessionLabels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
         indenter: args.indenter.clone(),
-        ..Labels::default()
+        ..SessionLabels::default()
     };
     super::add_labels(&mut labels, &args.about)?;
     Ok(labels)
@@ -127,7 +127,7 @@ fn labels(args: &ImportArgs) -> Result<Labels, Failure> {
 fn import_failure(err: ImportFailure) -> Failure {
     match err {
         ImportFailure::Foreign(ForeignError::Io { .. }) => Failure::failed(err),
-        ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
+        ImportFailure::Keep(StoreImportError::Times { .. }) => Failure::usage(err),
         ImportFailure::Keep(_) => Failure::failed(err),
         ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
         ImportFailure::Foreign(_) => {

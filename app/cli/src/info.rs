@@ -3,14 +3,14 @@
 use super::Failure;
 use super::output::{Output, merged};
 use clap::Args;
-use palpate_analysis::analysed;
+use palpate_analysis::analysed_session;
 use palpate_analysis::report::catalog::one_line;
-use palpate_analysis::report::said;
+use palpate_analysis::report::session_text;
 use palpate_runner::base::FoundBase;
-use palpate_sessions::analyses::{Analysis, inputs_of};
+use palpate_sessions::analyses::{Analysis, read_session_inputs};
 use palpate_sessions::edits::{Edit, Edits, Review};
 use palpate_sessions::log::Session;
-use palpate_sessions::{EDITS_FILE, HealthSummary, Imported};
+use palpate_sessions::{EDITS_FILE, HealthSummary, ImportOrigin};
 use std::path::PathBuf;
 
 /// Show what a session contains
@@ -29,9 +29,10 @@ struct Content<'a> {
 }
 
 pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
-    let opened = analysed::open(&args.session, None).map_err(super::source_failure)?;
+    let opened = analysed_session::open(&args.session, None).map_err(super::source_failure)?;
     let (session, edits) = (opened.edited.session, opened.edited.edits);
-    let mut now = inputs_of(&args.session).map_err(super::recalibrate::analysis_failure)?;
+    let mut now =
+        read_session_inputs(&args.session).map_err(super::recalibrate::analysis_failure)?;
     // The review is itself an edit; the order of edits shows what came after it.
     now.retain(|one| one.what != EDITS_FILE);
     now.extend(opened.analyses.input());
@@ -83,7 +84,7 @@ impl Content<'_> {
             "ending": end.map(|end| &end.outcome),
             "reason": end.map(|end| &end.reason),
             "time_use_s": end.map(|end| &end.time_use),
-            "raw_bytes": session.beside.raw_bytes,
+            "raw_bytes": session.auxiliary.raw_bytes,
             "health": health(session),
             "verdict": verdict.map(|(verdict, _)| verdict),
             "verdict_reason": verdict.map(|(_, edit)| &edit.reason),
@@ -119,7 +120,7 @@ impl Content<'_> {
             let settings = rig.settings.iter();
             lines.extend(settings.map(|(key, value)| format!("           {key} {value}")));
         }
-        let signal = manifest.signal.as_ref().map(said::signal);
+        let signal = manifest.signal.as_ref().map(session_text::describe_signal);
         lines.extend(signal.map(|lines| format!("signal     {}", lines.join("\n           "))));
         lines.extend(recording_lines(self.session));
         lines.extend(self.edits.all.iter().map(edit_text));
@@ -127,7 +128,7 @@ impl Content<'_> {
         if !tags.is_empty() {
             lines.push(format!("tags       {}", tags.join(", ")));
         }
-        let review = self.review.as_ref().map(said::review);
+        let review = self.review.as_ref().map(session_text::describe_review);
         lines.extend(review.map(|review| format!("review     {review}")));
         lines.extend(self.analyses.iter().map(analysis_text));
         let notes = self.session.notes.iter();
@@ -141,7 +142,7 @@ fn duration_s(session: &Session) -> f64 {
 }
 
 fn health(session: &Session) -> Option<&HealthSummary> {
-    Some(&session.beside.health).filter(|health| health.messages > 0)
+    Some(&session.auxiliary.health).filter(|health| health.messages > 0)
 }
 
 /// The recording and its ending.
@@ -166,11 +167,11 @@ fn recording_lines(session: &Session) -> Vec<String> {
     if !spent.is_empty() {
         lines.push(format!("time use   {}", spent.join(", ")));
     }
-    let count = session.beside.raw_bytes;
+    let count = session.auxiliary.raw_bytes;
     if count > 0 {
         lines.push(format!("raw        {count} bytes as exchanged with devices"));
     }
-    let health = health(session).map(said::health).unwrap_or_default();
+    let health = health(session).map(session_text::describe_health).unwrap_or_default();
     lines.extend(health.iter().map(|(name, text)| format!("{name:<10} {text}")));
     let base = FoundBase::of_session(session);
     lines.extend(
@@ -179,7 +180,7 @@ fn recording_lines(session: &Session) -> Vec<String> {
     lines
 }
 
-fn imported_text(imported: &Imported) -> String {
+fn imported_text(imported: &ImportOrigin) -> String {
     let read = imported.readings.iter();
     let mut lines = vec![format!("imported   {}", imported.source())];
     lines.extend(read.map(|one| format!("           {} {}, {}", one.what, one.found, one.how)));
@@ -189,12 +190,16 @@ fn imported_text(imported: &Imported) -> String {
 }
 
 fn edit_text(edit: &Edit) -> String {
-    let (at, by, change) = (said::at(&edit.at), one_line(&edit.by), said::change(&edit.change));
+    let (at, by, change) = (
+        session_text::format_utc(&edit.at),
+        one_line(&edit.by),
+        session_text::describe_edit(&edit.change),
+    );
     format!("edit       {at} {by}: {change}{}", reason_text(&edit.reason))
 }
 
 fn analysis_text(one: &Analysis) -> String {
-    let (at, kind) = (said::at(&one.at), one.what.word());
+    let (at, kind) = (session_text::format_utc(&one.at), one.what.word());
     format!("analysis   {at} {}: {kind} '{}'{}", one.by, one.name, reason_text(&one.reason))
 }
 

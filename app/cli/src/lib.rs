@@ -59,12 +59,12 @@ mod withdraw;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
-use palpate_analysis::compliance::CorrectionError;
+use palpate_analysis::compliance::ComplianceCorrectionError;
 use palpate_analysis::fit::KnownFitError;
-use palpate_analysis::opening::Windows;
+use palpate_analysis::recordings::RecordingsError;
 use palpate_analysis::source::SourceError;
-use palpate_analysis::sources::SourcesError;
-use palpate_model::about::Labels;
+use palpate_analysis::window_requests::WindowOpener;
+use palpate_model::metadata::SessionLabels;
 use palpate_sessions::log::ReadError;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -92,7 +92,7 @@ macro_rules! commands {
         }
 
         impl Command {
-            fn run(&self, $windows: Option<&dyn Windows>, output: &Output) -> Result<(), Failure> {
+            fn run(&self, $windows: Option<&dyn WindowOpener>, output: &Output) -> Result<(), Failure> {
                 match self {
                     $($(#[cfg($($part)*)])? Self::$name(args) => $run(args, $($more,)? output),)*
                 }
@@ -217,7 +217,7 @@ const NO_WINDOW: &str =
     "this palpate was built without its window; 'palpate --help' lists the commands that need none";
 
 /// Runs the command of the arguments; `windows` opens windows, if this program has any.
-pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
+pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
     outlive_file_limits();
     let cli = match parse() {
         Ok(cli) => cli,
@@ -247,9 +247,9 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
 }
 
 /// Adds the pairs of `--about` and checks that the labels are consistent.
-fn add_labels(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
+fn add_labels(labels: &mut SessionLabels, about: &[String]) -> Result<(), Failure> {
     for pair in about {
-        labels.tell_pair(pair).map_err(|err| Failure::usage(format!("--about: {err}")))?;
+        labels.set_pair(pair).map_err(|err| Failure::usage(format!("--about: {err}")))?;
     }
     labels.check().map_err(Failure::usage)
 }
@@ -264,14 +264,14 @@ fn read_failure(err: ReadError) -> Failure {
 }
 
 /// Recordings that cannot be read together: a wrong path is wrong use, an unreadable folder or damage is a failure.
-fn sources_failure(err: SourcesError) -> Failure {
+fn sources_failure(err: RecordingsError) -> Failure {
     match err {
-        SourcesError::Folder { .. } => Failure::failed(err),
-        SourcesError::Source { reason, .. } => source_failure(*reason),
-        SourcesError::Rejected(_) => {
+        RecordingsError::Folder { .. } => Failure::failed(err),
+        RecordingsError::Source { reason, .. } => source_failure(*reason),
+        RecordingsError::Rejected(_) => {
             Failure::usage(format!("{err}; add --include-rejected to include them"))
         }
-        SourcesError::Table(_) => {
+        RecordingsError::Table(_) => {
             Failure::usage(format!("{err}; 'palpate import' makes one of a table"))
         }
         err => Failure::usage(err),
@@ -305,7 +305,7 @@ fn source_failure(err: SourceError) -> Failure {
         SourceError::NoCycles => {
             Failure::Failed(format!("{err}; 'palpate report' shows what happened in it"))
         }
-        SourceError::Correction(CorrectionError::NoneInForce { .. }) => {
+        SourceError::Correction(ComplianceCorrectionError::NoneInForce { .. }) => {
             with("'palpate compliance SESSION --save' does so")
         }
         SourceError::Session(err) => read_failure(err),

@@ -4,8 +4,8 @@ use super::Failure;
 use super::output::Output;
 use super::recalibrate::{AuthorArgs, analysis_edit_failure};
 use clap::Args;
-use palpate_analysis::analyses;
-use palpate_analysis::progress::Unwatched;
+use palpate_analysis::progress::NoProgress;
+use palpate_analysis::session_actions;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -46,7 +46,7 @@ impl FromStr for Span {
 pub(super) fn run(args: &MaskArgs, output: &Output) -> Result<(), Failure> {
     let spans = args.leave_out.iter().map(|span| span.0).collect();
     let (session, author) = (&args.session, args.author.author());
-    let masked = analyses::mask(session, &args.name, spans, &author, &Unwatched);
+    let masked = session_actions::mask(session, &args.name, spans, &author, &NoProgress);
     let masked = masked.map_err(analysis_edit_failure)?;
     let (left_out, of, name) = (masked.left_out, masked.of, &masked.analysis.name);
     let object = serde_json::json!({

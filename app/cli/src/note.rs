@@ -5,7 +5,7 @@ use super::output::Output;
 use super::review::{read_subjects, session_edit_failure};
 use clap::Args;
 use palpate_analysis::edits::author;
-use palpate_sessions::edits::Change;
+use palpate_sessions::edits::EditChange;
 use std::path::PathBuf;
 
 /// Add a note to sessions; their logs stay unchanged
@@ -25,7 +25,7 @@ pub struct NoteArgs {
 pub(super) fn run(args: &NoteArgs, output: &Output) -> Result<(), Failure> {
     let by = author(args.by.as_deref());
     for subject in read_subjects(&args.sessions)? {
-        let edit = subject.say(&by, &args.text, Change::Note);
+        let edit = subject.add_edit(&by, &args.text, EditChange::Note);
         edit.map_err(session_edit_failure)?;
     }
     let text = args.text.trim();

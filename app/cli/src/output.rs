@@ -119,7 +119,7 @@ impl std::ops::Deref for Bar {
 }
 
 impl Progress for Bar {
-    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+    fn report(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
         self.0.set_length(of as u64);
         self.0.set_position(done as u64);
         self.0.set_message(what.to_owned());

@@ -5,14 +5,14 @@ use super::output::Output;
 use super::terminal::read_lines;
 use palpate_model::time::Nanos;
 use palpate_model::units::Seconds;
-use palpate_protocols::engine::{Operator, Outcome};
-use palpate_runner::{PromptView, Request, RunView};
+use palpate_protocols::engine::{Operator, RunOutcome};
+use palpate_runner::{PromptView, RunView, RunnerRequest};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError};
 
 pub(super) struct OperatorPrompts {
-    requests: SyncSender<Request>,
+    requests: SyncSender<RunnerRequest>,
     lines: Receiver<String>,
     shown_prompt: Option<(String, Seconds)>,
     is_closed: bool,
@@ -40,7 +40,7 @@ const ANSWERED_MAX: Seconds = Seconds(1.0);
 impl OperatorPrompts {
     /// Listens to standard input and answers to a runner.
     pub fn start(
-        requests: SyncSender<Request>,
+        requests: SyncSender<RunnerRequest>,
         is_question_open: Arc<AtomicBool>,
     ) -> Result<Self, Failure> {
         let lines = read_lines("answers")?;
@@ -93,14 +93,14 @@ impl OperatorPrompts {
             None => return,
         };
         // A runner that cannot take it ends the run by itself.
-        let _ = self.requests.try_send(Request::Operator(choice));
+        let _ = self.requests.try_send(RunnerRequest::Operator(choice));
     }
 
     /// After a stop the probe stays where it is, maybe deep in the tissue, until the operator asks for a retract.
     fn ask_to_retract(
         &mut self,
         view: &RunView,
-        stop: &Outcome,
+        stop: &RunOutcome,
         typed: Option<String>,
         output: &Output,
     ) {
@@ -144,7 +144,7 @@ impl OperatorPrompts {
             }
         };
         // A full queue: the next update tries again.
-        if self.requests.try_send(Request::Operator(choice)).is_ok() {
+        if self.requests.try_send(RunnerRequest::Operator(choice)).is_ok() {
             self.retract_question = RetractQuestion::Answered(view.now);
         }
     }

@@ -4,10 +4,10 @@ use super::Failure;
 use super::calibration::source::CalibrationSource;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::analysed::ForceChange;
-use palpate_analysis::analyses::{self, DeedFailure};
+use palpate_analysis::analysed_session::ForceChange;
 use palpate_analysis::edits;
-use palpate_analysis::report::kept;
+use palpate_analysis::report::stored_analysis;
+use palpate_analysis::session_actions::{self, SessionActionError};
 use palpate_sessions::analyses::AnalysisError;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -39,8 +39,11 @@ pub(super) struct AuthorArgs {
 }
 
 impl AuthorArgs {
-    pub fn author(&self) -> analyses::Who {
-        analyses::Who { by: edits::author(self.by.as_deref()), reason: self.reason.clone() }
+    pub fn author(&self) -> session_actions::Attribution {
+        session_actions::Attribution {
+            by: edits::author(self.by.as_deref()),
+            reason: self.reason.clone(),
+        }
     }
 }
 
@@ -60,7 +63,7 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
     let mut done = Vec::new();
     for session in &args.sessions {
         bar.set_message(session.display().to_string());
-        let made = analyses::recalibrate(session, &name, &source.calibration, &author);
+        let made = session_actions::recalibrate(session, &name, &source.calibration, &author);
         let made = made.map_err(analysis_edit_failure)?;
         for doubt in source.doubts(&made.rig) {
             bar.suspend(|| output.note(&format!("{}: {doubt}", session.display())));
@@ -75,7 +78,11 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
     });
     output.answer("recalibrate", &object, || {
         let line = |one: &Recalibrated| {
-            format!("{}: {}", one.session.display(), kept::change(&one.change))
+            format!(
+                "{}: {}",
+                one.session.display(),
+                stored_analysis::describe_force_change(&one.change)
+            )
         };
         let mut lines: Vec<String> = done.iter().map(line).collect();
         lines.push(format!(
@@ -86,18 +93,18 @@ pub(super) fn run(args: &RecalibrateArgs, output: &Output) -> Result<(), Failure
     Ok(())
 }
 
-pub(super) fn analysis_edit_failure(err: DeedFailure) -> Failure {
+pub(super) fn analysis_edit_failure(err: SessionActionError) -> Failure {
     match err {
-        DeedFailure::Source(err) => super::source_failure(err),
-        DeedFailure::Say(err) => super::review::session_edit_failure(err),
-        DeedFailure::Calibration(err) => super::calibration::source::failure(err),
-        DeedFailure::NothingLeftOut => {
+        SessionActionError::Source(err) => super::source_failure(err),
+        SessionActionError::Say(err) => super::review::session_edit_failure(err),
+        SessionActionError::Calibration(err) => super::calibration::source::failure(err),
+        SessionActionError::NothingLeftOut => {
             Failure::usage(format!("{err}; see t_s of 'palpate export'"))
         }
-        DeedFailure::WhichContact(several) => {
+        SessionActionError::WhichContact(several) => {
             Failure::usage(format!("{err} with --contact 1 to {several}"))
         }
-        DeedFailure::Fit(_) | DeedFailure::Cancelled => Failure::failed(err),
+        SessionActionError::Fit(_) | SessionActionError::Cancelled => Failure::failed(err),
         err => Failure::usage(err),
     }
 }

@@ -6,7 +6,9 @@ use super::output::Output;
 use clap::Args;
 use palpate_runner::wall_now;
 use palpate_sessions::library_folder;
-use palpate_sessions::recover::{Missing, RecoverError, examine_library, recover, recover_library};
+use palpate_sessions::recover::{
+    MissingData, RecoverError, find_unfinished_sessions, recover, recover_library,
+};
 use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -27,7 +29,7 @@ struct Recovered {
     session_id: String,
     samples: u64,
     raw_bytes: u64,
-    missing: Missing,
+    missing: MissingData,
     #[serde(skip)]
     sentences: Vec<String>,
 }
@@ -74,7 +76,7 @@ pub(super) fn run(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
-    examine_library(library).map_err(|err| {
+    find_unfinished_sessions(library).map_err(|err| {
         Failure::failed(format!("cannot read {} ({err}); check its permissions", library.display()))
     })
 }

@@ -3,8 +3,8 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::opening::{PlaybackRequest, Windows};
 use palpate_analysis::source::calibration_of;
+use palpate_analysis::window_requests::{PlaybackRequest, WindowOpener};
 use palpate_model::units::Newtons;
 use palpate_runner::TimeScale;
 use palpate_runner::replay::{Player, ReplayError, ReplayReport, blessings_of, replay};
@@ -38,7 +38,7 @@ struct Replayed {
 
 pub(super) fn run(
     args: &ReplayArgs,
-    windows: Option<&dyn Windows>,
+    windows: Option<&dyn WindowOpener>,
     output: &Output,
 ) -> Result<(), Failure> {
     if args.window {
@@ -66,7 +66,11 @@ pub(super) fn run(
 }
 
 /// One session in a window.
-fn show(args: &ReplayArgs, windows: Option<&dyn Windows>, output: &Output) -> Result<(), Failure> {
+fn show(
+    args: &ReplayArgs,
+    windows: Option<&dyn WindowOpener>,
+    output: &Output,
+) -> Result<(), Failure> {
     let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
     let [path] = args.sessions.as_slice() else {
         return Err(Failure::usage("--window shows one session; name one"));

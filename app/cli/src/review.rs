@@ -4,8 +4,8 @@ use super::Failure;
 use super::output::Output;
 use super::verdict::ReasonArgs;
 use clap::Args;
-use palpate_analysis::edits::{SayFailure, Subject};
-use palpate_sessions::edits::{Change, Decision, EditError};
+use palpate_analysis::edits::{EditFailure, EditTarget};
+use palpate_sessions::edits::{EditChange, EditError, ReviewDecision};
 use std::path::PathBuf;
 
 /// Record your decision about a session, with hashes of the files you saw
@@ -34,11 +34,11 @@ struct DecisionArgs {
 }
 
 impl DecisionArgs {
-    fn decision(&self) -> Decision {
+    fn decision(&self) -> ReviewDecision {
         match (self.accept, self.reject) {
-            (true, _) => Decision::Accepted,
-            (_, true) => Decision::Rejected,
-            _ => Decision::Repeat,
+            (true, _) => ReviewDecision::Accepted,
+            (_, true) => ReviewDecision::Rejected,
+            _ => ReviewDecision::Repeat,
         }
     }
 }
@@ -51,27 +51,28 @@ pub(super) fn edit_failure(err: EditError) -> Failure {
     }
 }
 
-pub(super) fn session_edit_failure(err: SayFailure) -> Failure {
+pub(super) fn session_edit_failure(err: EditFailure) -> Failure {
     match err {
-        SayFailure::Read(err) => super::read_failure(err),
-        SayFailure::Analyses(err) => super::source_failure(err.into()),
-        SayFailure::Edit(err) => edit_failure(err),
+        EditFailure::Read(err) => super::read_failure(err),
+        EditFailure::Analyses(err) => super::source_failure(err.into()),
+        EditFailure::Edit(err) => edit_failure(err),
     }
 }
 
 /// Reads all before any is changed.
-pub(super) fn read_subjects(sessions: &[PathBuf]) -> Result<Vec<Subject>, Failure> {
-    let read = |path: &PathBuf| Subject::read(path).map_err(session_edit_failure);
+pub(super) fn read_subjects(sessions: &[PathBuf]) -> Result<Vec<EditTarget>, Failure> {
+    let read = |path: &PathBuf| EditTarget::read(path).map_err(session_edit_failure);
     sessions.iter().map(read).collect()
 }
 
 pub(super) fn run(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
-    let subject = Subject::read(&args.session).map_err(session_edit_failure)?;
+    let subject = EditTarget::read(&args.session).map_err(session_edit_failure)?;
     let decision = args.decision.decision();
     let change = subject.review(decision).map_err(session_edit_failure)?;
     let author = args.reason.author();
-    let edit = subject.say(&author.by, &author.reason, change).map_err(session_edit_failure)?;
-    let Change::Review { seen, .. } = &edit.change else {
+    let edit =
+        subject.add_edit(&author.by, &author.reason, change).map_err(session_edit_failure)?;
+    let EditChange::Review { seen, .. } = &edit.change else {
         return Ok(());
     };
     let object = serde_json::json!({ "session": args.session, "decision": decision, "by": edit.by,

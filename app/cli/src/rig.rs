@@ -17,34 +17,34 @@ use palpate_sessions::folder::{HolderLock, library_folder};
 /// The bench of a simulated rig or behind an emulated device.
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
-    /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
+    /// SimulatedMasterSlave rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
     #[arg(long, default_value = "lab")]
     pub profile: SimProfile,
-    /// Simulated rig: seed of its random numbers; the same seed gives the same run
+    /// SimulatedMasterSlave rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Simulated rig: largest loss of elastic force after deeper loading, in percent
+    /// SimulatedMasterSlave rig: largest loss of elastic force after deeper loading, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
-    /// Simulated rig: white noise of the ideal load cell, rms, in mN
+    /// SimulatedMasterSlave rig: white noise of the ideal load cell, rms, in mN
     #[arg(long, default_value = "20", value_name = "MN")]
     pub noise: SimNoise,
-    /// Simulated rig: stiffness of the tissue, in percent of the default
+    /// SimulatedMasterSlave rig: stiffness of the tissue, in percent of the default
     #[arg(long, default_value = "100", value_name = "PERCENT")]
     pub stiffness: SimStiffness,
-    /// Simulated rig: thickness of the specimen on its stiff base, in mm
+    /// SimulatedMasterSlave rig: thickness of the specimen on its stiff base, in mm
     #[arg(long, default_value = "100", value_name = "MM")]
     pub thickness: SimThickness,
-    /// Simulated rig: machine compliance, in um/N
+    /// SimulatedMasterSlave rig: machine compliance, in um/N
     #[arg(long, default_value = "0", value_name = "UM_PER_N")]
     pub compliance: SimCompliance,
-    /// Simulated rig: shift of the tissue's surface by repeated loading, in percent of the greatest depth
+    /// SimulatedMasterSlave rig: shift of the tissue's surface by repeated loading, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
-    /// Simulated rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
+    /// SimulatedMasterSlave rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
     #[arg(long, default_value = "0", value_name = "CELSIUS")]
     pub bath: SimBath,
-    /// Simulated rig: when its digital input 1 goes high, in s; 0 for none
+    /// SimulatedMasterSlave rig: when its digital input 1 goes high, in s; 0 for none
     #[arg(long, default_value = "0", value_name = "SECONDS")]
     pub input: SimInput,
 }
@@ -75,10 +75,10 @@ pub struct RigArgs {
     pub rig: String,
     #[command(flatten)]
     pub bench: BenchArgs,
-    /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
+    /// SimulatedMasterSlave rig: controller clock, nominal (1000 us) or galil (976 us)
     #[arg(long, default_value = "nominal")]
     pub clock: SimClock,
-    /// Simulated rig: samples a second, 1000 to 20000
+    /// SimulatedMasterSlave rig: samples a second, 1000 to 20000
     #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
     pub rate: SimRate,
     /// Furthest position from home, in mm; set it a little before the base, so that no search meets it

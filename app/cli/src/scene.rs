@@ -7,11 +7,11 @@ use super::output::Output;
 use super::trade::with_bar;
 use clap::{Args, Subcommand};
 use palpate_analysis::progress::Progress;
-use palpate_analysis::recorded::Replayed;
 use palpate_analysis::report::scene::{bench_text, plan_text, played_text};
-use palpate_analysis::scene::{Played, play, replay, scene_of};
-use palpate_analysis::scene_bench::{bench, made_after, planned, planned_again};
-use palpate_analysis::trade::{Extent, measure_scene};
+use palpate_analysis::scene::{SceneRun, play_scene, read_scene, replay};
+use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
+use palpate_analysis::tick_replay::ReplayResult;
+use palpate_analysis::trade::{TradeExtent, measure_scene};
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -94,7 +94,7 @@ pub struct SceneShowArgs {
 #[derive(Serialize)]
 struct PlayedOutput<'a> {
     #[serde(flatten)]
-    played: &'a Played,
+    played: &'a SceneRun,
     plan: Option<&'a ScenePlan>,
     planned_again: Option<&'a ScenePlan>,
 }
@@ -124,7 +124,7 @@ pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure
 }
 
 fn read(file: Option<&Path>, output: &Output) -> Result<SceneFile, Failure> {
-    let (scene, notes) = scene_of(file).map_err(Failure::usage)?;
+    let (scene, notes) = read_scene(file).map_err(Failure::usage)?;
     notes.iter().for_each(|note| output.note(note));
     Ok(scene)
 }
@@ -147,14 +147,14 @@ fn run_scene(
     file.scene(COARSEST).map_err(Failure::usage)?;
     let mut after = None;
     if file.nodes.is_none() {
-        let curves = with_bar(output, |progress| measure_scene(Extent::Quick, progress))?;
-        let plan = planned(&file, &curves, 1.0).map_err(|none| Failure::failed(none.why))?;
-        file = made_after(&file, &plan);
+        let curves = with_bar(output, |progress| measure_scene(TradeExtent::Quick, progress))?;
+        let plan = plan_scene(&file, &curves, 1.0).map_err(|none| Failure::failed(none.reason))?;
+        file = scene_from_plan(&file, &plan);
         after = Some((curves, plan));
     }
     let played = output
         .with_share_bar(|bar| {
-            play(&file, (args.path, laps), record, &mut |share| {
+            play_scene(&file, (args.path, laps), record, &mut |share| {
                 bar.share(share, "");
             })
         })
@@ -162,8 +162,8 @@ fn run_scene(
     let plan = after.as_ref().map(|(_, plan)| plan);
     let again = after.as_ref().filter(|_| !played.is_within_budget);
     let again = again.map(|(curves, plan)| {
-        let took = 1e6 * played.paced.kept.work.p99_9.0;
-        planned_again(&file, curves, plan, took)
+        let took = 1e6 * played.paced.statistics.work.p99_9.0;
+        replan_scene(&file, curves, plan, took)
     });
     let found = PlayedOutput {
         played: &played,
@@ -177,7 +177,7 @@ fn run_scene(
         match &again {
             None => {}
             Some(Ok(plan)) => lines.push(format!("planned again: {}", plan_text(plan))),
-            Some(Err(none)) => lines.push(format!("planned again: {}", none.why)),
+            Some(Err(none)) => lines.push(format!("planned again: {}", none.reason)),
         }
         lines.join("\n")
     });
@@ -187,8 +187,8 @@ fn run_scene(
 fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {
     let file = read(args.file.as_deref(), output)?;
     let extent = match args.full {
-        true => Extent::Full,
-        false => Extent::Quick,
+        true => TradeExtent::Full,
+        false => TradeExtent::Quick,
     };
     let bench = with_bar(output, |progress| bench(&file, extent, progress))?;
     output.answer("scene-bench", &bench, || bench_text(&bench));
@@ -199,7 +199,7 @@ fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {
 pub(super) fn report_replay(
     command: &str,
     args: &RecordingReplayArgs,
-    replay: impl FnOnce(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String>,
+    replay: impl FnOnce(&Path, &mut dyn FnMut(f64) -> bool) -> Result<ReplayResult, String>,
     output: &Output,
 ) -> Result<(), Failure> {
     let replayed = output

@@ -5,11 +5,11 @@ use super::new_file;
 use super::output::Output;
 use super::{Failure, sources_failure};
 use clap::Args;
+use palpate_analysis::recordings::RecordingNames;
 use palpate_analysis::report::{of_selection, selection};
-use palpate_analysis::select::{SelectFailure, SelectRequest, select_sources};
-use palpate_analysis::source::{Stretch, Wanted};
-use palpate_analysis::sources::Naming;
-use palpate_rheology::families::by_key;
+use palpate_analysis::select::{ModelSelectionError, SelectRequest, select_sources};
+use palpate_analysis::source::{RecordStretch, SourceSelection};
+use palpate_rheology::families::find_family;
 use palpate_rheology::select::{SelectError, SelectOptions};
 use std::path::PathBuf;
 
@@ -53,13 +53,13 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
     let request = SelectRequest {
         paths: args.sources.clone(),
         columns: parse_columns(args.columns.as_deref())?,
-        wanted: Wanted {
-            stretch: Stretch::with_unload(args.unload),
+        wanted: SourceSelection {
+            stretch: RecordStretch::with_unload(args.unload),
             is_rejected_included: args.include_rejected,
         },
         options: options(args)?,
         specimens: names.map(|names| names.split(',').map(|name| name.trim().to_owned()).collect()),
-        naming: Naming::Path,
+        naming: RecordingNames::Path,
     };
     new_file::check("plot", args.plot.as_deref())?;
     let selected = select_sources(request, &output.count_bar(0)).map_err(failure)?;
@@ -67,15 +67,17 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
     let selection = &selected.selection;
     let mut object = serde_json::json!(selection);
     object["seconds"] = selected.seconds.into();
-    output.answer("select", &object, || selection::whole(selection));
+    output.answer("select", &object, || selection::selection_text(selection));
     new_file::write("plot", args.plot.as_deref(), || of_selection(selection))
 }
 
-fn failure(err: SelectFailure) -> Failure {
+fn failure(err: ModelSelectionError) -> Failure {
     match err {
-        SelectFailure::Sources(err) => sources_failure(err),
-        SelectFailure::Specimens { .. } => Failure::usage(format!("--specimens: {err}")),
-        SelectFailure::Select(SelectError::Fit(_) | SelectError::Ended) => Failure::failed(err),
+        ModelSelectionError::Sources(err) => sources_failure(err),
+        ModelSelectionError::Specimens { .. } => Failure::usage(format!("--specimens: {err}")),
+        ModelSelectionError::Select(SelectError::Fit(_) | SelectError::Ended) => {
+            Failure::failed(err)
+        }
         err => Failure::usage(err),
     }
 }
@@ -94,7 +96,7 @@ fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
                 keys.push(key);
             }
         }
-        let families = keys.into_iter().map(by_key).collect::<Result<_, _>>();
+        let families = keys.into_iter().map(find_family).collect::<Result<_, _>>();
         options.families = families.map_err(Failure::usage)?;
     }
     Ok(options)

@@ -6,10 +6,10 @@ use super::output::Output;
 use super::run::{RunLeader, SessionArgs, labels, run_plan};
 use super::{Failure, recover, rig};
 use clap::Args;
-use palpate_analysis::haptics::Setting;
+use palpate_analysis::haptics::HapticSettings;
 use palpate_analysis::report::haptics::slave_text;
 use palpate_haptics::Period;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::Follow;
 use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings};
@@ -41,9 +41,9 @@ pub struct SlaveArgs {
 
 impl SlaveArgs {
     /// Path of the hand: from the surface to the depth and back, repeated; `speed` is reached half way.
-    fn hand(&self) -> Hand {
+    fn hand(&self) -> SimulatedHand {
         let half = 0.5 * self.depth;
-        Hand::firm(HandPath::Sine {
+        SimulatedHand::firm(HandPath::Sine {
             middle: half,
             amplitude: half,
             hz: self.speed / (std::f64::consts::TAU * half),
@@ -52,7 +52,7 @@ impl SlaveArgs {
 
     fn check(&self, speed_max: MmPerS) -> Result<(), Failure> {
         above_zero("seconds", self.seconds, SECONDS_MAX, "s")?;
-        above_zero("depth", self.depth, Setting::DEPTH_MAX, "mm")?;
+        above_zero("depth", self.depth, HapticSettings::DEPTH_MAX, "mm")?;
         above_zero("speed", self.speed, speed_max.0, "mm/s")?;
         Ok(())
     }
@@ -67,7 +67,7 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     args.check(description.speed_max)?;
     let depth_max = Depth(args.depth);
     let body = body(&args.source, depth_max, output)?;
-    let mut master = Setting::source(Period::MILLISECOND).simulation(body, true);
+    let mut master = HapticSettings::source(Period::MILLISECOND).simulation(body, true);
     master.plant.hand = args.hand();
     let (hand, duration) = (MmPerS(args.speed), Seconds(args.seconds));
     let follow = Follow::of_hand(&description, hand, depth_max, duration);
@@ -89,7 +89,7 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
             if let Some(reason) = leader.failure() {
                 output.note(&format!("the master did not lead the slave: {reason}"));
             }
-            let slaved = leader.slaved()?;
+            let slaved = leader.report()?;
             Some((serde_json::to_value(&slaved).ok()?, slave_text(&slaved)))
         }),
     };

@@ -4,8 +4,8 @@ use super::Failure;
 use super::output::Output;
 use chrono::{DateTime, Utc};
 use clap::Args;
-use palpate_analysis::opening::Windows;
 use palpate_analysis::support_bundle::{BundleError, BundleRequest, make_bundle};
+use palpate_analysis::window_requests::WindowOpener;
 use palpate_runner::wall_now;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ fn features(has_window: bool) -> Vec<&'static str> {
 
 pub(super) fn run(
     args: &SupportBundleArgs,
-    windows: Option<&dyn Windows>,
+    windows: Option<&dyn WindowOpener>,
     output: &Output,
 ) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;

@@ -5,7 +5,7 @@ use super::output::Output;
 use super::review::{edit_failure, read_subjects, session_edit_failure};
 use clap::Args;
 use palpate_analysis::edits::author;
-use palpate_sessions::edits::{Change, Edits};
+use palpate_sessions::edits::{EditChange, Edits};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -63,7 +63,7 @@ pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
         }
         if !add.is_empty() || !remove.is_empty() {
             let add = add.clone();
-            let edit = subject.say(&by, "", Change::Tags { add, remove });
+            let edit = subject.add_edit(&by, "", EditChange::Tags { add, remove });
             edit.map_err(session_edit_failure)?;
         }
         let edits = Edits::read(&session, &subject.id).map_err(edit_failure)?;

@@ -9,7 +9,7 @@ use palpate_analysis::progress::Progress;
 use palpate_analysis::trade::stored::{
     quick_trade_file, read_trade, trade_file, trade_files, write_trade,
 };
-use palpate_analysis::trade::{self, Extent};
+use palpate_analysis::trade::{self, TradeExtent};
 use palpate_rheology::tolerance::Tolerance;
 use palpate_rheology::trade::TradeCurves;
 use palpate_sessions::library_folder;
@@ -76,7 +76,7 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
-    let extent = if is_quick { Extent::Quick } else { Extent::Full };
+    let extent = if is_quick { TradeExtent::Quick } else { TradeExtent::Full };
     with_bar(output, |progress| trade::measure(extent, progress))
 }
 
@@ -106,7 +106,7 @@ fn stored(library: &Path) -> Result<(TradeCurves, PathBuf), Failure> {
 }
 
 fn check(curves: &TradeCurves, output: &Output) -> Result<(), Failure> {
-    let extent = if curves.quick { Extent::Quick } else { Extent::Full };
+    let extent = if curves.quick { TradeExtent::Quick } else { TradeExtent::Full };
     let now = with_bar(output, |progress| trade::errors(extent, progress))?;
     curves.agrees_with(&now).map_err(Failure::failed)?;
     output.note("every stored error was reproduced");

@@ -4,10 +4,10 @@ use super::Failure;
 use super::output::Output;
 use super::recalibrate::analysis_edit_failure;
 use clap::Args;
-use palpate_analysis::analyses::{self, Who};
 use palpate_analysis::edits;
 use palpate_analysis::report::catalog::one_line;
-use palpate_sessions::edits::Verdict;
+use palpate_analysis::session_actions::{self, Attribution};
+use palpate_sessions::edits::DataQuality;
 use std::path::PathBuf;
 
 /// Set the data quality of a session: valid, suspect or rejected
@@ -16,7 +16,7 @@ pub struct VerdictArgs {
     /// Session folder
     session: PathBuf,
     /// valid, suspect or rejected
-    verdict: Verdict,
+    verdict: DataQuality,
     #[command(flatten)]
     reason: ReasonArgs,
 }
@@ -33,13 +33,14 @@ pub(super) struct ReasonArgs {
 }
 
 impl ReasonArgs {
-    pub(super) fn author(&self) -> Who {
-        Who { by: edits::author(self.by.as_deref()), reason: self.reason.clone() }
+    pub(super) fn author(&self) -> Attribution {
+        Attribution { by: edits::author(self.by.as_deref()), reason: self.reason.clone() }
     }
 }
 
 pub(super) fn run(args: &VerdictArgs, output: &Output) -> Result<(), Failure> {
-    let judged = analyses::judge(&args.session, args.verdict, &args.reason.author());
+    let judged =
+        session_actions::set_data_quality(&args.session, args.verdict, &args.reason.author());
     let (before, edit) = judged.map_err(analysis_edit_failure)?;
     let object = serde_json::json!({
         "session": args.session, "verdict": args.verdict, "was": before, "by": edit.by,

@@ -4,7 +4,7 @@ use super::output::Output;
 use super::rig::{OpenRig, RigArgs, open};
 use super::{Failure, NO_WINDOW};
 use clap::Args;
-use palpate_analysis::opening::{Windows, WorkbenchRequest};
+use palpate_analysis::window_requests::{WindowOpener, WorkbenchRequest};
 use palpate_protocols::plans::RampHold;
 
 /// Open the window
@@ -16,7 +16,7 @@ pub struct WindowArgs {
 
 pub(super) fn run(
     args: &WindowArgs,
-    windows: Option<&dyn Windows>,
+    windows: Option<&dyn WindowOpener>,
     output: &Output,
 ) -> Result<(), Failure> {
     let windows = windows.ok_or_else(|| Failure::usage(NO_WINDOW))?;

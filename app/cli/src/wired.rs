@@ -6,9 +6,9 @@ use super::output::Output;
 use super::rig::open_rig_file;
 use super::terminal::ctrl_c_flag;
 use clap::{Args, Subcommand};
-use palpate_drivers::detect::{Found, ask};
+use palpate_drivers::detect::{DetectedDevice, detect_device};
 use palpate_drivers::serial::list_ports;
-use palpate_drivers::wire::{LinkStats, Place};
+use palpate_drivers::wire::{DeviceAddress, LinkStats};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
@@ -124,18 +124,18 @@ fn detect(args: &RigDetectArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn identify_device(at: &str, baud: u32) -> Result<Found, String> {
-    // A name with a number behind the last colon is an address; ports of Windows end in their colon.
+fn identify_device(at: &str, baud: u32) -> Result<DetectedDevice, String> {
+    // A name with a number behind the last colon is an address; ports of WindowOpener end in their colon.
     let is_address = at
         .rsplit_once(':')
         .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
     let place = if is_address {
-        Place::Tcp(at.to_owned())
+        DeviceAddress::Tcp(at.to_owned())
     } else {
-        Place::Serial { port: at.to_owned(), baud, has_handshake: false }
+        DeviceAddress::Serial { port: at.to_owned(), baud, has_handshake: false }
     };
     let mut link = place.open().map_err(|err| err.to_string())?;
-    ask(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
+    detect_device(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
 }
 
 fn port_lines(ports: &[Port]) -> String {

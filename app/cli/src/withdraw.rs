@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::Output;
 use super::recalibrate::{AuthorArgs, analysis_edit_failure};
 use clap::Args;
-use palpate_analysis::analyses;
+use palpate_analysis::session_actions;
 use std::path::PathBuf;
 
 /// Withdraw an analysis; its record stays
@@ -19,7 +19,7 @@ pub struct WithdrawArgs {
 }
 
 pub(super) fn run(args: &WithdrawArgs, output: &Output) -> Result<(), Failure> {
-    let gone = analyses::withdraw(&args.session, &args.name, &args.author.author());
+    let gone = session_actions::withdraw(&args.session, &args.name, &args.author.author());
     let gone = gone.map_err(analysis_edit_failure)?;
     let object = serde_json::json!({
         "session": args.session, "analysis": gone.name, "by": gone.by, "reason": gone.reason,

@@ -1,8 +1,8 @@
 //! The little SVG that pictures need: text, lines and areas (SVG 1.1, W3C).
 //!
-//! A panel with axes is [`Panel`].
+//! A panel with axes is [`PlotPanel`].
 
-pub use crate::panel::{Look, Panel, round_up};
+pub use crate::panel::{AxisColours, PlotPanel, round_up};
 
 use ecolor::Color32;
 use std::fmt::Write;
@@ -17,14 +17,14 @@ pub const BAND_OPACITY: f64 = 0.18;
 /// A picture under construction.
 pub struct Svg {
     width: f64,
-    shapes: Vec<Shape>,
+    shapes: Vec<DrawingShape>,
 }
 
 /// Elements of a picture, in px from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
+pub enum DrawingShape {
     /// A text, turned a quarter to the left if upright.
-    Text { at: [f64; 2], is_upright: bool, ink: Ink, text: String },
+    Text { at: [f64; 2], is_upright: bool, ink: TextStyle, text: String },
     /// A line through points, dashed by so many px if not 0.
     Line { points: Vec<[f64; 2]>, color: Color32, width: f64, dash: f64 },
     /// The area within a line.
@@ -44,13 +44,13 @@ pub enum Anchor {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ink {
+pub struct TextStyle {
     pub color: Color32,
     pub size: f64,
     pub anchor: Anchor,
 }
 
-impl Ink {
+impl TextStyle {
     pub fn plain(color: Color32) -> Self {
         Self { color, size: FONT, anchor: Anchor::Start }
     }
@@ -67,7 +67,7 @@ pub struct Drawing {
     pub ground: Color32,
     /// Text for a screen reader.
     pub title: String,
-    pub shapes: Vec<Shape>,
+    pub shapes: Vec<DrawingShape>,
 }
 
 impl Drawing {
@@ -89,7 +89,7 @@ impl Drawing {
     }
 }
 
-impl Shape {
+impl DrawingShape {
     fn element(&self) -> String {
         match self {
             Self::Text { at: [x, y], is_upright, ink, text } => {
@@ -171,13 +171,13 @@ impl Svg {
         }
     }
 
-    pub fn text(&mut self, at: [f64; 2], ink: Ink, text: &str) {
-        self.shapes.push(Shape::Text { at, is_upright: false, ink, text: text.to_owned() });
+    pub fn text(&mut self, at: [f64; 2], ink: TextStyle, text: &str) {
+        self.shapes.push(DrawingShape::Text { at, is_upright: false, ink, text: text.to_owned() });
     }
 
     /// A text turned a quarter to the left, for the names of vertical axes.
-    pub fn upright_text(&mut self, at: [f64; 2], ink: Ink, text: &str) {
-        self.shapes.push(Shape::Text { at, is_upright: true, ink, text: text.to_owned() });
+    pub fn upright_text(&mut self, at: [f64; 2], ink: TextStyle, text: &str) {
+        self.shapes.push(DrawingShape::Text { at, is_upright: true, ink, text: text.to_owned() });
     }
 
     pub fn line(&mut self, points: &[[f64; 2]], color: Color32, width: f64) {
@@ -189,24 +189,25 @@ impl Svg {
         if points.is_empty() {
             return;
         }
-        self.shapes.push(Shape::Line { points: points.to_vec(), color, width, dash });
+        self.shapes.push(DrawingShape::Line { points: points.to_vec(), color, width, dash });
     }
 
     /// A rectangle between two corners.
     pub fn rectangle(&mut self, [left, top]: [f64; 2], [right, bottom]: [f64; 2], color: Color32) {
-        self.shapes.push(Shape::Rectangle { corners: [[left, top], [right, bottom]], color });
+        self.shapes
+            .push(DrawingShape::Rectangle { corners: [[left, top], [right, bottom]], color });
     }
 
     /// A band between an upper and a lower edge.
     pub fn band(&mut self, upper: &[[f64; 2]], lower: &[[f64; 2]], color: Color32) {
-        self.shapes.push(Shape::Band {
+        self.shapes.push(DrawingShape::Band {
             points: upper.iter().chain(lower.iter().rev()).copied().collect(),
             color,
         });
     }
 
     pub fn dot(&mut self, at: [f64; 2], color: Color32, radius: f64) {
-        self.shapes.push(Shape::Dot { at, color, radius });
+        self.shapes.push(DrawingShape::Dot { at, color, radius });
     }
 }
 

@@ -27,9 +27,9 @@ svg { max-width: 100%; height: auto; }
 
 /// The body of a page under construction.
 #[derive(Debug, Default)]
-pub struct Body(String);
+pub struct HtmlBody(String);
 
-impl Body {
+impl HtmlBody {
     /// A heading of a level from 1 on.
     pub fn heading(&mut self, level: u8, text: &str) {
         self.0 += &format!("<h{level}>{}</h{level}>\n", escape(text));
@@ -40,7 +40,7 @@ impl Body {
     }
 
     /// A paragraph with this start tag, alone on its line.
-    pub fn opened(&mut self, start: &str, text: &str) {
+    pub fn paragraph_with_tag(&mut self, start: &str, text: &str) {
         self.0 += &format!("{start}{}</p>\n", escape(text));
     }
 
@@ -146,7 +146,7 @@ fn style() -> String {
     inks.iter().fold(STYLE.to_owned(), |style, (name, ink)| style.replace(name, &hex(*ink)))
 }
 
-pub fn document(title: &str, body: Body) -> String {
+pub fn document(title: &str, body: HtmlBody) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{}</title>\n\
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn what_people_wrote_is_text_in_every_part() {
         let hostile = "</pre><script>alert(1)</script>\" onload='x' & \u{202e}so";
-        let mut body = Body::default();
+        let mut body = HtmlBody::default();
         body.heading(1, hostile);
         body.paragraph(hostile);
         body.strong(hostile);
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_page_names_no_place_in_the_network() {
-        let mut body = Body::default();
+        let mut body = HtmlBody::default();
         let svg = crate::drawing::Svg::new(10.0);
         let ground = crate::tokens::LIGHT.canvas;
         body.figure(&svg.finish(10.0, ground, "nothing"), "a figure");

@@ -1,6 +1,6 @@
 //! A rectangle of a picture with a range of numbers each way, and the marks of its axes.
 
-use crate::drawing::{Anchor, FONT, Ink, Svg};
+use crate::drawing::{Anchor, FONT, Svg, TextStyle};
 use crate::uncertain::shortest;
 use ecolor::Color32;
 
@@ -11,7 +11,7 @@ const WIDTH_OF_DECADE: f64 = 60.0;
 const MARKS_MAX: f64 = 10.0;
 
 /// A rectangle of the picture with a range of numbers each way.
-pub struct Panel {
+pub struct PlotPanel {
     /// Left, top, right and bottom in px.
     pub place: [f64; 4],
     /// Lowest and highest x and y drawn.
@@ -19,7 +19,7 @@ pub struct Panel {
     pub y: [f64; 2],
 }
 
-impl Panel {
+impl PlotPanel {
     /// A panel for a range of x in which all of these points are seen.
     pub fn around(place: [f64; 4], x: [f64; 2], series: &[&[[f64; 2]]]) -> Self {
         const MARGIN: f64 = 0.05;
@@ -64,7 +64,7 @@ impl Panel {
     }
 
     /// Grid, numbers and name of the time alone.
-    pub fn time_axis(&self, svg: &mut Svg, name: &str, look: Look) {
+    pub fn time_axis(&self, svg: &mut Svg, name: &str, look: AxisColours) {
         self.frame(svg, [name, ""], look, &[marks(self.x, MARKS_MAX), Vec::new()]);
     }
 
@@ -74,7 +74,7 @@ impl Panel {
         svg: &mut Svg,
         names: [&str; 2],
         are_logarithms: [bool; 2],
-        look: Look,
+        look: AxisColours,
     ) {
         let [left, top, right, bottom] = self.place;
         let room = [(right - left) / WIDTH_OF_DECADE, (bottom - top) / HEIGHT_OF_MARK];
@@ -93,11 +93,11 @@ impl Panel {
         &self,
         svg: &mut Svg,
         [x_name, y_name]: [&str; 2],
-        look: Look,
+        look: AxisColours,
         [x_marks, y_marks]: &[Vec<(f64, String)>; 2],
     ) {
         let [left, top, right, bottom] = self.place;
-        let ink = Ink::plain(look.text);
+        let ink = TextStyle::plain(look.text);
         for (mark, text) in x_marks {
             let [x, _] = self.at([*mark, 0.0]);
             svg.line(&[[x, top], [x, bottom]], look.grid, 0.6);
@@ -128,7 +128,7 @@ pub(crate) fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
 
 /// The two inks of axes.
 #[derive(Clone, Copy)]
-pub struct Look {
+pub struct AxisColours {
     pub text: Color32,
     pub grid: Color32,
 }
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn a_flat_line_has_numbers_that_can_be_read() {
         for value in [0.0, -0.0, 1e-14, 2.5, -1e6, 3e-4] {
-            let panel = Panel::around([0.0; 4], [0.0, 1.0], &[&[[0.0, value], [1.0, value]]]);
+            let panel = PlotPanel::around([0.0; 4], [0.0, 1.0], &[&[[0.0, value], [1.0, value]]]);
             let texts = marks(panel.y, 5.0);
             assert!(texts.len() >= 2, "{value}: {texts:?}");
             for (_, text) in texts {
@@ -225,18 +225,19 @@ mod tests {
         assert_eq!(texts([-2.2, 1.1], 9.0), ["0.01", "0.1", "1", "10"]);
         assert_eq!(texts([-8.5, 4.5], 5.0), ["1e-6", "1e-3", "1", "1000"]);
         assert!(texts([f64::INFINITY, 0.0], 5.0).is_empty());
-        let panel = Panel::around_logarithms([0.0, 0.0, 100.0, 100.0], &[]);
+        let panel = PlotPanel::around_logarithms([0.0, 0.0, 100.0, 100.0], &[]);
         assert_eq!((panel.x, panel.y), ([0.0, 1.0], [0.0, 1.0]));
     }
 
     #[test]
     fn points_lie_where_the_axes_say() {
-        let panel = Panel { place: [100.0, 10.0, 300.0, 110.0], x: [0.0, 10.0], y: [-1.0, 1.0] };
+        let panel =
+            PlotPanel { place: [100.0, 10.0, 300.0, 110.0], x: [0.0, 10.0], y: [-1.0, 1.0] };
         assert_eq!(panel.at([5.0, 0.0]), [200.0, 60.0]);
         assert_eq!(panel.at([10.0, 1.0]), [300.0, 10.0]);
-        let nothing = Panel::around(panel.place, [0.0, 1.0], &[&[]]);
+        let nothing = PlotPanel::around(panel.place, [0.0, 1.0], &[&[]]);
         assert_eq!(nothing.y, [0.0, 1.0]);
-        let flat = Panel::around(panel.place, [0.0, 1.0], &[&[[0.0, 3.0], [1.0, 3.0]]]);
+        let flat = PlotPanel::around(panel.place, [0.0, 1.0], &[&[[0.0, 3.0], [1.0, 3.0]]]);
         assert!(flat.at([0.5, 3.0]).iter().all(|number| number.is_finite()));
     }
 }

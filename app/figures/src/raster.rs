@@ -1,6 +1,6 @@
 //! A drawing as pixels, for documents that take no SVG. Letters are those of the window.
 
-use crate::drawing::{Anchor, BAND_OPACITY, Drawing, Ink, SHADE_OPACITY, Shape};
+use crate::drawing::{Anchor, BAND_OPACITY, Drawing, DrawingShape, SHADE_OPACITY, TextStyle};
 use ecolor::Color32;
 use epaint_default_fonts::{HACK_REGULAR, UBUNTU_LIGHT};
 use skrifa::instance::{LocationRef, Size};
@@ -8,7 +8,9 @@ use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, MetadataProvider};
 use std::io;
 use vello_cpu::color::{AlphaColor, Srgb};
-use vello_cpu::kurbo::{Affine, BezPath, Cap, Circle, Join, Point, Shape as Outline, Stroke};
+use vello_cpu::kurbo::{
+    Affine, BezPath, Cap, Circle, Join, Point, Shape as SessionOutline, Stroke,
+};
 use vello_cpu::{Pixmap, RenderContext, Resources};
 
 /// Pixels for a px of the drawing: sharp on paper and on fine screens.
@@ -76,9 +78,9 @@ fn path(points: &[[f64; 2]]) -> BezPath {
     path
 }
 
-fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
+fn draw(context: &mut RenderContext, letters: &Letters, shape: &DrawingShape) {
     match shape {
-        Shape::Text { at, is_upright, ink: own, text } => {
+        DrawingShape::Text { at, is_upright, ink: own, text } => {
             context.set_paint(ink(own.color, 1.0));
             let place = Affine::translate((at[0], at[1]));
             let turn = match is_upright {
@@ -87,7 +89,7 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
             };
             context.fill_path(&(place * turn * letters.line(text, *own)));
         }
-        Shape::Line { points, color, width, dash } => {
+        DrawingShape::Line { points, color, width, dash } => {
             let stroke = Stroke::new(*width).with_join(Join::Round).with_caps(Cap::Butt);
             context.set_stroke(match *dash {
                 dash if dash > 0.0 => stroke.with_dashes(0.0, [dash]),
@@ -96,18 +98,18 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
             context.set_paint(ink(*color, 1.0));
             context.stroke_path(&path(points));
         }
-        Shape::Band { points, color } => {
+        DrawingShape::Band { points, color } => {
             context.set_paint(ink(*color, BAND_OPACITY));
             let mut area = path(points);
             area.close_path();
             context.fill_path(&area);
         }
-        Shape::Rectangle { corners: [[left, top], [right, bottom]], color } => {
+        DrawingShape::Rectangle { corners: [[left, top], [right, bottom]], color } => {
             context.set_paint(ink(*color, SHADE_OPACITY));
             let area = vello_cpu::kurbo::Rect::new(*left, *top, *right, *bottom);
             context.fill_rect(&area);
         }
-        Shape::Dot { at, color, radius } => {
+        DrawingShape::Dot { at, color, radius } => {
             context.set_paint(ink(*color, 1.0));
             let circle = Circle::new(Point::new(at[0], at[1]), *radius);
             context.fill_path(&circle.to_path(ROUND));
@@ -127,7 +129,7 @@ impl Default for Letters {
 
 impl Letters {
     /// The outline of a line of text on the origin.
-    fn line(&self, text: &str, ink: Ink) -> BezPath {
+    fn line(&self, text: &str, ink: TextStyle) -> BezPath {
         let size = Size::new(ink.size as f32);
         let mut pen = Pen::default();
         for letter in text.chars() {
@@ -211,7 +213,7 @@ mod tests {
         svg.line(&[[0.0, 30.0], [100.0, 30.0]], LIGHT.limit, 4.0);
         svg.dashed_line(&[[0.0, 40.0], [100.0, 40.0]], LIGHT.limit, 4.0, 10.0);
         svg.dot([50.0, 60.0], LIGHT.series, 5.0);
-        svg.text([60.0, 20.0], Ink::plain(LIGHT.text), "µ² ±");
+        svg.text([60.0, 20.0], TextStyle::plain(LIGHT.text), "µ² ±");
         let (pixels, width) = read(&png(&svg.drawing(80.0, LIGHT.canvas, "t")).unwrap());
         assert_eq!((width, pixels.len()), (200, 200 * 160));
         let at = |x: usize, y: usize| pixels[2 * y * width + 2 * x];

@@ -23,7 +23,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     // An export of it into a lake is refused until it ends.
     let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
     assert_refused(&export, 1, "is being recorded");
-    assert!(lake::sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
+    assert!(lake::list_sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
     fs::write(&log, "").unwrap();
     let done = child.wait_with_output().unwrap();
     assert_eq!(done.status.code(), Some(1), "{}", stderr(&done));
@@ -66,7 +66,10 @@ fn a_review_that_was_cut_off_is_told_by_every_command() {
         let output = palpate(at, &words);
         assert_eq!(output.status.code(), Some(code), "{words:?}: {}", stderr(&output));
         let message = stdout(&output) + &stderr(&output);
-        assert!(message.contains("edits.jsonl") && message.contains("1 of 2"), "{words:?}: {message}");
+        assert!(
+            message.contains("edits.jsonl") && message.contains("1 of 2"),
+            "{words:?}: {message}"
+        );
     }
     let history = json(&palpate(at, &["history", "specimen", "gel", "--json"]));
     assert_eq!(history["events"].as_array().unwrap().len(), 1);

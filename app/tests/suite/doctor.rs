@@ -24,7 +24,7 @@ fn every_kind_of_file_gets_the_right_word() {
     let mut manifest = Session::open(&at.join("whole")).unwrap().manifest;
     manifest.record_version = palpate_sessions::RECORD_VERSION + 1;
     let newer = palpate_sessions::SessionFolder::create(&at.join("newer")).unwrap();
-    let pace = palpate_sessions::Pace::Virtual;
+    let pace = palpate_sessions::RecordingPace::Virtual;
     drop(palpate_sessions::SessionWriter::start(newer, None, &manifest, pace).unwrap());
 
     for (name, word, code) in [

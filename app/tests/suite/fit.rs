@@ -4,8 +4,8 @@ use crate::support::{
     assert_refused, command, json, palpate, short_run, split_words, stderr, stdout, succeeded,
     typed,
 };
-use palpate_analysis::fit::{Fitted, Intervals};
-use palpate_analysis::report::fit_json::Overlay;
+use palpate_analysis::fit::{FitIntervals, SourceFit};
+use palpate_analysis::report::fit_json::FitOverlay;
 use palpate_analysis::report::text;
 use palpate_analysis::source::read;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -97,10 +97,10 @@ fn one_source_prints_what_the_window_shows() {
     table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
     let output = palpate(at, &["fit", "t.csv"]);
     succeeded(&output);
-    let fitted = Fitted::of(read(&at.join("t.csv")).unwrap(), &FitOptions::default());
+    let fitted = SourceFit::of(read(&at.join("t.csv")).unwrap(), &FitOptions::default());
     let report = fitted.result.as_ref().unwrap();
-    let (overlay, intervals) = (Overlay::of(report, &fitted.samples), Intervals::default());
-    let page = text::whole(report, fitted.beside(&overlay, &intervals));
+    let (overlay, intervals) = (FitOverlay::of(report, &fitted.samples), FitIntervals::default());
+    let page = text::fit_text(report, fitted.details(&overlay, &intervals));
     assert_eq!(stdout(&output).trim_end(), page);
     // Whether its family is named or not: the same body, the same page.
     let named = palpate(at, &["fit", "t.csv", "--family", "series-3"]);

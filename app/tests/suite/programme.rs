@@ -121,7 +121,10 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
             assert!(printed.contains(fact), "{fact}: {printed}");
         }
         assert_eq!(printed.contains("operator ("), is_nameless, "{printed}");
-        assert!(printed.contains("[about]") && printed.trim_end().lines().count() == 1, "{printed}");
+        assert!(
+            printed.contains("[about]") && printed.trim_end().lines().count() == 1,
+            "{printed}"
+        );
         assert!(!at.join("day").exists(), "something ran");
     }
     let check = palpate(at, &["protocol", "check", "asking.toml"]);
@@ -179,7 +182,10 @@ fn check_looks_at_a_programme_whole() {
             printed.replace("mine.toml", "ramp-hold").replace("DEPTH", "200 mm"),
             "task 'press-again': step 5",
         ),
-        (printed.replace("DEPTH", "5 mm").replace("palpate-programme = 1\n", ""), "palpate-programme"),
+        (
+            printed.replace("DEPTH", "5 mm").replace("palpate-programme = 1\n", ""),
+            "palpate-programme",
+        ),
     ] {
         let refused = check(text);
         assert_eq!(refused.status.code(), Some(2));
@@ -211,7 +217,10 @@ fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     let refused = typed(at, "run two.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
     let printed = stderr(&refused);
-    assert!(printed.contains("line 6: task 'look'") && printed.contains("daily check"), "{printed}");
+    assert!(
+        printed.contains("line 6: task 'look'") && printed.contains("daily check"),
+        "{printed}"
+    );
     assert!(!at.join("day").exists(), "something ran");
 }
 

@@ -78,7 +78,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     let info = json(&palpate(at, &["info", "run", "--json"]));
     assert_eq!(info["edits"].as_array().unwrap().len(), 1);
     let before = Session::open(&at.join("run")).unwrap();
-    let found = palpate_analysis::edited::contacts(&before.entries)[0].position.0;
+    let found = palpate_analysis::edited_session::contacts(&before.entries)[0].position.0;
     let log = fs::read(at.join("run/000.mcap")).unwrap();
     let position = format!("{}", found - 0.25);
     let correct = |position: &str, reason: &str| {
@@ -101,7 +101,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     succeeded(&corrected);
     let change = json(&corrected)["depth_change_mm"].as_f64().unwrap();
     assert!((change - 0.25).abs() < 1e-12);
-    let after = palpate_analysis::edited::open(&at.join("run")).unwrap().session;
+    let after = palpate_analysis::edited_session::open(&at.join("run")).unwrap().session;
     let mut moved = 0;
     for (old, new) in before.rows.iter().zip(&after.rows) {
         match (old.depth, new.depth) {

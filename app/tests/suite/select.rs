@@ -4,7 +4,7 @@ use crate::support::{
     answer, assert_refused, json, palpate, split_words, stderr, stdout, succeeded,
 };
 use palpate_model::{Depth, Seconds};
-use palpate_rheology::families::{Model, by_key};
+use palpate_rheology::families::{Model, find_family};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn table(at: &Path, name: &str, model: &Model, [speed, depth]: [f64; 2]) {
 }
 
 fn kelvin() -> Model {
-    let family = by_key("kelvin").expect("a family");
+    let family = find_family("kelvin").expect("a family");
     family.model(&[1.5], &[0.15, 0.6]).expect("a model")
 }
 

@@ -199,7 +199,7 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     let mut manifest = palpate_sessions::Session::open(&log).unwrap().manifest;
     manifest.record_version = palpate_sessions::RECORD_VERSION + 1;
     let newer = palpate_sessions::SessionFolder::create(&at.join("newer")).unwrap();
-    let pace = palpate_sessions::Pace::Virtual;
+    let pace = palpate_sessions::RecordingPace::Virtual;
     drop(palpate_sessions::SessionWriter::start(newer, None, &manifest, pace).unwrap());
     let output = palpate(at, &["info", "newer"]);
     assert_refused(&output, 2, "update palpate");
@@ -288,7 +288,7 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     assert!(session.end.is_some());
     let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
-    let worst = session.beside.health.worst.expect("a state");
+    let worst = session.auxiliary.health.worst.expect("a state");
     assert!(worst.lateness_s > 0.6, "{worst:?}");
     let info = stdout(&palpate(at, &["info", "slept"]));
     assert!(info.contains("ms late"), "{info}");

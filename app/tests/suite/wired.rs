@@ -2,7 +2,7 @@
 
 use crate::emulate::{Emulator, emulate_galil};
 use crate::support::{assert_prints, assert_refused, json, palpate, stderr, typed};
-use palpate_sessions::{Row, Session};
+use palpate_sessions::{SampleRow, Session};
 use palpate_test_support::wait::{retry, until};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -70,7 +70,7 @@ fn is_late(message: &str) -> bool {
 }
 
 /// The samples of a session so far; none before there is one.
-fn samples(session: &Path) -> Vec<Row> {
+fn samples(session: &Path) -> Vec<SampleRow> {
     Session::open(session).map_or(Vec::new(), |session| session.rows)
 }
 

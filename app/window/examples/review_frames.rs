@@ -10,11 +10,12 @@ use eframe::egui::{
 };
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
-use palpate_model::about::About;
+use palpate_model::metadata::SessionMetadata;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
 use palpate_sessions::{
-    EndRecord, Manifest, Pace, RECORD_VERSION, Row, SessionFolder, SessionWriter, new_session_id,
+    EndRecord, Manifest, RECORD_VERSION, RecordingPace, SampleRow, SessionFolder, SessionWriter,
+    new_session_id,
 };
 use palpate_window::screens::review::{ReviewScreen, View};
 use palpate_window::shell::frame_meter::thread_cpu_s;
@@ -29,7 +30,7 @@ const FRAMES: usize = 60;
 type Failed = Box<dyn std::error::Error>;
 
 /// Loops of half a second down and half a second up, the force with noise and a little softer every time.
-fn row(index: u64, random: &mut u64) -> Row {
+fn row(index: u64, random: &mut u64) -> SampleRow {
     *random =
         random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     let noise = (*random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
@@ -37,7 +38,7 @@ fn row(index: u64, random: &mut u64) -> Row {
     let depth = 10.0 * if share < 1.0 { share } else { 2.0 - share };
     let softer = 0.7 + 0.3 * (-(index as f64) / 2e6).exp();
     let force = softer * 0.05 * depth * depth + 0.02 * noise;
-    Row {
+    SampleRow {
         tick: index,
         host: Nanos(index * 50_000),
         age: None,
@@ -65,7 +66,7 @@ fn manifest(number: u32) -> Manifest {
         operator: "none".into(),
         specimen: "none".into(),
         indenter: "none".into(),
-        about: About::default(),
+        about: SessionMetadata::default(),
         signal: None,
         imported: None,
         rig: Some(RigDescription {
@@ -100,7 +101,7 @@ fn record(folder: &Path, number: u32, samples: u64) -> Result<PathBuf, Failed> {
     let path = folder.join(&manifest.session_id);
     let mut random = u64::from(number) + 1;
     let folder = SessionFolder::create(&path)?;
-    let mut writer = SessionWriter::start(folder, None, &manifest, Pace::Virtual)?;
+    let mut writer = SessionWriter::start(folder, None, &manifest, RecordingPace::Virtual)?;
     for index in 0..samples {
         writer.push_row(row(index, &mut random))?;
     }

@@ -23,7 +23,7 @@ use crate::window::WindowOptions;
 use crate::workbench::Workbench;
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_protocols::engine::Operator;
-use palpate_runner::Snapshot;
+use palpate_runner::RunnerSnapshot;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ impl WorkbenchApp {
         })
     }
 
-    pub fn snapshot(&self) -> &Arc<Snapshot> {
+    pub fn snapshot(&self) -> &Arc<RunnerSnapshot> {
         &self.workbench.snapshot
     }
 

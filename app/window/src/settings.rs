@@ -124,7 +124,7 @@ impl SettingsFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_analysis::opening::SETTINGS_FILE;
+    use palpate_analysis::window_requests::SETTINGS_FILE;
 
     #[test]
     fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {

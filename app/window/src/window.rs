@@ -3,7 +3,7 @@
 use crate::app::WorkbenchApp;
 use crate::workbench::ListPorts;
 use eframe::egui::{Context, ViewportBuilder, ViewportCommand, vec2};
-use palpate_analysis::opening::{SETTINGS_FILE, WorkbenchRequest};
+use palpate_analysis::window_requests::{SETTINGS_FILE, WorkbenchRequest};
 use palpate_drivers::Rig;
 use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
@@ -37,12 +37,12 @@ impl WindowOptions {
         let calibration = palpate_drivers::sim::calibration(settings.profile);
         let to_acknowledge = Vec::new();
         let request = WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale };
-        Ok(Self { settings: None, ..Self::remembered(request) })
+        Ok(Self { settings: None, ..Self::from_request(request) })
     }
 
     /// Options for an open rig, with the settings file of the library.
     #[must_use]
-    pub fn remembered(request: WorkbenchRequest) -> Self {
+    pub fn from_request(request: WorkbenchRequest) -> Self {
         let WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale } = request;
         Self {
             rig,

@@ -10,7 +10,7 @@ use eframe::egui::Context;
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
 use palpate_protocols::engine::Operator;
-use palpate_runner::{Request, RunRequest, RunView, Runner, Snapshot, StartError};
+use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -48,7 +48,7 @@ pub struct Occupation {
 /// The window's side of the rig and the run, which belong to the runner.
 pub struct Workbench {
     runner: Runner,
-    pub snapshot: Arc<Snapshot>,
+    pub snapshot: Arc<RunnerSnapshot>,
     /// Calibration and limits of new sessions.
     pub bench: RunSetup,
     pub form: ProtocolForm,
@@ -213,7 +213,7 @@ impl Workbench {
             }
             UiCommand::CloseSession => self.operator(Operator::Close),
             UiCommand::Reconnect => {
-                let sent = self.runner.request(Request::Reconnect);
+                let sent = self.runner.request(RunnerRequest::Reconnect);
                 self.keep_refusal(sent);
             }
             UiCommand::ListPorts => self.refresh_ports(ctx),
@@ -234,7 +234,7 @@ impl Workbench {
     }
 
     pub fn operator(&mut self, choice: Operator) {
-        let passed = self.runner.operator(choice);
+        let passed = self.runner.send_choice(choice);
         self.keep_refusal(passed);
     }
 
@@ -243,7 +243,7 @@ impl Workbench {
         if run_in_progress(&self.snapshot).is_none() {
             return false;
         }
-        let written = self.runner.request(Request::Note(text));
+        let written = self.runner.request(RunnerRequest::Note(text));
         let is_written = written.is_ok();
         self.keep_refusal(written);
         is_written
@@ -276,7 +276,7 @@ impl Workbench {
         let Some(request) = self.next_run.take() else { return };
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
-        match self.runner.request(Request::Run(Box::new(request), reply)) {
+        match self.runner.request(RunnerRequest::Run(Box::new(request), reply)) {
             Ok(()) => self.start = Start::Sent(answer),
             Err(reason) => self.refusal = Some(reason),
         }

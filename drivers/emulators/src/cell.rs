@@ -4,7 +4,7 @@ use super::DeviceFault;
 use super::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use super::line_cell::EmulatedLineCell;
 use super::mark10::{EmulatedGauge, EmulatedGaugeSettings};
-use palpate_drivers::devices::{DEVICES, Role};
+use palpate_drivers::devices::{DEVICES, DeviceRole};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 
@@ -55,7 +55,7 @@ pub fn emulated_cell(word: &str, seed: u64) -> Option<Box<dyn EmulatedCell>> {
     }
     let kind = DEVICES.iter().find(|kind| kind.word == word)?;
     match kind.role {
-        Role::Cell { emulation, .. } => Some(Box::new(EmulatedLineCell::new(emulation?))),
-        Role::Axis(_) => None,
+        DeviceRole::Cell { emulation, .. } => Some(Box::new(EmulatedLineCell::new(emulation?))),
+        DeviceRole::Axis(_) => None,
     }
 }

@@ -1,6 +1,6 @@
 //! Faults on command: of the line, byte by byte, and of the device.
 
-use palpate_drivers::sim::{Cause, Random};
+use palpate_drivers::sim::{Random, RandomStream};
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;
@@ -28,9 +28,9 @@ pub enum LineFault {
     Drop,
     /// Bytes arrive twice.
     Duplicate,
-    /// Answers end early.
+    /// PromptResponder end early.
     Partial,
-    /// Answers arrive late.
+    /// PromptResponder arrive late.
     Late,
     /// No byte reaches the device.
     Deaf,
@@ -144,7 +144,7 @@ pub struct FaultEvent {
 impl FaultPlan {
     /// The seed decides which bytes are corrupted.
     pub fn new(faults: Vec<ScheduledFault>, seed: u64) -> Self {
-        Self { pending: faults, active: Vec::new(), random: Random::new(seed, Cause::Fault) }
+        Self { pending: faults, active: Vec::new(), random: Random::new(seed, RandomStream::Fault) }
     }
 
     pub fn add(&mut self, fault: ScheduledFault) {

@@ -1,13 +1,15 @@
 //! The slide, bench and load cell of the simulated rig behind every emulated device.
 
-use palpate_drivers::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
+use palpate_drivers::sim::{
+    LoadCell, Random, RandomStream, SWITCH_MARGIN_MM, SimBench, SimSettings, TRAVEL,
+};
 use palpate_model::rig::HandAction;
 use palpate_model::{Newtons, Position, Seconds, Volts};
 
 /// Positions passed in are those of the device's counter, in mm; no device knows where its zero is.
 #[derive(Clone, Debug)]
 pub struct EmulatedPlant {
-    bench: Bench,
+    bench: SimBench,
     cell: LoadCell,
     /// True position at which the counter reads zero.
     counter_zero: Position,
@@ -31,10 +33,10 @@ const SATURATED: Volts = Volts(12.0);
 impl EmulatedPlant {
     /// Starts 5 to 15 mm from home with the counter at zero; the cell is read once per `tick`.
     pub fn new(settings: &SimSettings, tick: Seconds) -> Self {
-        let mut machine = Random::new(settings.seed, Cause::Machine);
+        let mut machine = Random::new(settings.seed, RandomStream::Machine);
         let counter_zero = Position(machine.between(5.0, 15.0));
         let mut plant = Self {
-            bench: Bench::new(settings, counter_zero),
+            bench: SimBench::new(settings, counter_zero),
             cell: LoadCell::new(settings, tick),
             counter_zero,
             axis: counter_zero,
@@ -67,7 +69,7 @@ impl EmulatedPlant {
     }
 
     pub fn apply_hand_action(&mut self, action: HandAction) {
-        self.bench.by_hand(action);
+        self.bench.apply_hand_action(action);
     }
 
     /// Amplified signal of the cell.

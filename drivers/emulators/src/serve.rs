@@ -27,7 +27,7 @@ const FLUSH_MAX: Nanos = Nanos(500_000_000);
 
 /// Where clients find the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum EmulatorAddress {
     /// A pseudo-terminal, with a link to it by this name.
     Pty(Option<PathBuf>),
     /// One pseudo-terminal for each channel of the device.
@@ -40,7 +40,7 @@ pub enum Place {
 
 #[derive(Clone, Debug)]
 pub struct ServeOptions {
-    pub place: Place,
+    pub address: EmulatorAddress,
     /// Bits a second of the line, 10 a byte; no delay if `None`.
     pub baud: Option<u32>,
     /// Latency timer of the USB converter on the host's side.
@@ -51,7 +51,7 @@ pub struct ServeOptions {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum ServeEvent {
     /// Clients can connect here: a path or an address, or one for each channel with commas between.
     Ready(String),
     Fault(FaultEvent),
@@ -114,10 +114,10 @@ pub fn serve(
     options: &ServeOptions,
     orders: &Receiver<String>,
     stop: &AtomicBool,
-    notify: &mut dyn FnMut(Told),
+    notify: &mut dyn FnMut(ServeEvent),
 ) -> Result<(), ServeError> {
     let mut server = Server::open(device, options)?;
-    notify(Told::Ready(server.address.clone()));
+    notify(ServeEvent::Ready(server.address.clone()));
     while !stop.load(Ordering::Relaxed) {
         for order in orders.try_iter().filter(|line| !line.trim().is_empty()) {
             let now = server.now();
@@ -125,13 +125,13 @@ pub fn serve(
                 Ok(EmulatorOrder::Fault(fault)) => server.faults.add(fault),
                 Ok(order @ EmulatorOrder::Hand(action)) => {
                     server.device.apply_hand_action(now, action);
-                    notify(Told::Done(order));
+                    notify(ServeEvent::Done(order));
                 }
-                Err(err) => notify(Told::Refused(err.to_string())),
+                Err(err) => notify(ServeEvent::Refused(err.to_string())),
             }
         }
         for event in server.faults.advance(server.now()) {
-            notify(Told::Fault(event));
+            notify(ServeEvent::Fault(event));
             server.apply_fault_event(event)?;
         }
         server.wait()?;
@@ -183,11 +183,11 @@ impl<'a> Server<'a> {
     }
 
     fn plug_in(&mut self) -> Result<(), ServeError> {
-        match &self.options.place {
-            Place::Pty(link) => self.plug_in_ptys(0, std::slice::from_ref(link))?,
-            Place::Ptys(links) => self.plug_in_ptys(0, links)?,
-            Place::Tcp(address) => self.plug_in_tcp(*address)?,
-            Place::TcpAndPtys(address, links) => {
+        match &self.options.address {
+            EmulatorAddress::Pty(link) => self.plug_in_ptys(0, std::slice::from_ref(link))?,
+            EmulatorAddress::Ptys(links) => self.plug_in_ptys(0, links)?,
+            EmulatorAddress::Tcp(address) => self.plug_in_tcp(*address)?,
+            EmulatorAddress::TcpAndPtys(address, links) => {
                 self.plug_in_ptys(1, links)?;
                 let pty_addresses = std::mem::take(&mut self.address);
                 self.plug_in_tcp(*address)?;

@@ -34,7 +34,7 @@ const LAG_SAMPLES: f64 = 4.0;
 const BETWEEN: f64 = 1.1;
 
 #[derive(Clone, Debug)]
-pub struct Connected {
+pub struct ConnectedGalil {
     pub board: GalilBoard,
     pub description: RigDescription,
     pub pace: PollPace,
@@ -55,7 +55,7 @@ pub fn connect(
     clock: &HostClock,
     settings: &GalilSettings,
     device: &Arc<str>,
-) -> Result<Connected, GalilOpenError> {
+) -> Result<ConnectedGalil, GalilOpenError> {
     let mut console = GalilConsole::open(link, clock, device, GalilParser::take);
     let board = identify(&mut console, settings)?;
     silence_controller(&mut console, settings)?;
@@ -91,7 +91,7 @@ pub fn connect(
     // Values that change from one opening to the next stay out of the identity, by which repeats are compared.
     let words = format!("{safety}, {words}");
     let description = describe(settings, &board, acceleration, (pace, plan), &words, tm);
-    Ok(Connected {
+    Ok(ConnectedGalil {
         board,
         description,
         pace,

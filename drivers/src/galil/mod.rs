@@ -19,22 +19,22 @@ mod settings;
 mod sine;
 mod watchdog;
 
-use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
-use crate::devices::{DeviceKind, Role, find_line};
-use crate::wire::{HostClock, LinkThread, Place};
+use crate::device::{DeviceRig, OpenError, OpenedDevices, RigDevice};
+use crate::devices::{DeviceKind, DeviceRole, find_line};
+use crate::wire::{DeviceAddress, HostClock, LinkThread};
 use std::sync::Arc;
 
-pub use connect::{Connected, connect};
+pub use connect::{ConnectedGalil, connect};
 pub use error::{ErrorCode, GalilError};
 pub use model::{GalilBoard, GalilOpenError};
-pub use session::Session;
-pub use settings::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
+pub use session::GalilSession;
+pub use settings::{AnalogRange, GalilSettings, MotorType, Sampling, SwitchLevel};
 
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "galil",
     title: "a Galil controller",
     introduction: "Galil controller, ",
-    role: Role::Axis(crate::rig_file::galil),
+    role: DeviceRole::Axis(crate::rig_file::galil),
     recognise: |lines| find_line(lines, |line| line.starts_with("DMC") || line.starts_with("RIO")),
 };
 
@@ -42,14 +42,14 @@ pub type GalilRig = DeviceRig<GalilDevice>;
 
 #[derive(Clone)]
 pub struct GalilDevice {
-    place: Place,
+    place: DeviceAddress,
     settings: GalilSettings,
     worst_case_mm: f64,
 }
 
 impl GalilDevice {
     #[must_use]
-    pub fn new(place: Place, settings: GalilSettings) -> Self {
+    pub fn new(place: DeviceAddress, settings: GalilSettings) -> Self {
         Self { worst_case_mm: settings.travel.0, place, settings }
     }
 
@@ -60,17 +60,17 @@ impl GalilDevice {
 }
 
 impl RigDevice for GalilDevice {
-    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+    fn open(&mut self, clock: &HostClock) -> Result<OpenedDevices, OpenError> {
         let device: Arc<str> = "galil".into();
         let mut link = self.place.open()?;
         let connected = connect(link.as_mut(), clock, &self.settings, &device)?;
         // The next opening must find the same controller, even if the rig file has no serial number.
         self.settings.serial_number = connected.board.serial_number;
         self.worst_case_mm = connected.worst_case_mm;
-        let session = Session::new(self.settings.clone(), &connected, clock());
+        let session = GalilSession::new(self.settings.clone(), &connected, clock());
         // The recording ends too, so that the next program finds an idle controller.
         let farewell = format!("ST{};RC 0\r", self.settings.axis).into_bytes();
-        Ok(Opened {
+        Ok(OpenedDevices {
             description: connected.description,
             newtons_per_volt: None,
             link: Some(connected.link),

@@ -5,7 +5,7 @@ use super::sampling::parse_register;
 use super::settings::GalilSettings;
 use super::sine::SineFeed;
 use palpate_model::Nanos;
-use palpate_model::rig::{MoveTo, Oscillation, RigCommand, Sine};
+use palpate_model::rig::{MoveTo, Oscillation, RigCommand, SinePath};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
 /// Software limits are this far beyond the travel and behind home, in mm: behind the limit switches of a slide, which
@@ -93,7 +93,7 @@ impl GalilOrder {
             }
             RigCommand::Oscillate(wanted) => {
                 let length = Seconds(self.tick.seconds().0);
-                let path = Sine::new(Position(0.0), &wanted, settings.mm_per_pulse, length);
+                let path = SinePath::new(Position(0.0), &wanted, settings.mm_per_pulse, length);
                 if let Err(why) = path.check(settings.speed_max, wanted.acceleration) {
                     return OrderStep::Refused(why);
                 }

@@ -43,13 +43,13 @@ impl AnalogRange {
 
 /// The level of a switch's input while the switch is closed: the argument of `CN`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Levels {
+pub enum SwitchLevel {
     /// The switch pulls its input low, the usual wiring.
     ActiveLow = -1,
     ActiveHigh = 1,
 }
 
-impl Levels {
+impl SwitchLevel {
     /// Whether a switch with this level at its input is closed.
     #[must_use]
     pub const fn is_closed(self, is_high: bool) -> bool {
@@ -77,8 +77,8 @@ pub struct GalilSettings {
     pub unseen: Position,
     /// Polarity of the drive's pulses.
     pub motor_type: MotorType,
-    pub limits: Levels,
-    pub home: Levels,
+    pub limits: SwitchLevel,
+    pub home: SwitchLevel,
     /// Range of the load cell's input.
     pub range: AnalogRange,
     /// Bits of the converter: 12, or 16 as an option of the controller.
@@ -141,8 +141,8 @@ pub mod tests {
             acceleration: MmPerS2(61.44),
             unseen: palpate_model::rig::RigDescription::UNSEEN_USUAL,
             motor_type: MotorType::ActiveLow,
-            limits: Levels::ActiveLow,
-            home: Levels::ActiveLow,
+            limits: SwitchLevel::ActiveLow,
+            home: SwitchLevel::ActiveLow,
             range: AnalogRange::Bipolar10,
             bits: 16,
             noise: Volts(0.001),
@@ -165,7 +165,9 @@ pub mod tests {
 
     #[test]
     fn a_switch_is_closed_at_its_level() {
-        assert!(Levels::ActiveLow.is_closed(false) && !Levels::ActiveLow.is_closed(true));
-        assert!(Levels::ActiveHigh.is_closed(true) && !Levels::ActiveHigh.is_closed(false));
+        assert!(SwitchLevel::ActiveLow.is_closed(false) && !SwitchLevel::ActiveLow.is_closed(true));
+        assert!(
+            SwitchLevel::ActiveHigh.is_closed(true) && !SwitchLevel::ActiveHigh.is_closed(false)
+        );
     }
 }

@@ -6,7 +6,7 @@
 use super::protocol::LINE_MAX;
 use super::settings::GalilSettings;
 use palpate_model::Nanos;
-use palpate_model::rig::{Oscillation, Sine};
+use palpate_model::rig::{Oscillation, SinePath};
 use palpate_model::units::{Position, Seconds};
 
 /// `DT`: an increment lasts 2^3 samples, 8 ms. Between two of them a sine is off a straight line by `a w^2 t^2 / 8`, at
@@ -21,7 +21,7 @@ const FIRST: usize = 2;
 
 #[derive(Clone, Debug)]
 pub struct SineFeed {
-    path: Sine,
+    path: SinePath,
     axis: char,
     /// Counts of a millimetre, signed.
     counts_per_mm: f64,
@@ -43,7 +43,7 @@ impl SineFeed {
         let length = Seconds(tick.seconds().0);
         let total = u64::from(command.period_ticks) * u64::from(command.cycles);
         Self {
-            path: Sine::new(Position(0.0), command, settings.mm_per_pulse, length),
+            path: SinePath::new(Position(0.0), command, settings.mm_per_pulse, length),
             axis: settings.axis,
             counts_per_mm: settings.sign() as f64 / settings.mm_per_pulse,
             tick,

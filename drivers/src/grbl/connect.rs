@@ -5,7 +5,7 @@ use super::console::GrblConsole;
 use super::error::GrblOpenError;
 use super::fitness::{check_settings, read_settings, setting};
 use super::motion::worst_case_mm;
-use super::protocol::{self, CYCLE_START, GrblState, GrblStatus, Incoming, JOG_CANCEL, Parser};
+use super::protocol::{self, CYCLE_START, GrblLine, GrblParser, GrblState, GrblStatus, JOG_CANCEL};
 use super::settings::{BoardParameters, GrblSettings, HomeSwitch};
 use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
@@ -26,10 +26,10 @@ const REST_MAX: Nanos = Nanos::from_millis(5_000);
 const PINGS: usize = 10;
 
 #[derive(Clone, Debug)]
-pub struct Connected {
+pub struct ConnectedGrbl {
     /// Version, text of `$I=`, safety, for the operator and the log.
     pub identity: String,
-    pub facts: BoardParameters,
+    pub parameters: BoardParameters,
     pub stats: LinkStats,
     /// Longest way of the axis after palpate falls silent, in mm.
     pub worst_case_mm: f64,
@@ -42,8 +42,8 @@ pub fn connect(
     clock: &HostClock,
     settings: &GrblSettings,
     device: &Arc<str>,
-) -> Result<Connected, GrblOpenError> {
-    let mut console = GrblConsole::open(link, clock, device, Parser::take);
+) -> Result<ConnectedGrbl, GrblOpenError> {
+    let mut console = GrblConsole::open(link, clock, device, GrblParser::take);
     let welcome_version = wake(&mut console)?;
     let version = identify(&mut console, settings, welcome_version.as_deref())?;
     let status = wait_for_rest(&mut console)?;
@@ -78,14 +78,14 @@ pub fn connect(
     }
     stats.in_flight = 1;
     let worst_case_mm = worst_case_mm(settings.speed_max, settings.acceleration);
-    Ok(Connected {
+    Ok(ConnectedGrbl {
         // Rounded up: it is a bound.
         identity: format!(
             "Grbl {version}, axis {}; at most {:.1} mm after the link is lost at full speed",
             settings.axis,
             (worst_case_mm * 10.0).ceil() / 10.0
         ),
-        facts: BoardParameters {
+        parameters: BoardParameters {
             steps_per_mm,
             steps: (place * steps_per_mm).round() as i64,
             round_trip: stats.round_trip_min,
@@ -106,18 +106,18 @@ fn wake(console: &mut GrblConsole<'_>) -> Result<Option<String>, GrblOpenError> 
         while let Some(incoming) = console.next_line(until)? {
             has_received = true;
             match incoming {
-                Incoming::Hello(version) => return Ok(Some(version)),
-                Incoming::Status(_) => {
+                GrblLine::Hello(version) => return Ok(Some(version)),
+                GrblLine::Status(_) => {
                     // A board that is just being reset sends its welcome after this; the dialogue then starts again.
                     let until = console.now() + SETTLE;
                     while let Some(incoming) = console.next_line(until)? {
-                        if let Incoming::Hello(version) = incoming {
+                        if let GrblLine::Hello(version) = incoming {
                             return Ok(Some(version));
                         }
                     }
                     return Ok(None);
                 }
-                Incoming::Other(text) => {
+                GrblLine::Other(text) => {
                     let what: String = text.chars().filter(|c| !c.is_control()).take(40).collect();
                     if console.now().since(start) > Nanos::from_millis(2_500) {
                         return Err(GrblOpenError::NotGrbl { found: what });
@@ -156,7 +156,7 @@ fn identify(
     let mut version = None;
     let mut text = String::new();
     for incoming in console.ask("$I")? {
-        if let Incoming::Message(message) = incoming
+        if let GrblLine::Message(message) = incoming
             && let Some(rest) = message.strip_prefix("VER:")
         {
             let (number, own) = rest.split_once(':').unwrap_or((rest, ""));
@@ -182,7 +182,7 @@ fn identify(
 fn wait_for_ok(console: &mut GrblConsole<'_>) -> Result<bool, GrblOpenError> {
     let until = console.now() + ANSWER_MAX;
     while let Some(incoming) = console.next_line(until)? {
-        if incoming == Incoming::Ok {
+        if incoming == GrblLine::Ok {
             return Ok(true);
         }
     }

@@ -2,15 +2,15 @@
 
 use super::connect::{ANSWER_MAX, ASK_AGAIN};
 use super::error::GrblOpenError;
-use super::protocol::{self, GrblStatus, Incoming, Parser};
+use super::protocol::{self, GrblLine, GrblParser, GrblStatus};
 use crate::wire::SetupConsole;
 use palpate_model::Nanos;
 
-pub(super) type GrblConsole<'a> = SetupConsole<'a, Parser, Incoming>;
+pub(super) type GrblConsole<'a> = SetupConsole<'a, GrblParser, GrblLine>;
 
 impl GrblConsole<'_> {
     /// The next line, if one comes in time.
-    pub fn next_line(&mut self, until: Nanos) -> Result<Option<Incoming>, GrblOpenError> {
+    pub fn next_line(&mut self, until: Nanos) -> Result<Option<GrblLine>, GrblOpenError> {
         Ok(self.next(until)?.map(|(_, line)| line))
     }
 
@@ -21,7 +21,7 @@ impl GrblConsole<'_> {
             self.write([protocol::QUERY])?;
             let until = self.now() + ASK_AGAIN;
             while let Some(incoming) = self.next_line(until)? {
-                if let Incoming::Status(status) = incoming {
+                if let GrblLine::Status(status) = incoming {
                     return Ok(status);
                 }
             }
@@ -30,14 +30,14 @@ impl GrblConsole<'_> {
     }
 
     /// Sends a line and gives what comes before its `ok`.
-    pub fn ask(&mut self, line: &str) -> Result<Vec<Incoming>, GrblOpenError> {
+    pub fn ask(&mut self, line: &str) -> Result<Vec<GrblLine>, GrblOpenError> {
         self.write(format!("{line}\n"))?;
         let until = self.now() + ANSWER_MAX;
         let mut all = Vec::new();
         while let Some(incoming) = self.next_line(until)? {
             match incoming {
-                Incoming::Ok => return Ok(all),
-                Incoming::Refused(refusal) => {
+                GrblLine::Ok => return Ok(all),
+                GrblLine::Refused(refusal) => {
                     let detail = refusal.to_string();
                     return Err(GrblOpenError::Refused { line: line.to_owned(), detail });
                 }

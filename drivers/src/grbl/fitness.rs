@@ -2,7 +2,7 @@
 
 use super::console::GrblConsole;
 use super::error::GrblOpenError;
-use super::protocol::Incoming;
+use super::protocol::GrblLine;
 use super::settings::{GrblSettings, HomeSwitch};
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ pub(super) fn read_settings(
     Ok(listing
         .into_iter()
         .filter_map(|incoming| match incoming {
-            Incoming::Setting(number, value) => Some((number, value)),
+            GrblLine::Setting(number, value) => Some((number, value)),
             _ => None,
         })
         .collect())

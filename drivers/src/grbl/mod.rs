@@ -1,7 +1,7 @@
 //! A Grbl 1.1 board with a slide on one of its axes.
 //!
 //! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `connect.rs`, what happens once when the
-//! board is opened. The board has no load cell: [`crate::parts`] makes a rig of it and one.
+//! board is opened. The board has no load cell: [`crate::split_rig`] makes a rig of it and one.
 
 mod connect;
 mod console;
@@ -16,37 +16,37 @@ mod settings;
 mod times;
 
 use crate::device::OpenError;
-use crate::devices::{DeviceKind, Role, find_line};
-use crate::parts::{OpenedAxis, TICK, Track};
+use crate::devices::{DeviceKind, DeviceRole, find_line};
+use crate::split_rig::{AxisTrack, OpenedAxis, TICK};
 use crate::wire::{HostClock, Link, LinkThread};
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{MmPerS, Seconds, Volts};
-use protocol::{Incoming, JOG_CANCEL};
+use protocol::{GrblLine, JOG_CANCEL};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-pub use connect::{Connected, connect};
+pub use connect::{ConnectedGrbl, connect};
 pub use error::{GrblCode, GrblOpenError};
 pub use fitness::MM_PER_STEP_MIN;
 pub use motion::worst_case_mm;
-pub use session::{Session, SharedTrack};
+pub use session::{GrblSession, SharedTrack};
 pub use settings::{BoardParameters, GrblSettings, HomeSwitch};
 
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "grbl",
     title: "a Grbl controller",
     introduction: "Grbl, ",
-    role: Role::Axis(crate::rig_file::grbl),
+    role: DeviceRole::Axis(crate::rig_file::grbl),
     recognise: |lines| find_line(lines, is_of_grbl),
 };
 
 /// Its banner, a status report, an error, an alarm or a message.
 fn is_of_grbl(line: &str) -> bool {
-    match Incoming::parse(line) {
-        Incoming::Hello(_) | Incoming::Status(_) => true,
-        Incoming::Refused(refusal) => refusal.code.is_some(),
-        Incoming::Alarm(alarm) => alarm.code.is_some(),
-        Incoming::Message(message) => message.starts_with("MSG:"),
+    match GrblLine::parse(line) {
+        GrblLine::Hello(_) | GrblLine::Status(_) => true,
+        GrblLine::Refused(refusal) => refusal.code.is_some(),
+        GrblLine::Alarm(alarm) => alarm.code.is_some(),
+        GrblLine::Message(message) => message.starts_with("MSG:"),
         _ => false,
     }
 }
@@ -63,10 +63,10 @@ pub fn open(
     clock: &HostClock,
 ) -> Result<(RigDescription, OpenedAxis), OpenError> {
     let device: Arc<str> = "grbl".into();
-    let Connected { identity, facts, stats, raw, .. } =
+    let ConnectedGrbl { identity, parameters: facts, stats, raw, .. } =
         connect(link.as_mut(), clock, settings, &device)?;
-    let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * facts.steps)));
-    let session = Session::new(settings.clone(), facts, Arc::clone(&track), stats, clock());
+    let track = Arc::new(Mutex::new(AxisTrack::at_rest(settings.sign() * facts.steps)));
+    let session = GrblSession::new(settings.clone(), facts, Arc::clone(&track), stats, clock());
     let line = LinkThread::start(link, session, clock, device, vec![JOG_CANCEL])?;
     let description = RigDescription {
         name: settings.name.clone(),

@@ -1,7 +1,7 @@
 //! A motion cut into jogs, none of which is sent before it is needed.
 
 use palpate_model::Nanos;
-use palpate_model::rig::{MoveTo, Profile};
+use palpate_model::rig::{MotionProfile, MoveTo};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
 /// Longest time that the axis may go on at full speed with the jogs it has, without the way of braking: 60 ms for
@@ -25,7 +25,7 @@ pub struct JogMotion {
     /// mm/min of the board.
     pub feed: f64,
     /// From 0 on, in mm.
-    pub profile: Profile,
+    pub profile: MotionProfile,
     pub started: Option<Nanos>,
     /// When its early end was commanded.
     pub cancelled: Option<Nanos>,
@@ -67,8 +67,8 @@ impl JogMotion {
 
     /// A profile over a way in mm, from 0 on.
     #[must_use]
-    pub fn profile(way: f64, wanted: &MoveTo) -> Profile {
-        Profile::to_rest(Position(0.0), Position(way), wanted.speed, wanted.acceleration)
+    pub fn profile(way: f64, wanted: &MoveTo) -> MotionProfile {
+        MotionProfile::to_rest(Position(0.0), Position(way), wanted.speed, wanted.acceleration)
     }
 
     /// 1 or -1 in steps of the board.
@@ -81,7 +81,7 @@ impl JogMotion {
     }
 
     /// The part of the profile for which jogs were sent: what becomes of it when no more come.
-    pub fn given_profile(&self, mm_per_pulse: f64) -> Profile {
+    pub fn given_profile(&self, mm_per_pulse: f64) -> MotionProfile {
         let way = (self.sent - self.from).abs() as f64 * mm_per_pulse;
         Self::profile(way, &self.wanted)
     }

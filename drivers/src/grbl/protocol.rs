@@ -1,6 +1,6 @@
 //! Lines that Grbl 1.1 writes (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
 //!
-//! Bytes in, [`Incoming`] out; nothing else. Forms that older firmware or other compile options give are read too where
+//! Bytes in, [`GrblLine`] out; nothing else. Forms that older firmware or other compile options give are read too where
 //! the documents allow them.
 
 use super::error::GrblCode;
@@ -116,7 +116,7 @@ fn number(text: &str) -> Option<f64> {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Incoming {
+pub enum GrblLine {
     Ok,
     Refused(GrblCode),
     Alarm(GrblCode),
@@ -130,7 +130,7 @@ pub enum Incoming {
     Flood,
 }
 
-impl Incoming {
+impl GrblLine {
     /// Reads a line without its end.
     #[must_use]
     pub fn parse(line: &str) -> Self {
@@ -172,22 +172,22 @@ impl Incoming {
 
 /// Takes a line apart from the bytes before and behind it.
 #[derive(Clone, Debug, Default)]
-pub struct Parser {
+pub struct GrblParser {
     line: Vec<u8>,
     is_flooded: bool,
 }
 
-impl Parser {
-    pub fn take(&mut self, byte: u8) -> Option<Incoming> {
+impl GrblParser {
+    pub fn take(&mut self, byte: u8) -> Option<GrblLine> {
         match byte {
             b'\r' | b'\n' => {
                 let line = std::mem::take(&mut self.line);
                 if std::mem::take(&mut self.is_flooded) {
-                    return Some(Incoming::Flood);
+                    return Some(GrblLine::Flood);
                 }
                 let line = String::from_utf8_lossy(&line);
                 let line = line.trim();
-                (!line.is_empty()).then(|| Incoming::parse(line))
+                (!line.is_empty()).then(|| GrblLine::parse(line))
             }
             _ if self.line.len() >= LINE_MAX => {
                 self.is_flooded = true;

@@ -124,7 +124,7 @@ mod tests {
     }
 
     fn say(to: &mut Hx711Dialogue, at: Nanos, message: &Message) {
-        to.received(at, line(message).as_bytes());
+        to.handle_bytes(at, line(message).as_bytes());
     }
 
     fn value(micros: u32, count: i32) -> Message {
@@ -209,7 +209,7 @@ mod tests {
         for _ in 0..2 {
             say(&mut dialogue, ms(1), &value(1_000, 5));
         }
-        dialogue.received(ms(2), b"D,2000,5*0000\r\n\xff\r\n");
+        dialogue.handle_bytes(ms(2), b"D,2000,5*0000\r\n\xff\r\n");
         assert!(dialogue.take_sample().is_some() && dialogue.take_sample().is_none());
         assert_eq!(dialogue.garbled(), 3);
     }

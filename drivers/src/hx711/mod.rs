@@ -20,7 +20,7 @@ pub mod protocol;
 pub use dialogue::Hx711Dialogue;
 
 use crate::cell::CellDevice;
-use crate::devices::{DeviceKind, Role, find_line};
+use crate::devices::{DeviceKind, DeviceRole, find_line};
 use crate::rig_file::Fields;
 use palpate_model::units::Volts;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "hx711",
     title: "an HX711 board",
     introduction: "load cell on an HX711, ",
-    role: Role::Cell { read, emulation: None },
+    role: DeviceRole::Cell { read, emulation: None },
     recognise: |lines| {
         find_line(lines, |line| line.contains("palpate-hx711") || protocol::parse(line).is_some())
     },

@@ -53,7 +53,7 @@ impl CellDevice for Hx711Settings {
             description,
             dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
             raw: console.into_raw(),
-            farewell: Vec::new(),
+            closing_bytes: Vec::new(),
         })
     }
 }

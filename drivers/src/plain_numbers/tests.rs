@@ -23,7 +23,7 @@ fn numbers(keys: &str, decimals: u8) -> LineCell<PlainNumberReader> {
     };
     let mut line = LineCell::start(numbers, Nanos::ZERO);
     // Half of a line may be a number too.
-    line.received(Nanos::ZERO, b"99\r\n");
+    line.handle_bytes(Nanos::ZERO, b"99\r\n");
     assert_eq!((line.take_sample(), line.garbled()), (None, 0));
     line
 }
@@ -37,7 +37,7 @@ const COUNTS: &str = "unit = \"counts\"\nfull_scale = 8388607\n";
 #[test]
 fn plain_numbers_count_and_everything_else_is_garbled() {
     let mut line = numbers(COUNTS, 0);
-    line.received(Nanos(7), b"12345\r\n-6\n +7 \r\n0\r\n");
+    line.handle_bytes(Nanos(7), b"12345\r\n-6\n +7 \r\n0\r\n");
     assert_eq!(counts(&mut line), [12_345, -6, 7, 0]);
     assert_eq!(line.garbled(), 0);
     let wrong = [
@@ -58,7 +58,7 @@ fn plain_numbers_count_and_everything_else_is_garbled() {
         "12\u{7f}3",
     ];
     for wrong in wrong {
-        line.received(Nanos(8), format!("{wrong}\r\n").as_bytes());
+        line.handle_bytes(Nanos(8), format!("{wrong}\r\n").as_bytes());
         assert!(counts(&mut line).is_empty(), "{wrong}");
     }
     assert_eq!(line.garbled(), wrong.len() as u64);
@@ -69,7 +69,7 @@ fn plain_numbers_count_and_everything_else_is_garbled() {
 fn pieces_of_a_line_are_put_together() {
     let mut line = numbers(COUNTS, 0);
     for byte in b"-1234\r\n5\n" {
-        line.received(Nanos(1), &[*byte]);
+        line.handle_bytes(Nanos(1), &[*byte]);
     }
     assert_eq!(counts(&mut line), [-1234, 5]);
 }
@@ -85,7 +85,7 @@ fn units_become_volts() {
         ("unit = \"gF\"\nfull_scale = 2000\ndirection = \"tension\"\n", 0, "-1000", 9.806_65),
     ] {
         let mut line = numbers(keys, decimals);
-        line.received(Nanos(1), format!("{text}\r\n").as_bytes());
+        line.handle_bytes(Nanos(1), format!("{text}\r\n").as_bytes());
         let sample = line.take_sample().unwrap();
         assert!((sample.volts.0 - volts).abs() < 1e-12, "{keys}: {sample:?}");
         assert_eq!(sample.device_time, None);
@@ -97,18 +97,18 @@ fn times_of_the_board_neither_wrap_nor_go_back() {
     let keys = format!("{COUNTS}time_column = \"ms\"\n");
     let mut line = numbers(&keys, 0);
     let ms = Nanos::from_millis;
-    line.received(ms(10), b"4294967290,1\r\n");
-    line.received(ms(20), b"4, 2\r\n4,2\r\n");
+    line.handle_bytes(ms(10), b"4294967290,1\r\n");
+    line.handle_bytes(ms(20), b"4, 2\r\n4,2\r\n");
     let times = [(); 2].map(|()| line.take_sample().unwrap().device_time.unwrap());
     assert_eq!(times[1].since(times[0]), ms(10));
     assert_eq!((line.take_sample(), line.garbled()), (None, 1));
     assert_eq!(line.take_trouble(), None);
     for wrong in ["3", "+30,3", "-1,3", "30.5,3", "4294967296,3", ",3", "30,", "30,3,4"] {
-        line.received(ms(30), format!("{wrong}\r\n").as_bytes());
+        line.handle_bytes(ms(30), format!("{wrong}\r\n").as_bytes());
         assert_eq!(line.take_sample(), None, "{wrong}");
     }
     // It counts from the beginning: that is no wrap of 49 days.
-    line.received(ms(2_000), b"1,3\r\n");
+    line.handle_bytes(ms(2_000), b"1,3\r\n");
     assert!(line.take_trouble().unwrap().contains("restarted"));
     assert!(line.take_sample().unwrap().device_time.unwrap() > times[1]);
 }
@@ -117,14 +117,14 @@ fn times_of_the_board_neither_wrap_nor_go_back() {
 fn end_of_the_range_is_reported_once_and_silence_ends_it() {
     let mut line = numbers("unit = \"N\"\nfull_scale = 25\n", 2);
     let ms = Nanos::from_millis;
-    line.received(ms(1), b"24.99\r\n25.00\r\n-25.01\r\n1.00\r\n");
+    line.handle_bytes(ms(1), b"24.99\r\n25.00\r\n-25.01\r\n1.00\r\n");
     assert!(line.take_trouble().unwrap().contains("end of its range"));
     assert_eq!(line.take_trouble(), None);
-    line.received(ms(2), b"25.00\r\n");
+    line.handle_bytes(ms(2), b"25.00\r\n");
     assert!(line.take_trouble().is_some());
     assert_eq!(line.is_dead(ms(1_002)), None);
     // What is no number is no sign of life.
-    line.received(ms(1_002), b"?\r\n");
+    line.handle_bytes(ms(1_002), b"?\r\n");
     assert!(line.is_dead(ms(1_003)).unwrap().contains("no number"));
 }
 

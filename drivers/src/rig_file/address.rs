@@ -1,18 +1,18 @@
 //! The keys that say where a device is.
 
 use super::fields::Fields;
-use crate::wire::Place;
+use crate::wire::DeviceAddress;
 
 /// Reads `port`, `baud`, `handshake` and `address`, behind a table's name and a dot or nothing.
-pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
+pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<DeviceAddress> {
     let key = |name: &str| format!("{table}{name}");
     let port = fields.text(&key("port"));
     let address = fields.text(&key("address"));
-    let baud = fields.whole(&key("baud"), 300, 4_000_000);
+    let baud = fields.whole_number(&key("baud"), 300, 4_000_000);
     let has_handshake =
         fields.choice(&key("handshake"), &[("none", false), ("rts-cts", true)], Some(false));
     match (port, address) {
-        (Some(port), None) => Some(Place::Serial {
+        (Some(port), None) => Some(DeviceAddress::Serial {
             port,
             // The factory setting of Galil boards with an USB port, and what gclib opens them with (gclib.h, `--baud`);
             // that of Grbl 1.1 (doc/markdown/interface.md), of Mark-10 stands, and of the sketch for HX711 boards.
@@ -26,7 +26,7 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<Place> {
                     "a controller on a network has no baud rate; remove this",
                 );
             }
-            Some(Place::Tcp(address))
+            Some(DeviceAddress::Tcp(address))
         }
         (Some(_), Some(_)) => {
             fields.mistake(

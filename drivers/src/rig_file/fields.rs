@@ -16,7 +16,7 @@ pub struct Mistake {
 
 /// All mistakes of a file in one sentence each; `file` is what it is called.
 #[must_use]
-pub fn in_words(file: &str, mistakes: &[Mistake]) -> String {
+pub fn format_mistakes(file: &str, mistakes: &[Mistake]) -> String {
     let one = |mistake: &Mistake| match mistake.line {
         0 => format!("{file}: {}", mistake.message),
         line => format!("{file}, line {line}: {}", mistake.message),
@@ -139,7 +139,7 @@ impl Fields {
     }
 
     /// A whole number within bounds, if it is there.
-    pub fn whole(&mut self, key: &str, least: u64, most: u64) -> Option<u64> {
+    pub fn whole_number(&mut self, key: &str, least: u64, most: u64) -> Option<u64> {
         let (least, most) = (least as f64, most as f64);
         let hint = format!("give a whole number from {least} to {most}, without quotes");
         self.read_value(key, &hint, |value| match value {
@@ -152,9 +152,9 @@ impl Fields {
 
     /// Limits of the slide, for any controller.
     pub(super) fn limits(&mut self) -> Option<SlideLimits> {
-        let travel = self.needed("travel_mm", 1.0, 10_000.0);
-        let speed_max = self.needed("speed_max_mm_s", 1e-3, 1000.0);
-        let acceleration = self.needed("acceleration_mm_s2", 1e-3, 1e6);
+        let travel = self.required_number("travel_mm", 1.0, 10_000.0);
+        let speed_max = self.required_number("speed_max_mm_s", 1e-3, 1000.0);
+        let acceleration = self.required_number("acceleration_mm_s2", 1e-3, 1e6);
         // Less is below what a desktop computer's pauses leave at any speed; more is too deep for a force that is not
         // measured.
         let unseen = self.number("unseen_mm", 0.02, 0.5);
@@ -166,7 +166,7 @@ impl Fields {
         })
     }
 
-    pub fn needed(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
+    pub fn required_number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         if !self.all.iter().any(|field| field.key == key) {
             self.mistake(key, "is missing; add it to the file");
             return None;

@@ -3,8 +3,8 @@
 use super::RigFile;
 use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
-use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, Sampling};
-use crate::wire::Place;
+use crate::galil::{AnalogRange, GalilDevice, GalilSettings, MotorType, Sampling, SwitchLevel};
+use crate::wire::DeviceAddress;
 use palpate_model::units::Volts;
 
 pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
@@ -14,9 +14,9 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
 }
 
 /// Address and settings of the controller.
-pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, GalilSettings)> {
     let place = read_address(fields, "");
-    let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
+    let serial_number = fields.whole_number("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {
         [letter @ b'A'..=b'H'] => char::from(*letter),
@@ -25,13 +25,13 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             'A'
         }
     };
-    let input = fields.whole("input", 1, 8).unwrap_or(1);
-    let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
+    let input = fields.whole_number("input", 1, 8).unwrap_or(1);
+    let mm_per_pulse = fields.required_number("mm_per_pulse", 1e-6, 1.0);
     let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
     let limits = fields.limits();
     let motor_type = fields.choice("motor_type", &MOTOR_TYPES, Some(MotorType::ActiveLow));
-    let limit_switches = fields.choice("limit_switches", &LEVELS, Some(Levels::ActiveLow));
-    let home = fields.choice("home_switch", &LEVELS, Some(Levels::ActiveLow));
+    let limit_switches = fields.choice("limit_switches", &LEVELS, Some(SwitchLevel::ActiveLow));
+    let home = fields.choice("home_switch", &LEVELS, Some(SwitchLevel::ActiveLow));
     let range = fields.choice("range", &RANGES, Some(AnalogRange::Bipolar10));
     let bits = fields.choice("converter", &[("12 bit", 12), ("16 bit", 16)], None);
     let noise = fields.number("noise_v", 1e-9, 1.0);
@@ -39,7 +39,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let has_watchdog = fields.flag("watchdog").unwrap_or(true);
     let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
     // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
-    let sample_us = fields.whole("sample_us", 500, 1000);
+    let sample_us = fields.whole_number("sample_us", 500, 1000);
     let (mm_per_pulse, limits) = (mm_per_pulse?, limits?);
     // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
     if limits.acceleration.0 / mm_per_pulse < 1024.0 {
@@ -84,8 +84,8 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
 const MOTOR_TYPES: [(&str, MotorType); 2] =
     [("active-low", MotorType::ActiveLow), ("active-high", MotorType::ActiveHigh)];
 
-const LEVELS: [(&str, Levels); 2] =
-    [("active-low", Levels::ActiveLow), ("active-high", Levels::ActiveHigh)];
+const LEVELS: [(&str, SwitchLevel); 2] =
+    [("active-low", SwitchLevel::ActiveLow), ("active-high", SwitchLevel::ActiveHigh)];
 
 const RANGES: [(&str, AnalogRange); 4] = [
     ("-10..10 V", AnalogRange::Bipolar10),

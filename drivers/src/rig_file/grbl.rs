@@ -4,8 +4,8 @@ use super::RigFile;
 use super::address::read_address;
 use super::fields::{DIRECTIONS, Fields};
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
-use crate::parts::SplitRigDevices;
-use crate::wire::Place;
+use crate::split_rig::SplitRigDevices;
+use crate::wire::DeviceAddress;
 
 /// A rig with the board and the load cell beside it of a rig file.
 pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
@@ -21,12 +21,12 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(places, SplitRigDevices::new(axis, cell)))
 }
 
-pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
     let place = read_address(fields, "");
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
-    let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
+    let mm_per_pulse = fields.required_number("mm_per_pulse", 1e-6, 1.0);
     if mm_per_pulse.is_some_and(|mm| mm < MM_PER_STEP_MIN) {
         fields.mistake(
             "mm_per_pulse",

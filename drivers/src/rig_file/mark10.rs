@@ -5,19 +5,19 @@ use super::address::read_address;
 use super::fields::Fields;
 use crate::mark10::gauge::{FILTER_MAX, RATES};
 use crate::mark10::{GaugeSettings, StandDevice, StandSettings};
-use crate::wire::Place;
+use crate::wire::DeviceAddress;
 use palpate_model::units::Newtons;
 
 pub(crate) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
     let usual = GaugeSettings::default();
-    let capacity = fields.needed("cell.capacity_n", 1e-3, 1e6);
-    let per_second = fields.whole("cell.readings_per_second", 1, 250);
+    let capacity = fields.required_number("cell.capacity_n", 1e-3, 1e6);
+    let per_second = fields.whole_number("cell.readings_per_second", 1, 250);
     let per_second = per_second.map_or(usual.per_second, |rate| rate as u16);
     if !RATES.contains(&per_second) {
         let rates = RATES.map(|rate| rate.to_string()).join(", ");
         fields.mistake("cell.readings_per_second", &format!("give one of {rates}"));
     }
-    let filter = fields.whole("cell.filter", 0, u64::from(FILTER_MAX));
+    let filter = fields.whole_number("cell.filter", 0, u64::from(FILTER_MAX));
     let is_reversed =
         fields.choice("cell.direction", &[("compression", false), ("tension", true)], Some(false));
     let noise = fields.number("cell.noise_n", 1e-9, 1e3).map(Newtons);
@@ -38,7 +38,7 @@ pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(places, StandDevice { place, settings }))
 }
 
-pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, StandSettings)> {
     let place = read_address(fields, "");
     let limits = fields.limits();
     let is_upwards = fields.choice("direction", &[("down", false), ("up", true)], Some(false));

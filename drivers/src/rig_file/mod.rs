@@ -16,9 +16,9 @@ pub(crate) use mark10::{gauge, stand};
 
 use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, RigDevice};
-use crate::devices::{DEVICES, Role};
+use crate::devices::{DEVICES, DeviceRole};
 use crate::rig::Rig;
-use crate::wire::{HostClock, Place};
+use crate::wire::{DeviceAddress, HostClock};
 use std::fmt;
 use std::sync::Arc;
 use thiserror::Error;
@@ -28,12 +28,12 @@ pub const BYTES_MAX: usize = 64 * 1024;
 type Opener = dyn Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync;
 
 pub struct RigFile {
-    places: Vec<Place>,
+    places: Vec<DeviceAddress>,
     open: Box<Opener>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{}", fields::in_words(.file, .mistakes))]
+#[error("{}", fields::format_mistakes(.file, .mistakes))]
 pub struct RigFileError {
     pub file: String,
     /// What is wrong with it, in the order of its lines.
@@ -59,7 +59,10 @@ impl RigFile {
     }
 
     /// A rig whose devices are at these places, that of the axis first.
-    pub(crate) fn of(places: Vec<Place>, device: impl RigDevice + Clone + Sync + 'static) -> Self {
+    pub(crate) fn of(
+        places: Vec<DeviceAddress>,
+        device: impl RigDevice + Clone + Sync + 'static,
+    ) -> Self {
         let open = Box::new(move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
             Ok(Box::new(DeviceRig::open(device.clone(), clock.clone())?))
         });
@@ -67,7 +70,7 @@ impl RigFile {
     }
 
     /// Addresses of its devices, that of the axis first.
-    pub fn places(&self) -> &[Place] {
+    pub fn places(&self) -> &[DeviceAddress] {
         &self.places
     }
 
@@ -84,10 +87,10 @@ impl fmt::Debug for RigFile {
 }
 
 /// Address and settings of the load cell in the table `[cell]`.
-fn read_cell(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
+fn read_cell(fields: &mut Fields) -> Option<(DeviceAddress, Arc<dyn CellDevice>)> {
     let cells = DEVICES.iter().filter_map(|kind| match kind.role {
-        Role::Cell { read, .. } => Some((kind.word, read)),
-        Role::Axis(_) => None,
+        DeviceRole::Cell { read, .. } => Some((kind.word, read)),
+        DeviceRole::Axis(_) => None,
     });
     let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
     let place = address::read_address(fields, "cell.");
@@ -97,8 +100,8 @@ fn read_cell(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> {
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
     let axes = DEVICES.iter().filter_map(|kind| match kind.role {
-        Role::Axis(read) => Some((kind.word, read)),
-        Role::Cell { .. } => None,
+        DeviceRole::Axis(read) => Some((kind.word, read)),
+        DeviceRole::Cell { .. } => None,
     });
     let read = fields.choice("device", &axes.collect::<Vec<_>>(), None)?;
     let name = fields.text("name").unwrap_or_else(|| stem(file));

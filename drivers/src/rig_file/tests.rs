@@ -14,14 +14,14 @@ acceleration_mm_s2 = 61.44
 converter = "16 bit"
 "#;
 
-fn galil(file: &str, text: &str) -> (Place, GalilSettings) {
+fn galil(file: &str, text: &str) -> (DeviceAddress, GalilSettings) {
     assert_eq!(RigFile::parse(file, text).unwrap().places().len(), 1);
     let mut fields = Fields::read(text).unwrap();
     let name = fields.text("name").unwrap_or_else(|| stem(file));
     super::galil::read(name, &mut fields).unwrap()
 }
 
-fn grbl_settings(text: &str) -> (Place, GrblSettings) {
+fn grbl_settings(text: &str) -> (DeviceAddress, GrblSettings) {
     super::grbl::read("bench".into(), &mut Fields::read(text).unwrap()).unwrap()
 }
 
@@ -39,7 +39,7 @@ fn missing_keys_have_usual_values() {
     let (place, galil) = galil("rigs/bench 2.toml", THESIS);
     assert_eq!(
         place,
-        Place::Serial { port: "/dev/ttyUSB0".into(), baud: 115_200, has_handshake: false }
+        DeviceAddress::Serial { port: "/dev/ttyUSB0".into(), baud: 115_200, has_handshake: false }
     );
     assert_eq!(galil.name, "bench 2");
     assert_eq!((galil.axis, galil.input), ('A', 1));
@@ -69,7 +69,7 @@ sampling = "record"
 sample_us = 500
 "#;
     let (place, galil) = galil("x.toml", &text);
-    assert_eq!(place, Place::Tcp("10.0.0.5:23".into()));
+    assert_eq!(place, DeviceAddress::Tcp("10.0.0.5:23".into()));
     assert_eq!(galil.name, "left bench");
     assert_eq!((galil.axis, galil.input), ('C', 3));
     assert_eq!(galil.sign(), -1);

@@ -27,7 +27,7 @@ pub struct BenchForces {
 }
 
 #[derive(Clone, Debug)]
-pub struct Bench {
+pub struct SimBench {
     settings: SimSettings,
     specimen: Option<Tissue>,
     base: Position,
@@ -36,7 +36,7 @@ pub struct Bench {
     probe: Position,
 }
 
-impl Bench {
+impl SimBench {
     /// The bench as the rig is switched on, its own specimen clipped in and the probe far outside.
     pub fn new(settings: &SimSettings, probe: Position) -> Self {
         let specimen = Tissue::new(&mut Random::of_specimen(settings.seed, 0), settings);
@@ -69,7 +69,7 @@ impl Bench {
     }
 
     /// A person does something. A mass that is none, negative or not finite, changes nothing.
-    pub fn by_hand(&mut self, action: HandAction) {
+    pub fn apply_hand_action(&mut self, action: HandAction) {
         match action {
             HandAction::LoadCell { mass_g } if mass_g >= 0.0 && mass_g.is_finite() => {
                 self.weights = HandAction::weight(mass_g);

@@ -1,6 +1,6 @@
 //! When things happen: controller ticks on one side of the link, arrivals on the other.
 
-use super::random::{Cause, Random};
+use super::random::{Random, RandomStream};
 use palpate_model::Nanos;
 
 /// Time a command needs to reach the controller: some tens of characters on a fast link.
@@ -49,7 +49,7 @@ pub struct ReportLink {
 
 impl ReportLink {
     pub fn new(seed: u64) -> Self {
-        Self { random: Random::new(seed, Cause::Link), newest: None }
+        Self { random: Random::new(seed, RandomStream::Link), newest: None }
     }
 
     /// Arrival at the host of a report sent at `sent`, later than every arrival before it.

@@ -1,8 +1,8 @@
 //! The simulated load cell: force to volts, with the faults of the cell it stands for.
 
-use super::random::{Cause, Random};
+use super::random::{Random, RandomStream};
 use super::settings::{SimProfile, SimSettings};
-use palpate_model::calibration::{Calibration, Curve};
+use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::AdcDescription;
 use palpate_model::{Newtons, Seconds, Volts};
 
@@ -54,7 +54,7 @@ pub fn noise_expected(settings: &SimSettings) -> Volts {
 /// The cell, its amplifier and, in the lab, its converter.
 #[derive(Clone, Debug)]
 pub struct LoadCell {
-    curve: Curve,
+    curve: CalibrationCurve,
     noise: Random,
     error: CellError,
 }
@@ -73,7 +73,7 @@ impl LoadCell {
             .expect("the built-in tables rise from step to step, as the tests of this file show");
         let error = match settings.profile {
             SimProfile::Lab => {
-                let mut drift = Random::new(settings.seed, Cause::Drift);
+                let mut drift = Random::new(settings.seed, RandomStream::Drift);
                 let rate = drift.between(-DRIFT_RATE_MAX, DRIFT_RATE_MAX);
                 let step_minutes = WANDER_TICKS as f64 * tick.0 / 60.0;
                 CellError::Lab {
@@ -86,7 +86,7 @@ impl LoadCell {
             }
             SimProfile::Ideal => CellError::Ideal { noise: settings.noise.newtons() },
         };
-        Self { curve, noise: Random::new(settings.seed, Cause::Noise), error }
+        Self { curve, noise: Random::new(settings.seed, RandomStream::Noise), error }
     }
 
     /// The signal under a force at the next tick, as counts where there is a converter.

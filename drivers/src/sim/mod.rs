@@ -21,9 +21,9 @@ pub use amounts::{
     SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
     SimStiffness, SimThickness,
 };
-pub use bench::Bench;
+pub use bench::SimBench;
 pub use load_cell::{LoadCell, calibration, counts_from_volts, volts_from_counts};
-pub use random::{Cause, Random};
+pub use random::{Random, RandomStream};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;
 
@@ -48,13 +48,13 @@ const SPEED_MAX: MmPerS = MmPerS(20.0);
 const ACCELERATION: MmPerS2 = MmPerS2(4.0 * ACCELERATION_QUANTUM.0);
 /// Commands on their way; a controller's input buffer holds no more.
 const COMMANDS_MAX: usize = 64;
-/// Changes whenever equal settings no longer give equal events.
+/// CatalogChanges whenever equal settings no longer give equal events.
 const SIMULATOR_VERSION: u32 = 1;
 
 /// True values of a simulated rig, for demonstrations and tests. No decision of a run may
 /// use it: a rig on wires has no such thing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
+pub struct SimTruth {
     /// Tick the other values belong to.
     pub tick: u64,
     /// Tip of the probe, in mm from the edge of the home switch: where the rig gives way, not where the
@@ -72,7 +72,7 @@ pub struct Truth {
     pub force: Newtons,
 }
 
-impl Truth {
+impl SimTruth {
     /// The probe's position on the scale of the pulse counter, as a host sees it.
     pub fn position_counted(&self) -> Position {
         Position(self.position.distance_from(self.counter_zero))
@@ -92,7 +92,7 @@ pub struct SimRig {
     clock: TickClock,
     link: ReportLink,
     slider: Slider,
-    bench: Bench,
+    bench: SimBench,
     load_cell: LoadCell,
     sensors: Sensors,
     newest_tick: u64,
@@ -120,9 +120,9 @@ impl SimRig {
     pub fn named(name: &str, settings: SimSettings) -> Self {
         let description = describe(name, &settings);
         let tick = description.tick();
-        let mut machine = Random::new(settings.seed, Cause::Machine);
+        let mut machine = Random::new(settings.seed, RandomStream::Machine);
         let slider = Slider::new(&description, &mut machine);
-        let bench = Bench::new(&settings, slider.counter_zero());
+        let bench = SimBench::new(&settings, slider.counter_zero());
         // The controller was switched on up to a minute and a half before the host looked.
         let tick_count = machine.between(1.0, 1e5) as u64;
         Self {
@@ -149,9 +149,9 @@ impl SimRig {
         calibration(self.settings.profile)
     }
 
-    /// The true values at the tick of the newest event; see [`Truth`].
-    pub fn truth(&self) -> Truth {
-        Truth {
+    /// The true values at the tick of the newest event; see [`SimTruth`].
+    pub fn truth(&self) -> SimTruth {
+        SimTruth {
             tick: self.newest_tick,
             position: self.bench.probe(),
             surface: self.bench.surface(),
@@ -233,8 +233,8 @@ impl Rig for SimRig {
     }
 
     /// Acts at the next tick.
-    fn by_hand(&mut self, action: HandAction) {
-        self.bench.by_hand(action);
+    fn apply_hand_action(&mut self, action: HandAction) {
+        self.bench.apply_hand_action(action);
     }
 }
 

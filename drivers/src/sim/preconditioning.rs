@@ -77,7 +77,7 @@ impl SurfaceRecession {
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::{Cause, Random};
+    use super::super::random::{Random, RandomStream};
     use super::super::settings::SimSettings;
     use super::super::tissue::Tissue;
     use super::*;
@@ -105,7 +105,7 @@ mod tests {
                 preconditioning: percent.to_string().parse().unwrap(),
                 ..SimSettings::default()
             };
-            let tissue = Tissue::new(&mut Random::new(4, Cause::Tissue), &settings);
+            let tissue = Tissue::new(&mut Random::new(4, RandomStream::Tissue), &settings);
             let surface = tissue.surface();
             Self { tissue, surface }
         }
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn without_preconditioning_forces_stay_the_same_to_the_last_bit() {
         let mut with = Press::new(0);
-        let plain = Tissue::new(&mut Random::new(4, Cause::Tissue), &SimSettings::default());
+        let plain = Tissue::new(&mut Random::new(4, RandomStream::Tissue), &SimSettings::default());
         let mut without = Press { surface: plain.surface(), tissue: plain };
         for i in 0..20_000 {
             let x = 15.0 - 16.0 * (f64::from(i) * 1e-3).cos();

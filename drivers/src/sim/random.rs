@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use rand_pcg::Pcg64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cause {
+pub enum RandomStream {
     /// Where the slider stands at power-on, and the controller's count.
     Machine = 1,
     Tissue = 2,
@@ -22,7 +22,7 @@ pub struct Random(Pcg64);
 
 impl Random {
     /// The generator of `cause` under `seed`.
-    pub fn new(seed: u64, cause: Cause) -> Self {
+    pub fn new(seed: u64, cause: RandomStream) -> Self {
         let cause = cause as u64;
         let high = scramble(seed ^ scramble(cause));
         let low = scramble(high);
@@ -32,8 +32,8 @@ impl Random {
     /// The generator that draws the specimen with a number; number 0 is the rig's own.
     pub fn of_specimen(seed: u64, specimen: u64) -> Self {
         match specimen {
-            0 => Self::new(seed, Cause::Tissue),
-            _ => Self::new(seed ^ scramble(specimen), Cause::Tissue),
+            0 => Self::new(seed, RandomStream::Tissue),
+            _ => Self::new(seed ^ scramble(specimen), RandomStream::Tissue),
         }
     }
 
@@ -85,9 +85,13 @@ mod tests {
             let mut random = Random::new(seed, cause);
             (0..4000).map(|_| random.normal()).collect()
         };
-        let base = draw(7, Cause::Noise);
-        assert_eq!(base, draw(7, Cause::Noise));
-        for other in [draw(8, Cause::Noise), draw(7, Cause::Drift), draw(7, Cause::Link)] {
+        let base = draw(7, RandomStream::Noise);
+        assert_eq!(base, draw(7, RandomStream::Noise));
+        for other in [
+            draw(8, RandomStream::Noise),
+            draw(7, RandomStream::Drift),
+            draw(7, RandomStream::Link),
+        ] {
             let correlation: f64 =
                 base.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / base.len() as f64;
             // Five standard errors of 1 / sqrt(4000).

@@ -12,7 +12,8 @@ use super::random::Random;
 use crate::rig::axis_status;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{
-    Ack, AxisStatus, Course, Fault, MoveTo, Oscillation, Profile, RigCommand, RigDescription, Sine,
+    Ack, AxisStatus, Course, Fault, MotionProfile, MoveTo, Oscillation, RigCommand, RigDescription,
+    SinePath,
 };
 use palpate_model::{MmPerS, MmPerS2, Position, Seconds};
 
@@ -185,7 +186,7 @@ impl Slider {
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
         self.check_direction(target.distance_from(self.position))?;
         let made = MoveTo { target_pulses: wanted.target_pulses, speed, acceleration };
-        let profile = Profile::to_rest(self.position, target, speed, acceleration);
+        let profile = MotionProfile::to_rest(self.position, target, speed, acceleration);
         self.begin(tick, Course::Move(profile), wanted.target_pulses);
         Ok(made)
     }
@@ -202,7 +203,7 @@ impl Slider {
                 made.amplitude_pulses
             )));
         }
-        let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
+        let sine = SinePath::new(self.position, &made, self.mm_per_pulse, self.tick);
         sine.check(MmPerS(self.speed_max), made.acceleration).map_err(refusal)?;
         self.check_direction(made.amplitude_pulses as f64)?;
         self.begin(tick, Course::Sine(sine), start);

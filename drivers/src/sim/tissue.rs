@@ -141,7 +141,7 @@ impl Tissue {
 
 #[cfg(test)]
 mod tests {
-    use super::super::random::Cause;
+    use super::super::random::RandomStream;
     use super::*;
 
     fn specimen(seed: u64, percent: u8) -> Tissue {
@@ -149,7 +149,7 @@ mod tests {
             softening: percent.to_string().parse().unwrap(),
             ..SimSettings::default()
         };
-        Tissue::new(&mut Random::new(seed, Cause::Tissue), &settings)
+        Tissue::new(&mut Random::new(seed, RandomStream::Tissue), &settings)
     }
 
     /// Force at every millisecond on the way through depths in mm, at `speed` in mm/s.

@@ -1,7 +1,7 @@
 //! Question and answer, one at a time, while a device that speaks in lines is set up.
 
 use super::error::{DeviceError, describe_unknown_device};
-use super::lines::{Lines, Taken};
+use super::lines::{Lines, ReceivedLine};
 use crate::wire::{HostClock, Link, SetupConsole};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
@@ -13,7 +13,7 @@ const RECEIVED_MAX: usize = 512;
 
 /// A link to a device that speaks in lines, with nothing else going on.
 pub struct TextConsole<'a> {
-    console: SetupConsole<'a, Lines, Taken>,
+    console: SetupConsole<'a, Lines, ReceivedLine>,
     /// Its name in errors.
     device: &'static str,
 }
@@ -43,8 +43,8 @@ impl<'a> TextConsole<'a> {
         let until = self.now() + within;
         loop {
             match self.console.next(until).map_err(|err| self.link_error(&err))? {
-                Some((at, Taken::Line(line))) => return Ok(Some((at, line))),
-                Some((_, Taken::Garbled)) => {}
+                Some((at, ReceivedLine::Line(line))) => return Ok(Some((at, line))),
+                Some((_, ReceivedLine::Garbled)) => {}
                 None => return Ok(None),
             }
         }

@@ -4,7 +4,7 @@
 const LINE_MAX: usize = 160;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Taken {
+pub enum ReceivedLine {
     /// A line without its end; never empty.
     Line(String),
     /// A line too long, or with bytes that no text has.
@@ -19,7 +19,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    pub fn take(&mut self, byte: u8) -> Option<Taken> {
+    pub fn take(&mut self, byte: u8) -> Option<ReceivedLine> {
         match byte {
             b'\r' | b'\n' => self.end(),
             b' '..=b'~' if self.line.len() < LINE_MAX => {
@@ -42,13 +42,13 @@ impl Lines {
         *self = Self::default();
     }
 
-    fn end(&mut self) -> Option<Taken> {
+    fn end(&mut self) -> Option<ReceivedLine> {
         let line = std::mem::take(&mut self.line);
         if std::mem::take(&mut self.is_spoiled) {
-            return Some(Taken::Garbled);
+            return Some(ReceivedLine::Garbled);
         }
         // Only printable ASCII was taken in.
-        (!line.is_empty()).then(|| Taken::Line(String::from_utf8_lossy(&line).into_owned()))
+        (!line.is_empty()).then(|| ReceivedLine::Line(String::from_utf8_lossy(&line).into_owned()))
     }
 }
 
@@ -56,14 +56,14 @@ impl Lines {
 mod tests {
     use super::*;
 
-    fn all(bytes: &[u8]) -> Vec<Taken> {
+    fn all(bytes: &[u8]) -> Vec<ReceivedLine> {
         let mut lines = Lines::default();
         bytes.iter().filter_map(|byte| lines.take(*byte)).collect()
     }
 
     #[test]
     fn cr_or_lf_or_both_end_a_line() {
-        let two = [Taken::Line("4.285 N".into()), Taken::Line("*10".into())];
+        let two = [ReceivedLine::Line("4.285 N".into()), ReceivedLine::Line("*10".into())];
         for text in ["4.285 N\r\n*10\r\n", "4.285 N\r*10\r", "\n4.285 N\n\n*10\n"] {
             assert_eq!(all(text.as_bytes()), two, "{text:?}");
         }
@@ -72,8 +72,11 @@ mod tests {
     #[test]
     fn a_spoiled_line_is_one_garbled_line_and_the_next_is_whole() {
         let long = [vec![b'x'; 3 * LINE_MAX], b"\r\nok\r\n".to_vec()].concat();
-        assert_eq!(all(&long), [Taken::Garbled, Taken::Line("ok".into())]);
-        assert_eq!(all(b"1\xff2\r\n3\r\n"), [Taken::Garbled, Taken::Line("3".into())]);
+        assert_eq!(all(&long), [ReceivedLine::Garbled, ReceivedLine::Line("ok".into())]);
+        assert_eq!(
+            all(b"1\xff2\r\n3\r\n"),
+            [ReceivedLine::Garbled, ReceivedLine::Line("3".into())]
+        );
         assert!(all(b"half").is_empty());
     }
 }

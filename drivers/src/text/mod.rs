@@ -9,4 +9,4 @@ pub use crate::cell::OpenedCell;
 pub use console::TextConsole;
 pub use decimal::FixedDecimal;
 pub use error::DeviceError;
-pub use lines::{Lines, Taken};
+pub use lines::{Lines, ReceivedLine};

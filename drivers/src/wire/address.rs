@@ -13,14 +13,14 @@ use thiserror::Error;
 const CONNECT_MAX: Duration = Duration::from_secs(3);
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum DeviceAddress {
     /// A serial port, 8 data bits, no parity, one stop bit.
     Serial { port: String, baud: u32, has_handshake: bool },
     /// `HOST:PORT`.
     Tcp(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for DeviceAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Serial { port, baud, .. } => write!(f, "{port} at {baud} baud"),
@@ -49,7 +49,7 @@ pub enum WireError {
     Unreachable { address: String, detail: String },
 }
 
-impl Place {
+impl DeviceAddress {
     /// Opens it. Two programs cannot have one serial port.
     pub fn open(&self) -> Result<Box<dyn Link>, WireError> {
         match self {
@@ -90,7 +90,7 @@ fn port_error(port: &str, err: &serialport::Error) -> WireError {
         Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
         Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
         // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
-        // port"; on Windows a missing port has it too, with other words.
+        // port"; on WindowOpener a missing port has it too, with other words.
         Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
         Kind::NoDevice if !std::path::Path::new(&port).exists() => {
             WireError::Missing { port, present: port_list() }
@@ -116,7 +116,8 @@ mod tests {
     use super::*;
 
     fn serial(port: &str) -> WireError {
-        let place = Place::Serial { port: port.into(), baud: 115_200, has_handshake: false };
+        let place =
+            DeviceAddress::Serial { port: port.into(), baud: 115_200, has_handshake: false };
         let Err(err) = place.open() else {
             panic!("{port} was opened");
         };
@@ -140,7 +141,7 @@ mod tests {
     #[test]
     fn addresses_are_checked_before_connecting() {
         for wrong in ["", "localhost", "localhost:x", "127.0.0.1:99999"] {
-            let Err(err) = Place::Tcp(wrong.into()).open() else {
+            let Err(err) = DeviceAddress::Tcp(wrong.into()).open() else {
                 panic!("'{wrong}' was opened");
             };
             assert!(matches!(err, WireError::Address { .. }), "{err}");
@@ -153,7 +154,7 @@ mod tests {
         let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let address = free.local_addr().unwrap().to_string();
         drop(free);
-        let Err(err) = Place::Tcp(address.clone()).open() else {
+        let Err(err) = DeviceAddress::Tcp(address.clone()).open() else {
             panic!("a connection was accepted");
         };
         assert!(err.to_string().contains(&address), "{err}");

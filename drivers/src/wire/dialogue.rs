@@ -27,7 +27,7 @@ pub struct LinkStats {
     /// known before.
     pub deviation_max: Nanos,
     /// Samples that a device took and overwrote before they were fetched.
-    pub lost: u64,
+    pub samples_lost: u64,
     /// Count of resynchronisations of questions and answers.
     pub resynchronised: u64,
     /// Whether the system grants the link's thread real time, so that other programs do not make a stop late.
@@ -65,7 +65,7 @@ impl AnswerQueue {
         self.count
     }
 
-    /// Answers a command. Returns the answers that may be given now, in order: those with none missing before them.
+    /// PromptResponder a command. Returns the answers that may be given now, in order: those with none missing before them.
     fn answer(&mut self, number: u64, body: RigEventBody) -> Vec<RigEventBody> {
         if let Some((_, answer)) = self.owed.iter_mut().find(|(owed, _)| *owed == number) {
             *answer = Some(body);
@@ -86,7 +86,7 @@ impl AnswerQueue {
 /// A protocol in progress. Times never go backwards. It must neither wait nor read a clock.
 pub trait Dialogue: Send {
     /// The rig's owner has asked for reports. Without such calls the dialogue stops the axis.
-    fn attended(&mut self, at: Nanos);
+    fn note_attendance(&mut self, at: Nanos);
 
     /// A command from the host. Commands that stop are written before all that wait, and motions that wait are not
     /// begun. Whatever the order of writing, commands are acknowledged or refused in the order in which they came.
@@ -97,7 +97,7 @@ pub trait Dialogue: Send {
         self.command(now, command);
     }
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]);
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]);
 
     /// Whole lines to be written now, if there are any.
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>>;

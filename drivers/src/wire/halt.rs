@@ -84,7 +84,7 @@ pub(super) fn run_deferred_work() {
 }
 
 /// Does this now, or, on a thread that owns a link and panics, when the link's farewell has stopped what moves.
-pub fn after_farewell(work: impl FnOnce() + 'static) {
+pub fn run_after_link_stop(work: impl FnOnce() + 'static) {
     if OWNS_LINK.get() {
         DEFERRED.set(Some(Box::new(work)));
     } else {

@@ -55,7 +55,7 @@ pub type TcpLink = SocketLink<TcpStream>;
 pub type MemoryLink = SocketLink<UnixStream>;
 
 /// Both ends of a wire.
-pub fn pair() -> (MemoryLink, MemoryLink) {
+pub fn memory_link_pair() -> (MemoryLink, MemoryLink) {
     let (one, other) = UnixStream::pair().expect("the operating system has a pair of sockets");
     for end in [&one, &other] {
         end.set_nonblocking(true).expect("a new socket takes its settings");
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn bytes_of_one_end_arrive_at_the_other_until_it_is_unplugged() {
-        let (mut here, mut there) = pair();
+        let (mut here, mut there) = memory_link_pair();
         let mut buffer = [0_u8; 4];
         assert_eq!(there.read(&mut buffer, WAIT).unwrap(), 0);
         here.write(b"STA\r;").unwrap();
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn write_to_a_link_that_is_never_read_times_out() {
-        let (mut here, _there) = pair();
+        let (mut here, _there) = memory_link_pair();
         let result = here.write(&vec![b'x'; 1 << 24]);
         assert_eq!(result.unwrap_err().kind(), ErrorKind::TimedOut);
     }

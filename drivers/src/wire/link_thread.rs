@@ -5,10 +5,10 @@ use super::halt::{HaltHandle, StopCounters, mark_link_owner, run_deferred_work};
 use super::link::Link;
 use super::{HostClock, lock};
 use crate::device::OpenError;
-use crate::priority::{self, Granted};
+use crate::priority::{self, GrantedPriority};
 use crate::rig::{RigEvent, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, Fault, RawBytes, RigCommand};
+use palpate_model::rig::{Fault, RawBytes, RigCommand, SampleAge};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -119,7 +119,8 @@ impl LinkThread {
                 mark_link_owner();
                 let _in = tracing::info_span!("device", name = &*owner.device).entered();
                 tracing::info!("connected");
-                owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
+                owner.is_real_time =
+                    matches!(priority::request_real_time(), GrantedPriority::RealTime(_));
                 owner.run(&closing);
             })
             .map_err(|err| OpenError::Thread(err.to_string()))?;
@@ -294,7 +295,7 @@ impl<D: Dialogue> LinkOwner<D> {
         let now = (self.clock)();
         if count > 0 {
             self.tap(now, false, buffer[..count].to_vec());
-            self.dialogue.received(now, &buffer[..count]);
+            self.dialogue.handle_bytes(now, &buffer[..count]);
         }
         while let Some((at, mut body)) = self.dialogue.take_event() {
             if let RigEventBody::Reading(reading) = &mut body {
@@ -307,8 +308,8 @@ impl<D: Dialogue> LinkOwner<D> {
     }
 
     /// Age of a sample of the device at a time of the host.
-    fn age(&self, at: Nanos, tick: u64) -> Option<Age> {
-        Some(Age {
+    fn age(&self, at: Nanos, tick: u64) -> Option<SampleAge> {
+        Some(SampleAge {
             by: at.since(self.dialogue.host_time(tick)?),
             within: self.dialogue.uncertainty(at)?,
         })
@@ -349,7 +350,7 @@ impl<D: Dialogue> LinkOwner<D> {
         };
         reports.stats = LinkStats { is_real_time: self.is_real_time, ..self.dialogue.stats() };
         if std::mem::take(&mut reports.is_attended) {
-            self.dialogue.attended((self.clock)());
+            self.dialogue.note_attendance((self.clock)());
         }
         let has_events = !self.events.is_empty();
         reports.take(&mut self.events, &mut self.raw);

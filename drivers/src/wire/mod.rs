@@ -10,11 +10,11 @@ mod link;
 mod link_thread;
 mod setup_console;
 
-pub use address::{Place, WireError};
+pub use address::{DeviceAddress, WireError};
 pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
 pub use dialogue::{AnswerQueue, Dialogue, LinkStats};
-pub use halt::{HaltHandle, after_farewell};
-pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, pair};
+pub use halt::{HaltHandle, run_after_link_stop};
+pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, memory_link_pair};
 pub use link_thread::LinkThread;
 pub use setup_console::SetupConsole;
 

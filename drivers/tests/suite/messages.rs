@@ -23,7 +23,7 @@ fn messages_of_rigs_and_ports_name_what_is_wrong() {
     assert_messages! {
         RigError::Unknown { name: "robot".into() } => ["'robot'"],
         RigError::File { file: file(), detail: detail() } => ["bench.toml", "no such device"],
-        RigError::NotAgain => ["again"],
+        RigError::CannotReconnect => ["again"],
         RigError::Device { file: file(), error: thread } => ["bench.toml", "no memory"],
         WireError::Missing { port: port(), present: "none".into() } => ["/dev/ttyUSB0", "none"],
         WireError::Busy { port: port() } => ["/dev/ttyUSB0"],

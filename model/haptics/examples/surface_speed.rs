@@ -16,7 +16,8 @@
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Side, Surface,
+    ContactSide, Cut, Grid, GridNode, HeightField, Surface, SurfaceContact, SurfaceMethod,
+    SurfaceRecovery,
 };
 use palpate_model::Seconds;
 use palpate_test_support::naive_surface as naive;
@@ -25,7 +26,7 @@ use std::time::Instant;
 
 /// A tick at 1 kHz.
 const TICK: f64 = 1e-3;
-/// Relaxation time of the thesis body in s.
+/// StressRelaxation time of the thesis body in s.
 const TAU: f64 = 1.023;
 /// Of neighbours, in mm.
 const SHEAR: f64 = 0.05;
@@ -51,10 +52,10 @@ impl Case {
     }
 
     /// Where the tool is at a tick.
-    fn tool(self, n: usize, tick: usize) -> (Node, f64) {
+    fn tool(self, n: usize, tick: usize) -> (GridNode, f64) {
         let middle = (n / 2) as f64;
         let depth = SHEAR * middle;
-        let node = |column: f64, row: f64| Node { column: column as u16, row: row as u16 };
+        let node = |column: f64, row: f64| GridNode { column: column as u16, row: row as u16 };
         match self {
             Self::Lasting => (node(middle, middle), -depth),
             Self::Whole => (node(middle, middle), -2.0 * depth),
@@ -84,17 +85,17 @@ fn line(name: &str, times: &mut [f64], nodes_per_tick: f64) -> f64 {
     rate
 }
 
-fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
+fn measure(n: usize, case: Case, method: SurfaceMethod, ticks: usize) -> f64 {
     let grid = Grid::new(n, n, 0.5).expect("a grid");
     let field = HeightField::flat(grid, SHEAR).expect("a field");
-    let recovery = Recovery::new(Seconds(TAU), Seconds(TICK)).expect("a recovery");
+    let recovery = SurfaceRecovery::new(Seconds(TAU), Seconds(TICK)).expect("a recovery");
     let mut surface = Surface::new(field, method, recovery, Cut::NONE);
     let mut times = Vec::with_capacity(ticks);
     let mut moved = 0;
     // The first tenth is not counted: memory comes to the cache, and the trail of the tool appears.
     for tick in 0..ticks + ticks / 10 {
         let (node, z) = case.tool(n, tick);
-        let contact = [Contact::at(&grid, node, z, Side::Push)];
+        let contact = [SurfaceContact::at(&grid, node, z, ContactSide::Push)];
         let start = Instant::now();
         let report = black_box(surface.tick(black_box(&contact)));
         let taken = start.elapsed().as_secs_f64();
@@ -118,7 +119,7 @@ fn measure_naive(n: usize, case: Case, ticks: usize) -> f64 {
         for (now, rest) in now.iter_mut().zip(&rest) {
             *now = rest + (*now - rest) * keep;
         }
-        moved += naive::push(&mut now, n, |_, _| SHEAR, (seed, z), naive::Order::First);
+        moved += naive::push(&mut now, n, |_, _| SHEAR, (seed, z), naive::PassOrder::First);
         chain.push(start.elapsed().as_secs_f64() * 1e6);
     }
     black_box(&now);
@@ -161,12 +162,12 @@ fn main() {
             );
             let few = if n > 500 { ticks / 10 } else { ticks };
             if is_fast {
-                measure(n, case, Method::Envelope, ticks);
+                measure(n, case, SurfaceMethod::Envelope, ticks);
                 continue;
             }
             let naive = measure_naive(n, case, (few / NAIVE_SHARE).max(5));
-            for method in Method::ALL {
-                let ticks = if method == Method::Envelope { ticks } else { few };
+            for method in SurfaceMethod::ALL {
+                let ticks = if method == SurfaceMethod::Envelope { ticks } else { few };
                 let rate = measure(n, case, method, ticks.max(10));
                 println!("    {:.0} times naive", rate / naive);
             }

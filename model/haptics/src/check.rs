@@ -6,7 +6,7 @@
 use super::Period;
 use super::calibrate::BiasPoint;
 use super::master_slave::MasterSlaveError;
-use super::rig::{Hand, HandPath};
+use super::rig::{HandPath, SimulatedHand};
 use super::setting_error::{SettingError, SettingRange};
 use super::simulation::{Simulation, SimulationSettings};
 use super::torque::{DriveKind, TorqueSettings};
@@ -15,7 +15,7 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use thiserror::Error;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CheckSettings {
+pub struct FeedbackCheckSettings {
     pub body: ModifiedKelvin,
     pub period: Period,
     /// Speed of the second slider.
@@ -29,7 +29,7 @@ pub struct CheckSettings {
     pub samples_hz: f64,
 }
 
-impl CheckSettings {
+impl FeedbackCheckSettings {
     /// As the source did it: 0.75 mm/s to 30 mm and 50 s, on a voltage drive without compensation.
     #[must_use]
     pub fn source(body: ModifiedKelvin) -> Self {
@@ -59,7 +59,7 @@ pub enum FeedbackCheckError {
 /// Longest check in s: a day.
 const LONGEST_S: f64 = 86_400.0;
 
-impl CheckSettings {
+impl FeedbackCheckSettings {
     /// The master's motor and what drives it.
     pub fn torque(&self) -> TorqueSettings {
         TorqueSettings {
@@ -70,7 +70,7 @@ impl CheckSettings {
     }
 
     /// When the slider is at its end and begins to hold.
-    pub fn ramp(&self) -> Seconds {
+    pub fn ramp_end(&self) -> Seconds {
         Seconds(self.depth.0 / self.speed.0)
     }
 
@@ -84,7 +84,7 @@ impl CheckSettings {
         ];
         SettingRange::Positive.check(CHECK, &positive)?;
         SettingRange::MayBeInfinite.check(CHECK, &[("hold", self.hold.0, " s")])?;
-        let seconds = self.ramp().0 + self.hold.0;
+        let seconds = self.ramp_end().0 + self.hold.0;
         SettingRange::UpTo(LONGEST_S).check(CHECK, &[("duration", seconds, " s")])?;
         Ok(seconds)
     }
@@ -92,7 +92,7 @@ impl CheckSettings {
 
 /// One sample of a check.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CheckSample {
+pub struct FeedbackCheckSample {
     /// Time since the slider began.
     pub t: Seconds,
     /// Depth of the slave.
@@ -106,14 +106,14 @@ pub struct CheckSample {
 }
 
 /// A slider as a hand: so stiff that 10 N give way by 0.1 mm, damped to a tenth over the mass it is and moves.
-fn slider(path: HandPath) -> Hand {
-    Hand { mass_kg: 0.5, stiffness: 100.0, damping: 0.2, path }
+fn slider(path: HandPath) -> SimulatedHand {
+    SimulatedHand { mass_kg: 0.5, stiffness: 100.0, damping: 0.2, path }
 }
 
 /// Runs a check on the simulated master and gives each sample to `seen`, in order; `progress` hears the share done.
 pub fn check(
-    settings: &CheckSettings,
-    mut seen: impl FnMut(&CheckSample),
+    settings: &FeedbackCheckSettings,
+    mut seen: impl FnMut(&FeedbackCheckSample),
     mut progress: impl FnMut(f64),
 ) -> Result<(), FeedbackCheckError> {
     let seconds = settings.seconds()?;
@@ -129,7 +129,7 @@ pub fn check(
         let one = simulation.tick();
         sum += one.hand.0;
         if tick % apart == 0 {
-            seen(&CheckSample {
+            seen(&FeedbackCheckSample {
                 t: one.t,
                 depth: one.snapshot.depth,
                 commanded: one.snapshot.force,
@@ -148,7 +148,7 @@ pub fn check(
 /// tissue relaxes, with the rack at rest. At rest friction holds either way, so that the hold tells nothing of it and
 /// is left out; `until` is the end of the ramp.
 #[must_use]
-pub fn calibration_points(samples: &[CheckSample], until: Seconds) -> Vec<BiasPoint> {
+pub fn calibration_points(samples: &[FeedbackCheckSample], until: Seconds) -> Vec<BiasPoint> {
     let ramp = samples.iter().filter(|one| one.t <= until);
     ramp.map(|one| BiasPoint { bias: one.bias, force: one.measured, is_rising: true }).collect()
 }

@@ -5,7 +5,7 @@
 //! [`HapticPlant::sense`] and [`HapticPlant::tick`] in turn; [`MasterSlave`](super::MasterSlave) is one.
 
 use super::rig::{
-    DriveInput, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackForces, ThermalState,
+    DriveInput, HandPath, Motor, MotorState, Pinion, Rack, RackForces, SimulatedHand, ThermalState,
 };
 use super::{DELAY_MAX, Period};
 use palpate_model::units::{MmPerS, Newtons};
@@ -28,7 +28,7 @@ pub struct PlantSettings {
     pub delay: usize,
     /// The motor on its pinion; `None` for a source of force without faults.
     pub motor: Option<(Motor, Pinion)>,
-    pub hand: Hand,
+    pub hand: SimulatedHand,
     /// Place at the start, in mm.
     pub x: f64,
     /// Speed at the start, in mm/s.
@@ -51,7 +51,7 @@ impl PlantSettings {
             count_mm: 0.0,
             delay: 0,
             motor: None,
-            hand: Hand::NONE,
+            hand: SimulatedHand::NONE,
             x: 0.0,
             v: 0.0,
             held: Newtons(0.0),

@@ -1,6 +1,6 @@
 //! The trait every haptic device implements, simulated or real: where its stylus is, and a force on the hand.
 
-use crate::scene::{DeviceSettings, Hand6, Pose};
+use crate::scene::{DeviceSettings, HandPose, Pose};
 use std::fmt::Debug;
 
 /// A haptic device with a stylus that is sensed in six axes and pushed along three.
@@ -20,7 +20,7 @@ pub trait HapticDevice: Debug + Send {
 
     /// The hand that led a simulated device to where it was sensed last: a recording of hands computes the device again, too. A
     /// real device has none, and its places are recorded.
-    fn hand(&self) -> Option<Hand6> {
+    fn hand(&self) -> Option<HandPose> {
         None
     }
 }

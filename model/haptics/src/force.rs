@@ -4,8 +4,9 @@ use super::{Flags, Period, SettingError, SettingRange};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_rheology::families::{POWER_MAX, StepError};
 use palpate_rheology::integrators::{
-    Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
-    IntegratorError, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
+    ExactIntegrator, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler,
+    Integrator, IntegratorError, IntegratorStart, RuleIntegrator, RungeKutta, Scheme, SeriesBody,
+    Trapezoid,
 };
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -88,13 +89,13 @@ pub struct ForceLaw {
 /// A scheme with its state, in double precision.
 #[derive(Clone, Copy, Debug)]
 enum Stepper {
-    ExplicitEuler(Stepped<f64, N, ExplicitEuler>),
-    ImplicitEuler(Stepped<f64, N, ImplicitEuler>),
-    Trapezoid(Stepped<f64, N, Trapezoid>),
-    ExponentialLeft(Stepped<f64, N, ExponentialLeft>),
-    ExponentialFirstOrder(Stepped<f64, N, ExponentialFirstOrder>),
-    Exact(Exact<f64, N>),
-    RungeKutta(Stepped<f64, N, RungeKutta>),
+    ExplicitEuler(RuleIntegrator<f64, N, ExplicitEuler>),
+    ImplicitEuler(RuleIntegrator<f64, N, ImplicitEuler>),
+    Trapezoid(RuleIntegrator<f64, N, Trapezoid>),
+    ExponentialLeft(RuleIntegrator<f64, N, ExponentialLeft>),
+    ExponentialFirstOrder(RuleIntegrator<f64, N, ExponentialFirstOrder>),
+    Exact(ExactIntegrator<f64, N>),
+    RungeKutta(RuleIntegrator<f64, N, RungeKutta>),
     /// No relaxation time: the force is the forcing.
     Instant {
         body: SeriesBody<N>,
@@ -114,17 +115,23 @@ impl Stepper {
             return Ok(Self::Instant { body: *body, dt, depth });
         }
         scheme.check(body, dt)?;
-        let start = Start { depth, force: None };
+        let start = IntegratorStart { depth, force: None };
         Ok(match scheme {
-            Scheme::ExplicitEuler => Self::ExplicitEuler(Stepped::at_any_step(body, dt, start)),
-            Scheme::ImplicitEuler => Self::ImplicitEuler(Stepped::at_any_step(body, dt, start)),
-            Scheme::Trapezoid => Self::Trapezoid(Stepped::at_any_step(body, dt, start)),
-            Scheme::ExponentialLeft => Self::ExponentialLeft(Stepped::at_any_step(body, dt, start)),
-            Scheme::ExponentialFirstOrder => {
-                Self::ExponentialFirstOrder(Stepped::at_any_step(body, dt, start))
+            Scheme::ExplicitEuler => {
+                Self::ExplicitEuler(RuleIntegrator::at_any_step(body, dt, start))
             }
-            Scheme::Exact => Self::Exact(Exact::at_any_step(body, dt, start)),
-            Scheme::RungeKutta => Self::RungeKutta(Stepped::at_any_step(body, dt, start)),
+            Scheme::ImplicitEuler => {
+                Self::ImplicitEuler(RuleIntegrator::at_any_step(body, dt, start))
+            }
+            Scheme::Trapezoid => Self::Trapezoid(RuleIntegrator::at_any_step(body, dt, start)),
+            Scheme::ExponentialLeft => {
+                Self::ExponentialLeft(RuleIntegrator::at_any_step(body, dt, start))
+            }
+            Scheme::ExponentialFirstOrder => {
+                Self::ExponentialFirstOrder(RuleIntegrator::at_any_step(body, dt, start))
+            }
+            Scheme::Exact => Self::Exact(ExactIntegrator::at_any_step(body, dt, start)),
+            Scheme::RungeKutta => Self::RungeKutta(RuleIntegrator::at_any_step(body, dt, start)),
         })
     }
 

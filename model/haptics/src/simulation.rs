@@ -6,7 +6,7 @@ use super::master_slave::{
     MasterSlave, MasterSlaveError, MasterSlaveInput, MasterSlaveOutput, MasterSlaveSettings,
     MasterSlaveSnapshot,
 };
-use super::rig::Hand;
+use super::rig::SimulatedHand;
 use super::torque::TorqueSettings;
 use super::{GuardSettings, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -23,7 +23,7 @@ pub struct SimulationSettings {
 impl SimulationSettings {
     /// The source's system on the source's rack, with a hand; the specimen is the body that is rendered.
     #[must_use]
-    pub fn of(body: ModifiedKelvin, period: Period, hand: Hand) -> Self {
+    pub fn of(body: ModifiedKelvin, period: Period, hand: SimulatedHand) -> Self {
         let system = MasterSlaveSettings::of(LawSettings::of::<3>(body, period));
         let torque = &system.torque;
         let friction = torque.friction().0;
@@ -146,7 +146,7 @@ impl Simulation {
     }
 
     /// A tick in which the loop is away: the drive holds, the hand goes on.
-    pub fn stalled(&mut self) -> SimulationTick {
+    pub fn tick_stalled(&mut self) -> SimulationTick {
         self.away += 1;
         let depth = self.system.snapshot().depth;
         self.cell = self.specimen.tick(depth).force;

@@ -67,7 +67,7 @@ fn main() {
         }
     });
     println!("{ns:>8.2}  any step, the thesis body");
-    let model = families::by_key("series-3").map(|family| {
+    let model = families::find_family("series-3").map(|family| {
         family.model(&[body.tau_eps], &[body.mu[0], body.mu[1], body.mu[2], body.tau_sig])
     });
     if let Ok(Ok(model)) = model

@@ -9,6 +9,6 @@ use pulp::Arch;
 
 /// Runs `work` compiled for the widest vectors at hand; all it calls must be `#[inline(always)]`.
 #[inline(always)]
-pub fn wide<R>(work: impl FnOnce() -> R) -> R {
+pub fn run_wide<R>(work: impl FnOnce() -> R) -> R {
     Arch::new().dispatch(work)
 }

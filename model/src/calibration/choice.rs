@@ -5,7 +5,7 @@
 //! first and the last weight are left out as well, but there the curve is only continued straight: that
 //! error is reported separately and does not count.
 
-use super::curve::Curve;
+use super::curve::CalibrationCurve;
 use super::document::CalibrationPoint;
 use super::kind::CurveKind;
 use super::quality::{TaredCurve, rms};
@@ -18,7 +18,7 @@ const DEGREES: std::ops::RangeInclusive<usize> = 1..=super::curve::DEGREE_MAX;
 
 /// One kind of curve and what it misses.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Candidate {
+pub struct CurveCandidate {
     pub curve: CurveKind,
     pub name: String,
     /// Root mean square error in N of the forces read for weights left out between the ends.
@@ -53,7 +53,7 @@ impl Recipe {
         &self,
         points: &[CalibrationPoint],
         index: usize,
-    ) -> Option<(Curve, Vec<CalibrationPoint>)> {
+    ) -> Option<(CalibrationCurve, Vec<CalibrationPoint>)> {
         let mut others = points.to_vec();
         others.remove(index);
         let curve = self.kind(&others)?.through(&others).ok()?;
@@ -76,7 +76,7 @@ impl Recipe {
 ///
 /// With fewer than four weights nothing can be compared, and the monotone curve stands alone.
 #[must_use]
-pub fn candidates(points: &[CalibrationPoint]) -> Vec<Candidate> {
+pub fn curve_candidates(points: &[CalibrationPoint]) -> Vec<CurveCandidate> {
     let mut recipes = vec![Recipe::Fixed(CurveKind::Monotone)];
     if points.len() >= 4 {
         let all = points.len() - 1;
@@ -87,10 +87,10 @@ pub fn candidates(points: &[CalibrationPoint]) -> Vec<Candidate> {
         recipes.extend(DEGREES.map(|degree| Recipe::Fixed(CurveKind::Polynomial { degree })));
     }
     let judged = recipes.iter().filter_map(|recipe| judge(recipe, points));
-    let mut candidates: Vec<Candidate> = judged.collect();
-    let score = |one: &Candidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
+    let mut candidates: Vec<CurveCandidate> = judged.collect();
+    let score = |one: &CurveCandidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
     candidates.sort_by(|a, b| {
-        let unusable = |one: &Candidate| one.refused.is_some();
+        let unusable = |one: &CurveCandidate| one.refused.is_some();
         let order = unusable(a).cmp(&unusable(b));
         order.then(score(a).total_cmp(&score(b)))
     });
@@ -99,16 +99,20 @@ pub fn candidates(points: &[CalibrationPoint]) -> Vec<Candidate> {
 
 /// Errors of a given kind of curve at these points.
 #[must_use]
-pub fn judge_kind(kind: &CurveKind, points: &[CalibrationPoint]) -> Option<Candidate> {
+pub fn assess_curve_kind(kind: &CurveKind, points: &[CalibrationPoint]) -> Option<CurveCandidate> {
     judge_as(kind.clone(), &Recipe::of(kind), points)
 }
 
-fn judge(recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
+fn judge(recipe: &Recipe, points: &[CalibrationPoint]) -> Option<CurveCandidate> {
     judge_as(recipe.kind(points)?, recipe, points)
 }
 
-fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[CalibrationPoint]) -> Option<Candidate> {
-    let mut candidate = Candidate {
+fn judge_as(
+    kind: CurveKind,
+    recipe: &Recipe,
+    points: &[CalibrationPoint],
+) -> Option<CurveCandidate> {
+    let mut candidate = CurveCandidate {
         name: kind.to_string(),
         curve: kind,
         left_out_rms_n: None,

@@ -75,9 +75,9 @@ impl Piece {
 /// Volts as a strictly increasing function of newtons, with its exact inverse.
 ///
 /// Beyond the first and the last weight step the curve continues straight with its end slope;
-/// [`Curve::is_extrapolated`] says when a force lies there.
+/// [`CalibrationCurve::is_extrapolated`] says when a force lies there.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Curve {
+pub struct CalibrationCurve {
     pieces: Vec<Piece>,
     slope_first: f64,
     slope_last: f64,
@@ -85,7 +85,7 @@ pub struct Curve {
     volts_last: f64,
 }
 
-impl Curve {
+impl CalibrationCurve {
     /// The curve through points (N, V); the caller has checked that there are two or more, all
     /// finite and strictly increasing in both coordinates.
     pub(super) fn through(points: &[(f64, f64)]) -> Self {
@@ -184,7 +184,7 @@ impl Curve {
         })
     }
 
-    /// The force in N at a signal in V: the exact inverse of [`Curve::volts_from_newtons`].
+    /// The force in N at a signal in V: the exact inverse of [`CalibrationCurve::volts_from_newtons`].
     pub fn newtons_from_volts(&self, signal: Volts) -> Newtons {
         let first = &self.pieces[0];
         let volts = signal.0;
@@ -201,7 +201,7 @@ impl Curve {
 
     /// The force in N above the unloaded cell, whose signal the tare found: the curve is moved along the
     /// signal so that it passes through zero there. Without a tare, above the calibration's own zero.
-    pub fn newtons_above(&self, signal: Volts, tare: Option<Volts>) -> Newtons {
+    pub fn newtons_above_tare(&self, signal: Volts, tare: Option<Volts>) -> Newtons {
         let zero = self.volts_from_newtons(Newtons(0.0));
         let shift = tare.map_or(0.0, |tare| tare.0 - zero.0);
         self.newtons_from_volts(Volts(signal.0 - shift))
@@ -266,7 +266,7 @@ mod tests {
     use super::super::Calibration;
     use super::*;
 
-    fn thesis() -> Curve {
+    fn thesis() -> CalibrationCurve {
         Calibration::thesis().curve().unwrap()
     }
 
@@ -347,14 +347,14 @@ mod tests {
     #[test]
     fn segments_are_straight_and_a_polynomial_finds_itself_or_is_refused() {
         let points = [(0.0, 1.0), (1.0, 1.5), (3.0, 1.6), (4.0, 3.0)];
-        let curve = Curve::straight(&points);
+        let curve = CalibrationCurve::straight(&points);
         assert!((curve.volts_from_newtons(Newtons(2.0)).0 - 1.55).abs() < 1e-15);
         assert!((curve.newtons_from_volts(Volts(2.3)).0 - 3.5).abs() < 1e-14);
         assert!((curve.sensitivity_at(Newtons(5.0)) - 1.4).abs() < 1e-15);
         let quintic = |f: f64| 1.0 + 0.3 * f + 0.02 * f * f + 1e-4 * f.powi(5);
         let points: Vec<(f64, f64)> =
             (0..9).map(|i| (f64::from(i), quintic(f64::from(i)))).collect();
-        let curve = Curve::polynomial(&points, 5).unwrap();
+        let curve = CalibrationCurve::polynomial(&points, 5).unwrap();
         for newtons in [0.0, 0.7, 3.3, 7.9] {
             let volts = curve.volts_from_newtons(Newtons(newtons));
             assert!((volts.0 - quintic(newtons)).abs() < 1e-12, "{newtons}");
@@ -362,15 +362,15 @@ mod tests {
         }
         // A hump between the ends, and fewer points than coefficients.
         let hump = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.5), (3.0, 1.5)];
-        assert_eq!(Curve::polynomial(&hump, 3), None);
-        assert_eq!(Curve::polynomial(&hump, 4), None);
-        assert!(Curve::polynomial(&hump, 1).is_some());
+        assert_eq!(CalibrationCurve::polynomial(&hump, 3), None);
+        assert_eq!(CalibrationCurve::polynomial(&hump, 4), None);
+        assert!(CalibrationCurve::polynomial(&hump, 1).is_some());
     }
 
     #[test]
     fn a_kinked_end_still_inverts() {
         // A steep second interval would ask for a falling end slope.
-        let curve = Curve::through(&[(0.0, 0.0), (1.0, 0.01), (2.0, 5.0)]);
+        let curve = CalibrationCurve::through(&[(0.0, 0.0), (1.0, 0.01), (2.0, 5.0)]);
         let volts = curve.volts_from_newtons(Newtons(-2.0));
         assert!((curve.newtons_from_volts(volts).0 + 2.0).abs() < 1e-12);
     }

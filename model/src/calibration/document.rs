@@ -1,7 +1,7 @@
 //! The document of a calibration: what lay on the load cell, what it read, and what else a reader of a
 //! force must know. It is never edited, only superseded.
 
-use super::curve::Curve;
+use super::curve::CalibrationCurve;
 use super::error::CalibrationError;
 use super::kind::CurveKind;
 use super::weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};
@@ -40,7 +40,7 @@ crate::named! {
 
 /// One way up or down.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Series {
+pub struct CalibrationSeries {
     pub direction: Direction,
     /// Which repeat, counted from 1.
     pub repeat: u32,
@@ -100,7 +100,7 @@ pub struct Calibration {
     pub weights: Vec<NamedWeight>,
     /// Every way up and down, in the order taken.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub series: Vec<Series>,
+    pub series: Vec<CalibrationSeries>,
     /// Signal of the empty cell before the first series.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zero_before: Option<Volts>,
@@ -220,7 +220,7 @@ impl Calibration {
     }
 
     /// The curve through the points, or what prevents one.
-    pub fn curve(&self) -> Result<Curve, CalibrationError> {
+    pub fn curve(&self) -> Result<CalibrationCurve, CalibrationError> {
         self.curve.through(&self.points()?)
     }
 
@@ -310,7 +310,7 @@ impl Calibration {
     }
 
     /// Every step of every series, in the order taken.
-    pub fn series_steps(&self) -> impl Iterator<Item = (&Series, &SeriesStep)> {
+    pub fn series_steps(&self) -> impl Iterator<Item = (&CalibrationSeries, &SeriesStep)> {
         self.series.iter().flat_map(|series| series.steps.iter().map(move |step| (series, step)))
     }
 
@@ -355,7 +355,7 @@ impl Calibration {
 
     /// The kind of curve that predicts weights left out best.
     pub fn best_curve(&self) -> Result<CurveKind, CalibrationError> {
-        let found = super::candidates(&self.points()?);
+        let found = super::curve_candidates(&self.points()?);
         let best = found.into_iter().find(|one| one.refused.is_none());
         Ok(best.map_or(CurveKind::Monotone, |one| one.curve))
     }

@@ -1,6 +1,6 @@
 //! Kinds of calibration curves.
 
-use super::curve::Curve;
+use super::curve::CalibrationCurve;
 use super::document::CalibrationPoint;
 use super::error::CalibrationError;
 use serde::{Deserialize, Serialize};
@@ -48,24 +48,29 @@ impl CurveKind {
     }
 
     /// The curve of this kind for points in order of increasing mass.
-    pub fn through(&self, points: &[CalibrationPoint]) -> Result<Curve, CalibrationError> {
+    pub fn through(
+        &self,
+        points: &[CalibrationPoint],
+    ) -> Result<CalibrationCurve, CalibrationError> {
         let pairs = |points: &mut dyn Iterator<Item = &CalibrationPoint>| -> Vec<(f64, f64)> {
             points.map(|point| (point.newtons.0, point.volts.0)).collect()
         };
         match self {
             Self::Monotone => {
                 check_rise(points.iter().enumerate())?;
-                Ok(Curve::through(&pairs(&mut points.iter())))
+                Ok(CalibrationCurve::through(&pairs(&mut points.iter())))
             }
             Self::Segments { through_g } => {
                 let breaks = break_indices(points, through_g).ok_or_else(|| {
                     CalibrationError::NoSuchBreak { through_g: through_g.clone() }
                 })?;
                 check_rise(breaks.iter().map(|&i| (i, &points[i])))?;
-                Ok(Curve::straight(&pairs(&mut breaks.iter().map(|&i| &points[i]))))
+                Ok(CalibrationCurve::straight(&pairs(&mut breaks.iter().map(|&i| &points[i]))))
             }
-            &Self::Polynomial { degree } => Curve::polynomial(&pairs(&mut points.iter()), degree)
-                .ok_or(CalibrationError::NotRising { degree, points: points.len() }),
+            &Self::Polynomial { degree } => {
+                CalibrationCurve::polynomial(&pairs(&mut points.iter()), degree)
+                    .ok_or(CalibrationError::NotRising { degree, points: points.len() })
+            }
         }
     }
 

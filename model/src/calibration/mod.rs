@@ -17,16 +17,18 @@ mod uncertainty_tests;
 mod validity;
 mod weight_steps;
 
-pub use choice::{Candidate, candidates, judge_kind};
-pub use curve::{Curve, DEGREE_MAX};
+pub use choice::{CurveCandidate, assess_curve_kind, curve_candidates};
+pub use curve::{CalibrationCurve, DEGREE_MAX};
 pub use document::{
-    CALIBRATION_FORMAT, Calibration, CalibrationPoint, CalibrationReading, Direction, NamedWeight,
-    Series, SeriesStep, VALID_DAYS,
+    CALIBRATION_FORMAT, Calibration, CalibrationPoint, CalibrationReading, CalibrationSeries,
+    Direction, NamedWeight, SeriesStep, VALID_DAYS,
 };
 pub use error::CalibrationError;
 pub use kind::CurveKind;
-pub use quality::{FlatStretch, Hysteresis, PointQuality, Quality};
-pub use settle::{Settle, SettleRule, Settling, SettlingNow, Steady};
-pub use uncertainty::{ForceUncertainty, Term};
-pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckResult, KnownWeight, WeightCheckError};
+pub use quality::{CalibrationQuality, FlatStretch, Hysteresis, PointQuality};
+pub use settle::{SettleDetector, SettleProgress, SettleRule, SettleState, SteadySignal};
+pub use uncertainty::{ForceUncertainty, UncertaintyTerm};
+pub use validity::{
+    CHECK_LIMIT_PERCENT, CalibrationUse, KnownWeight, WeightCheck, WeightCheckError,
+};
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -1,7 +1,7 @@
-//! Quality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
+//! CalibrationQuality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
 
 use super::CalibrationError;
-use super::curve::Curve;
+use super::curve::CalibrationCurve;
 use super::document::{Calibration, CalibrationPoint, Direction};
 use super::uncertainty::ForceUncertainty;
 use crate::units::{Newtons, Volts};
@@ -13,13 +13,13 @@ const FLAT_SHARE: f64 = 0.25;
 /// A curve read after taring, as every force of a run is: the signal is shifted so that the empty cell
 /// reads 0 N. A curve by least squares misses the empty cell's signal; taring takes that out.
 pub(super) struct TaredCurve<'a> {
-    curve: &'a Curve,
+    curve: &'a CalibrationCurve,
     shift: f64,
 }
 
 impl<'a> TaredCurve<'a> {
     /// Tared on the empty cell if it is among the points, else not at all.
-    pub fn of(curve: &'a Curve, points: &[CalibrationPoint]) -> Self {
+    pub fn of(curve: &'a CalibrationCurve, points: &[CalibrationPoint]) -> Self {
         let empty = points.first().filter(|point| point.newtons.0 == 0.0);
         let shift =
             empty.map_or(0.0, |point| point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0);
@@ -95,7 +95,7 @@ pub struct Hysteresis {
 
 /// Figures of merit of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Quality {
+pub struct CalibrationQuality {
     pub points: Vec<PointQuality>,
     /// Loading against unloading, where both were taken.
     pub hysteresis: Option<Hysteresis>,
@@ -113,7 +113,7 @@ pub struct Quality {
 }
 
 impl Calibration {
-    pub fn quality(&self) -> Result<Quality, CalibrationError> {
+    pub fn quality(&self) -> Result<CalibrationQuality, CalibrationError> {
         let points = self.points()?;
         let curve = self.curve.through(&points)?;
         let uncertainty = ForceUncertainty::of(self)?;
@@ -139,7 +139,7 @@ impl Calibration {
             })
             .collect();
         let zero_shift_v = self.zero_shift().map(|volts| volts.0);
-        let mut quality = Quality {
+        let mut quality = CalibrationQuality {
             hysteresis: hysteresis(&qualities),
             repeatability_v: repeatability(&points).map(|volts| volts.0),
             zero_shift_v,
@@ -196,7 +196,7 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// hardly moves the signal and goes on as long as the signal, seen from there, lags behind.
 fn flat(
     points: &[CalibrationPoint],
-    curve: &Curve,
+    curve: &CalibrationCurve,
     uncertainty: &ForceUncertainty,
 ) -> Option<FlatStretch> {
     let chord = |i: usize, j: usize| {
@@ -229,7 +229,7 @@ fn flat(
     })
 }
 
-fn findings(quality: &Quality, uncertainty: &ForceUncertainty) -> Vec<String> {
+fn findings(quality: &CalibrationQuality, uncertainty: &ForceUncertainty) -> Vec<String> {
     let mut findings = Vec::new();
     for flat in &quality.flat {
         let own = flat.worst_uncertainty_n.map_or(String::new(), |sigma| {

@@ -59,7 +59,7 @@ impl SettleRule {
 
 /// Mean, noise and slope of a signal over one window.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Steady {
+pub struct SteadySignal {
     /// Mean of the window.
     pub mean: Volts,
     /// Standard deviation of one sample.
@@ -73,18 +73,18 @@ pub struct Steady {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Settle {
+pub enum SettleState {
     /// Not yet at rest.
     Waiting,
     /// At rest. It stays so whatever follows.
-    Settled(Steady),
+    Settled(SteadySignal),
     /// Never at rest within the time allowed. It stays so whatever follows.
-    TimedOut(SettlingNow),
+    TimedOut(SettleProgress),
 }
 
 /// How far a signal has come to rest. Prints as a sentence that says why it is not yet at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SettlingNow {
+pub struct SettleProgress {
     /// Time waited so far.
     pub waited: Seconds,
     /// Longest time to wait.
@@ -92,14 +92,14 @@ pub struct SettlingNow {
     /// Share of the window that is filled, 0 to 1.
     pub filled: f64,
     /// The last window, once one was full.
-    pub last: Option<Steady>,
+    pub last: Option<SteadySignal>,
     /// The slope in V/s that counts as rest; 0 before a window was full.
     pub slope_max_v_per_s: f64,
     /// The scatter that counts as rest.
     pub noise_max: Volts,
 }
 
-impl fmt::Display for SettlingNow {
+impl fmt::Display for SettleProgress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let waited = self.waited.0;
         match self.last {
@@ -143,16 +143,16 @@ impl Block {
 
 /// Watches a signal sample by sample; memory does not grow.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settling {
+pub struct SettleDetector {
     rule: SettleRule,
     ticks: u64,
     block: Block,
     blocks: VecDeque<Block>,
-    last: Option<(Steady, f64)>,
-    verdict: Settle,
+    last: Option<(SteadySignal, f64)>,
+    verdict: SettleState,
 }
 
-impl Settling {
+impl SettleDetector {
     /// Begins to watch.
     #[must_use]
     pub fn new(rule: SettleRule) -> Self {
@@ -162,13 +162,13 @@ impl Settling {
             block: Block::default(),
             blocks: VecDeque::with_capacity(BLOCKS),
             last: None,
-            verdict: Settle::Waiting,
+            verdict: SettleState::Waiting,
         }
     }
 
     /// Takes the next sample, so many ticks after the one before. A signal that is not a number restarts the window.
-    pub fn push(&mut self, ticks: u64, signal: Volts) -> Settle {
-        if self.verdict != Settle::Waiting {
+    pub fn push(&mut self, ticks: u64, signal: Volts) -> SettleState {
+        if self.verdict != SettleState::Waiting {
             return self.verdict;
         }
         self.ticks += ticks;
@@ -189,14 +189,14 @@ impl Settling {
                 self.judge();
             }
         }
-        if self.verdict == Settle::Waiting && self.waited().0 >= self.rule.timeout.0 {
-            self.verdict = Settle::TimedOut(self.now());
+        if self.verdict == SettleState::Waiting && self.waited().0 >= self.rule.timeout.0 {
+            self.verdict = SettleState::TimedOut(self.now());
         }
         self.verdict
     }
 
-    pub fn now(&self) -> SettlingNow {
-        SettlingNow {
+    pub fn now(&self) -> SettleProgress {
+        SettleProgress {
             waited: self.waited(),
             timeout: self.rule.timeout,
             filled: self.blocks.len() as f64 / BLOCKS as f64,
@@ -228,7 +228,7 @@ impl Settling {
         let length = count * block_time;
         let slope_sigma = noise / (length * (count * per_block / 12.0).sqrt());
         let slope_max = (SLOPE_SIGMAS * slope_sigma).max(self.rule.change_min.0 / length);
-        let steady = Steady {
+        let steady = SteadySignal {
             mean: Volts(mean),
             noise: Volts(noise),
             slope_v_per_s: slope,
@@ -237,7 +237,7 @@ impl Settling {
         };
         self.last = Some((steady, slope_max));
         if slope.abs() <= slope_max && noise <= self.rule.noise_max.0 {
-            self.verdict = Settle::Settled(steady);
+            self.verdict = SettleState::Settled(steady);
         }
     }
 }
@@ -256,24 +256,24 @@ mod tests {
     };
 
     /// The verdict on a signal over time with white noise of 1 mV.
-    fn watch(seed: u64, signal: impl Fn(f64) -> f64) -> Settle {
+    fn watch(seed: u64, signal: impl Fn(f64) -> f64) -> SettleState {
         let mut random = SplitMix::seeded(seed);
-        let mut settling = Settling::new(RULE);
+        let mut settling = SettleDetector::new(RULE);
         for i in 0..40_000 {
             let t = f64::from(i) * 1e-3;
             let verdict = settling.push(1, Volts(signal(t) + 1e-3 * random.normal()));
-            if verdict != Settle::Waiting {
+            if verdict != SettleState::Waiting {
                 return verdict;
             }
         }
-        Settle::Waiting
+        SettleState::Waiting
     }
 
     #[test]
     fn a_step_that_creeps_is_waited_for() {
         for seed in 0..20 {
             let creep = |t: f64| 1.6 - 0.02 * (-t / 1.5).exp();
-            let Settle::Settled(steady) = watch(seed, creep) else {
+            let SettleState::Settled(steady) = watch(seed, creep) else {
                 panic!("seed {seed} never settles");
             };
             // What is left of the creep is within what one count or the noise of the mean hides.
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn a_steady_signal_settles_with_the_first_window_or_soon_after() {
         let first = (0..200).filter(|&seed| {
-            matches!(watch(seed, |_| 1.28), Settle::Settled(steady) if steady.waited.0 <= 2.0 + 1e-9)
+            matches!(watch(seed, |_| 1.28), SettleState::Settled(steady) if steady.waited.0 <= 2.0 + 1e-9)
         });
         // 3 sigma, or one count if that is more: hardly one in 400 waits longer.
         assert!(first.count() >= 196);
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_drift_and_a_swing_time_out_and_say_so() {
-        let Settle::TimedOut(drift) = watch(3, |t| 1.28 + 0.002 * t) else {
+        let SettleState::TimedOut(drift) = watch(3, |t| 1.28 + 0.002 * t) else {
             panic!("a drift of 2 mV/s settled");
         };
         assert!((drift.waited.0 - 30.0).abs() < 0.01);
@@ -304,7 +304,7 @@ mod tests {
         assert!((slope - 0.002).abs() < 2e-4, "{slope}");
         assert!(drift.to_string().contains("still moves"), "{drift}");
         let swing = |t: f64| 1.28 + 0.02 * (std::f64::consts::TAU * 2.0 * t).sin();
-        let Settle::TimedOut(swing) = watch(3, swing) else {
+        let SettleState::TimedOut(swing) = watch(3, swing) else {
             panic!("a swing of 20 mV settled");
         };
         assert!(swing.to_string().contains("still scatters"), "{swing}");
@@ -315,17 +315,17 @@ mod tests {
         // Eighty samples a second on a clock of milliseconds: 12 or 13 ticks apart.
         for seed in 0..20 {
             let mut random = SplitMix::seeded(seed);
-            let mut settling = Settling::new(RULE);
-            let mut verdict = Settle::Waiting;
+            let mut settling = SettleDetector::new(RULE);
+            let mut verdict = SettleState::Waiting;
             let mut sample = 0_u64;
-            while verdict == Settle::Waiting {
+            while verdict == SettleState::Waiting {
                 sample += 1;
                 let ticks = 12 + sample % 2;
                 let t = sample as f64 * 0.0125;
                 let volts = 1.6 - 0.02 * (-t / 0.3).exp() + 2e-4 * random.normal();
                 verdict = settling.push(ticks, Volts(volts));
             }
-            let Settle::Settled(steady) = verdict else {
+            let SettleState::Settled(steady) = verdict else {
                 panic!("seed {seed}: {verdict:?}");
             };
             assert!((steady.mean.0 - 1.6).abs() < 5e-4, "{steady:?}");
@@ -337,24 +337,24 @@ mod tests {
 
     #[test]
     fn a_gap_restarts_the_window_and_the_verdict_stays() {
-        let mut settling = Settling::new(RULE);
+        let mut settling = SettleDetector::new(RULE);
         for i in 0..1999 {
             let volts = if i == 1500 { f64::NAN } else { 1.28 };
-            assert_eq!(settling.push(1, Volts(volts)), Settle::Waiting);
+            assert_eq!(settling.push(1, Volts(volts)), SettleState::Waiting);
         }
-        let mut verdict = Settle::Waiting;
+        let mut verdict = SettleState::Waiting;
         for _ in 0..2000 {
             verdict = settling.push(1, Volts(1.28));
         }
-        let Settle::Settled(steady) = verdict else {
+        let SettleState::Settled(steady) = verdict else {
             panic!("{verdict:?}");
         };
         assert_eq!((steady.noise, steady.slope_v_per_s), (Volts(0.0), 0.0));
         assert!((steady.waited.0 - 3.501).abs() < 1e-9, "{steady:?}");
         assert_eq!(settling.push(1, Volts(9.0)), verdict);
-        let mut blind = Settling::new(RULE);
+        let mut blind = SettleDetector::new(RULE);
         let verdict = (0..30_000).map(|_| blind.push(1, Volts(f64::NAN))).last();
-        let Some(Settle::TimedOut(blind)) = verdict else {
+        let Some(SettleState::TimedOut(blind)) = verdict else {
             panic!("{verdict:?}");
         };
         assert!(blind.to_string().contains("without gaps"), "{blind}");

@@ -24,7 +24,7 @@ pub(super) fn document(series: &[Taken<'_>]) -> Calibration {
         format: CALIBRATION_FORMAT,
         series: series
             .iter()
-            .map(|(direction, repeat, steps)| Series {
+            .map(|(direction, repeat, steps)| CalibrationSeries {
                 direction: *direction,
                 repeat: *repeat,
                 steps: steps.iter().map(step).collect(),
@@ -289,24 +289,24 @@ fn the_curve_that_foretells_best_is_chosen() {
         .map(|(repeat, steps)| (Direction::Loading, repeat, steps.as_slice()))
         .collect();
     let calibration = document(&borrowed);
-    let found = candidates(&calibration.points().unwrap());
+    let found = curve_candidates(&calibration.points().unwrap());
     assert!(matches!(found[0].curve, CurveKind::Polynomial { degree: 2.. }), "{}", found[0].name);
     // 1 + 7 + 5 kinds, all judged.
     assert_eq!(found.len(), 13);
     // One straight line is off by the square: an eighth of 0.01 * 8.8^2 V at most, over 0.29 V/N.
     let line = found.iter().find(|one| one.name == "1 straight segment").unwrap();
     assert!(line.left_out_rms_n.unwrap() > 20.0 * found[0].left_out_rms_n.unwrap());
-    let score = |one: &Candidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
+    let score = |one: &CurveCandidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
     assert!(found.windows(2).all(|pair| score(&pair[0]) <= score(&pair[1])));
     // With three weights there is nothing to compare.
     let few = document(&[(Direction::Loading, 1, &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)])]);
-    assert_eq!(candidates(&few.points().unwrap()).len(), 1);
+    assert_eq!(curve_candidates(&few.points().unwrap()).len(), 1);
 }
 
 #[test]
 fn every_curve_of_the_thesis_table_is_shown() {
     let points = Calibration::thesis().points().unwrap();
-    let found = candidates(&points);
+    let found = curve_candidates(&points);
     assert_eq!(found.len(), 13);
     for one in found.iter().filter(|one| one.refused.is_none()) {
         assert_eq!(one.residuals_n.len(), 11, "{}", one.name);
@@ -348,7 +348,7 @@ fn age_and_rig_raise_doubts() {
     let mut calibration = Calibration::thesis();
     (calibration.rig, calibration.cell) = ("bench-2".into(), "4711".into());
     calibration.excitation = Some(Volts(10.0));
-    let bench = |age_days| Bench {
+    let bench = |age_days| CalibrationUse {
         rig: "bench-2",
         cell: Some("4711"),
         excitation: Some(Volts(10.001)),
@@ -363,13 +363,17 @@ fn age_and_rig_raise_doubts() {
         (Some(-1), Some("1 days ahead")),
         (None, Some("when it was taken")),
     ] {
-        let doubts = calibration.doubts(&bench(age));
+        let doubts = calibration.validity_warnings(&bench(age));
         assert_eq!(doubts.len(), usize::from(words.is_some()), "{age:?}: {doubts:?}");
         assert!(words.is_none_or(|words| doubts[0].contains(words)), "{doubts:?}");
     }
-    let other =
-        Bench { rig: "sim", cell: Some("9"), excitation: Some(Volts(5.0)), age_days: Some(1) };
-    assert_eq!(calibration.doubts(&other).len(), 3);
+    let other = CalibrationUse {
+        rig: "sim",
+        cell: Some("9"),
+        excitation: Some(Volts(5.0)),
+        age_days: Some(1),
+    };
+    assert_eq!(calibration.validity_warnings(&other).len(), 3);
 }
 
 #[test]

@@ -7,7 +7,7 @@
 
 use super::CalibrationError;
 use super::choice::left_out_volts;
-use super::curve::Curve;
+use super::curve::CalibrationCurve;
 use super::document::{Calibration, CalibrationPoint, Direction};
 use super::quality::{repeatability, rms};
 use crate::units::{Newtons, Volts};
@@ -25,10 +25,10 @@ crate::named! {
     /// Source of an error.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
     #[serde(rename_all = "snake_case")]
-    pub enum Term {
+    pub enum UncertaintyTerm {
         /// Tolerance of the weights, a rectangular distribution; each weight is one error in all its steps.
         Weights = "tolerance of the weights",
-        /// Scatter of repeats over the root of their number, at each weight by itself.
+        /// ScatterPlot of repeats over the root of their number, at each weight by itself.
         Repeatability = "repeatability",
         /// Digits with which readings were written down, rectangular, at each weight by itself.
         Resolution = "digits of the readings",
@@ -44,7 +44,7 @@ crate::named! {
 /// One independent error and what one standard uncertainty of it does to a force.
 #[derive(Clone, Debug, PartialEq)]
 struct Component {
-    term: Term,
+    term: UncertaintyTerm,
     /// Shift of the force in N at each node.
     shifts: Vec<f64>,
 }
@@ -58,7 +58,7 @@ pub struct ForceUncertainty {
     components: Vec<Component>,
     /// Root of the sum of squares at each node, in N.
     sigma: Vec<f64>,
-    not_stated: Vec<Term>,
+    not_stated: Vec<UncertaintyTerm>,
     range: (Newtons, Newtons),
 }
 
@@ -67,7 +67,7 @@ impl ForceUncertainty {
         let maker = ComponentBuilder::of(calibration)?;
         let mut not_stated = Vec::new();
         let mut components = Vec::new();
-        for term in Term::ALL {
+        for term in UncertaintyTerm::ALL {
             match maker.components(term) {
                 Some(own) => components.extend(own),
                 None => not_stated.push(term),
@@ -95,7 +95,7 @@ impl ForceUncertainty {
     }
 
     /// The part of one term.
-    pub fn term_sigma(&self, term: Term, force: Newtons) -> Option<Newtons> {
+    pub fn term_sigma(&self, term: UncertaintyTerm, force: Newtons) -> Option<Newtons> {
         if self.not_stated.contains(&term) {
             return None;
         }
@@ -107,11 +107,11 @@ impl ForceUncertainty {
 
     /// Whether anything is known of its errors.
     pub fn is_stated(&self) -> bool {
-        self.not_stated.len() < Term::ALL.len()
+        self.not_stated.len() < UncertaintyTerm::ALL.len()
     }
 
     /// Terms of which the calibration says nothing.
-    pub fn not_stated(&self) -> &[Term] {
+    pub fn not_stated(&self) -> &[UncertaintyTerm] {
         &self.not_stated
     }
 
@@ -126,7 +126,7 @@ impl ForceUncertainty {
     }
 
     /// The term of each independent error.
-    pub fn errors(&self) -> impl Iterator<Item = Term> {
+    pub fn errors(&self) -> impl Iterator<Item = UncertaintyTerm> {
         self.components.iter().map(|component| component.term)
     }
 
@@ -148,7 +148,7 @@ impl ForceUncertainty {
 struct ComponentBuilder<'a> {
     calibration: &'a Calibration,
     points: Vec<CalibrationPoint>,
-    curve: Curve,
+    curve: CalibrationCurve,
     nodes: Vec<f64>,
 }
 
@@ -170,11 +170,11 @@ impl<'a> ComponentBuilder<'a> {
     }
 
     /// The errors of a term; `None` where the calibration says nothing of it.
-    fn components(&self, term: Term) -> Option<Vec<Component>> {
+    fn components(&self, term: UncertaintyTerm) -> Option<Vec<Component>> {
         match term {
-            Term::Weights => self.weights(),
-            Term::Repeatability => self.each_point(term, self.reading_sigmas()?),
-            Term::Resolution => {
+            UncertaintyTerm::Weights => self.weights(),
+            UncertaintyTerm::Repeatability => self.each_point(term, self.reading_sigmas()?),
+            UncertaintyTerm::Resolution => {
                 // Readings with a known noise of their samples are not limited by digits.
                 let is_sampled = || self.sampled().is_some();
                 match self.calibration.reading_resolution() {
@@ -185,7 +185,7 @@ impl<'a> ComponentBuilder<'a> {
                     None => is_sampled().then(Vec::new),
                 }
             }
-            Term::Hysteresis => {
+            UncertaintyTerm::Hysteresis => {
                 let halves: Vec<Option<f64>> = self
                     .points
                     .iter()
@@ -199,7 +199,7 @@ impl<'a> ComponentBuilder<'a> {
                 };
                 Some(vec![self.component(term, moved)])
             }
-            Term::ZeroDrift => {
+            UncertaintyTerm::ZeroDrift => {
                 let sigma = 0.5 * self.calibration.zero_shift()?.0.abs() / 3f64.sqrt();
                 // Taring takes out what moves all signals alike.
                 let moved = |share: f64| {
@@ -211,7 +211,7 @@ impl<'a> ComponentBuilder<'a> {
                 };
                 Some(vec![self.component(term, moved)])
             }
-            Term::Interpolation => self.interpolation(),
+            UncertaintyTerm::Interpolation => self.interpolation(),
         }
     }
 
@@ -233,7 +233,7 @@ impl<'a> ComponentBuilder<'a> {
                 self.points.iter().map(|p| self.share(&weight.name, p)).collect();
             let moved =
                 |share: f64| self.moved(|i, point| point.newtons.0 += share * sigma * shares[i]);
-            components.push(self.component(Term::Weights, moved));
+            components.push(self.component(UncertaintyTerm::Weights, moved));
         }
         (!components.is_empty()).then_some(components)
     }
@@ -262,7 +262,7 @@ impl<'a> ComponentBuilder<'a> {
     }
 
     /// One independent error in V at each point.
-    fn each_point(&self, term: Term, sigmas: Vec<f64>) -> Option<Vec<Component>> {
+    fn each_point(&self, term: UncertaintyTerm, sigmas: Vec<f64>) -> Option<Vec<Component>> {
         let one = |k: usize| {
             let moved = |share: f64| {
                 self.moved(|i, point| {
@@ -277,7 +277,7 @@ impl<'a> ComponentBuilder<'a> {
     }
 
     /// The curve through points that were moved.
-    fn moved(&self, change: impl Fn(usize, &mut CalibrationPoint)) -> Option<Curve> {
+    fn moved(&self, change: impl Fn(usize, &mut CalibrationPoint)) -> Option<CalibrationCurve> {
         let mut points = self.points.clone();
         points.iter_mut().enumerate().for_each(|(i, point)| change(i, point));
         let is_ordered = points.windows(2).all(|pair| pair[0].newtons.0 < pair[1].newtons.0);
@@ -285,7 +285,11 @@ impl<'a> ComponentBuilder<'a> {
     }
 
     /// Half the difference of the forces read with the error up and down.
-    fn component(&self, term: Term, moved: impl Fn(f64) -> Option<Curve>) -> Component {
+    fn component(
+        &self,
+        term: UncertaintyTerm,
+        moved: impl Fn(f64) -> Option<CalibrationCurve>,
+    ) -> Component {
         let pair = |halvings: u32| {
             let share = 0.5f64.powi(halvings as i32);
             Some((share, moved(share)?, moved(-share)?))
@@ -304,7 +308,7 @@ impl<'a> ComponentBuilder<'a> {
     }
 
     /// The force that another curve reads, tared, where this one reads `force`.
-    fn read(&self, other: &Curve, force: f64) -> f64 {
+    fn read(&self, other: &CalibrationCurve, force: f64) -> f64 {
         let zero = Newtons(0.0);
         let above_zero =
             self.curve.volts_from_newtons(Newtons(force)) - self.curve.volts_from_newtons(zero);
@@ -321,7 +325,7 @@ impl<'a> ComponentBuilder<'a> {
         let last = self.points.len() - 1;
         let newtons = |i: usize| self.points[i].newtons.0;
         let component = |shift: &dyn Fn(f64) -> f64| Component {
-            term: Term::Interpolation,
+            term: UncertaintyTerm::Interpolation,
             shifts: self.nodes.iter().map(|force| shift(*force)).collect(),
         };
         let sensitivity = |force: f64| self.curve.sensitivity_at(Newtons(force));

@@ -6,7 +6,7 @@ use crate::random::SplitMix;
 use crate::units::{Newtons, Volts};
 
 /// The force that `other` reads, tared, where `curve` reads `force`.
-fn read(curve: &Curve, other: &Curve, force: f64) -> f64 {
+fn read(curve: &CalibrationCurve, other: &CalibrationCurve, force: f64) -> f64 {
     let zero = Newtons(0.0);
     let above = curve.volts_from_newtons(Newtons(force)) - curve.volts_from_newtons(zero);
     other.newtons_from_volts(above + other.volts_from_newtons(zero)).0
@@ -59,7 +59,7 @@ fn bench() -> Calibration {
 fn each_term_is_what_draws_of_it_scatter() {
     let calibration = bench();
     let uncertainty = ForceUncertainty::of(&calibration).unwrap();
-    assert_eq!(uncertainty.not_stated(), [Term::Resolution]);
+    assert_eq!(uncertainty.not_stated(), [UncertaintyTerm::Resolution]);
     let weights = |random: &mut SplitMix| {
         let mut drawn = calibration.clone();
         for weight in &mut drawn.weights {
@@ -107,7 +107,7 @@ fn each_term_is_what_draws_of_it_scatter() {
         }
         drawn
     };
-    let close = |term: Term, force: f64, drawn: f64| {
+    let close = |term: UncertaintyTerm, force: f64, drawn: f64| {
         let stated = uncertainty.term_sigma(term, Newtons(force)).unwrap().0;
         // 4000 draws know a standard deviation to 1.1 %; three times that, and the curve's bend.
         assert!(
@@ -116,12 +116,14 @@ fn each_term_is_what_draws_of_it_scatter() {
         );
     };
     for force in [0.4, 1.3, 2.45, 3.9, 4.8] {
-        close(Term::Weights, force, scatter(&calibration, force, weights));
-        close(Term::Repeatability, force, scatter(&calibration, force, readings));
-        close(Term::Hysteresis, force, scatter(&calibration, force, hysteresis));
-        close(Term::ZeroDrift, force, scatter(&calibration, force, drift));
+        close(UncertaintyTerm::Weights, force, scatter(&calibration, force, weights));
+        close(UncertaintyTerm::Repeatability, force, scatter(&calibration, force, readings));
+        close(UncertaintyTerm::Hysteresis, force, scatter(&calibration, force, hysteresis));
+        close(UncertaintyTerm::ZeroDrift, force, scatter(&calibration, force, drift));
         // All together, in quadrature.
-        let sum = Term::ALL.iter().filter_map(|&term| uncertainty.term_sigma(term, Newtons(force)));
+        let sum = UncertaintyTerm::ALL
+            .iter()
+            .filter_map(|&term| uncertainty.term_sigma(term, Newtons(force)));
         let sum = sum.map(|sigma| sigma.0 * sigma.0).sum::<f64>().sqrt();
         let whole = uncertainty.sigma(Newtons(force)).unwrap().0;
         assert!((whole / sum - 1.0).abs() < 0.02, "{whole} against {sum}");
@@ -132,9 +134,9 @@ fn each_term_is_what_draws_of_it_scatter() {
 fn the_digits_of_the_thesis_are_what_draws_of_them_scatter() {
     let thesis = Calibration::thesis();
     let uncertainty = ForceUncertainty::of(&thesis).unwrap();
-    let stated = [Term::Resolution, Term::Interpolation];
+    let stated = [UncertaintyTerm::Resolution, UncertaintyTerm::Interpolation];
     assert!(
-        Term::ALL
+        UncertaintyTerm::ALL
             .iter()
             .all(|term| stated.contains(term) != uncertainty.not_stated().contains(term))
     );
@@ -147,7 +149,7 @@ fn the_digits_of_the_thesis_are_what_draws_of_them_scatter() {
         drawn
     };
     for force in [0.7, 2.0, 3.0, 4.0, 5.0, 7.0, 9.0, 11.0] {
-        let stated = uncertainty.term_sigma(Term::Resolution, Newtons(force)).unwrap().0;
+        let stated = uncertainty.term_sigma(UncertaintyTerm::Resolution, Newtons(force)).unwrap().0;
         let drawn = 10.0 * scatter(&thesis, force, draw);
         // The curve bends within a whole digit where it is flat, so the two part a little.
         assert!((stated / drawn - 1.0).abs() < 0.2, "{force} N: {stated} against {drawn}");
@@ -182,9 +184,11 @@ fn interpolation_is_bounded_by_the_weights_around() {
         let points = calibration.points().unwrap();
         for pair in points.windows(2) {
             let (from, to) = (pair[0].newtons.0, pair[1].newtons.0);
-            let middle = uncertainty.term_sigma(Term::Interpolation, Newtons(0.5 * (from + to)));
+            let middle =
+                uncertainty.term_sigma(UncertaintyTerm::Interpolation, Newtons(0.5 * (from + to)));
             let middle = middle.unwrap().0;
-            let end = uncertainty.term_sigma(Term::Interpolation, Newtons(to)).unwrap().0;
+            let end =
+                uncertainty.term_sigma(UncertaintyTerm::Interpolation, Newtons(to)).unwrap().0;
             match kind {
                 // It meets its points, and between them it cannot leave the interval.
                 CurveKind::Monotone => {
@@ -206,13 +210,13 @@ fn a_term_without_errors_is_zero_and_not_minus_zero() {
         samples: Some(1000),
         ..SeriesStep::default()
     };
-    sampled.series = vec![Series {
+    sampled.series = vec![CalibrationSeries {
         direction: Direction::Loading,
         repeat: 1,
         steps: sampled.steps.drain(..).map(step).collect(),
     }];
     sampled.resolution = None;
     let uncertainty = ForceUncertainty::of(&sampled).unwrap();
-    let digits = uncertainty.term_sigma(Term::Resolution, Newtons(1.0)).unwrap();
+    let digits = uncertainty.term_sigma(UncertaintyTerm::Resolution, Newtons(1.0)).unwrap();
     assert!(digits.0.to_bits() == 0, "{digits:?}");
 }

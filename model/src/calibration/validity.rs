@@ -16,7 +16,7 @@ pub const CHECK_LIMIT_PERCENT: f64 = 1.0;
 
 /// The rig and cell that a calibration is used with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bench<'a> {
+pub struct CalibrationUse<'a> {
     pub rig: &'a str,
     /// Serial number of its cell, where it is known.
     pub cell: Option<&'a str>,
@@ -41,7 +41,7 @@ pub struct KnownWeight {
 
 /// Result of a check with a known weight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CheckResult {
+pub struct WeightCheck {
     /// Whether the error is within the limit.
     pub is_passed: bool,
     /// Weight in N.
@@ -103,7 +103,7 @@ impl KnownWeight {
 impl Calibration {
     /// Why this calibration may not be right for that use, one sentence each; none if nothing speaks
     /// against it.
-    pub fn doubts(&self, bench: &Bench<'_>) -> Vec<String> {
+    pub fn validity_warnings(&self, bench: &CalibrationUse<'_>) -> Vec<String> {
         let mut doubts = Vec::new();
         let mut doubt = |text: String| {
             doubts.push(format!("the calibration \"{}\" {text}", self.name));
@@ -203,7 +203,7 @@ impl Calibration {
     }
 
     /// Whether a known weight reads what it weighs.
-    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, WeightCheckError> {
+    pub fn check(&self, weight: &KnownWeight) -> Result<WeightCheck, WeightCheckError> {
         let limit_percent = weight.checked_limit()?;
         let curve = self.curve()?;
         let uncertainty = ForceUncertainty::of(self)?;
@@ -238,7 +238,7 @@ impl Calibration {
             if is_passed { "within" } else { "beyond" },
             if is_passed { "" } else { "; take a new calibration before the next run" },
         );
-        Ok(CheckResult {
+        Ok(WeightCheck {
             is_passed,
             weight_n: true_force.0,
             force_n: force.0,

@@ -1,16 +1,16 @@
 //! Whatever motion is under way: the one path that a slider makes and a host follows.
 
-use super::oscillation::Sine;
-use super::profile::Profile;
+use super::oscillation::SinePath;
+use super::profile::MotionProfile;
 use crate::units::{MmPerS, Position, Seconds};
 
 /// Position and velocity as functions of the time since the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Course {
     /// A move from point to point, or the deceleration that cut a motion short.
-    Move(Profile),
+    Move(MotionProfile),
     /// In and out again.
-    Sine(Sine),
+    Sine(SinePath),
 }
 
 impl Course {

@@ -1,7 +1,7 @@
 //! The description that a rig reports about itself when it is connected.
 
 use super::command::Oscillation;
-use super::oscillation::Sine;
+use super::oscillation::SinePath;
 use super::sensor::RigSensors;
 use crate::is_default;
 use crate::units::{MmPerS, MmPerS2, Position, Seconds, Volts};
@@ -113,7 +113,7 @@ impl RigDescription {
 
     /// Checks that the rig can follow an oscillation, and explains a refusal.
     pub fn check_oscillation(&self, command: &Oscillation) -> Result<(), String> {
-        Sine::new(Position(0.0), command, self.mm_per_pulse, self.tick())
+        SinePath::new(Position(0.0), command, self.mm_per_pulse, self.tick())
             .check(self.speed_max, self.acceleration)
             .map_err(|why| format!("rig {} cannot do this: {why}", self.name))
     }

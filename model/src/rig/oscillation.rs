@@ -1,7 +1,7 @@
 //! Sinusoidal motion: a slider that goes in and out by itself, with a frequency known to the tick.
 
 use super::command::Oscillation;
-use super::profile::Profile;
+use super::profile::MotionProfile;
 use crate::units::{MmPerS, MmPerS2, Position, Seconds};
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// It starts at a turning point because there the speed is zero: started at the mean, an axis would need its
 /// top speed at once. What jumps at both ends is the acceleration, as it does in a trapezoidal move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sine {
+pub struct SinePath {
     from: f64,
     /// Half the way between the turning points, in mm; its sign is the first direction.
     amplitude: f64,
@@ -20,7 +20,7 @@ pub struct Sine {
     accel: f64,
 }
 
-impl Sine {
+impl SinePath {
     /// The path of a command given to an axis that rests at `from`.
     #[must_use]
     pub fn new(from: Position, command: &Oscillation, mm_per_pulse: f64, tick: Seconds) -> Self {
@@ -75,8 +75,8 @@ impl Sine {
     }
 
     /// The deceleration to rest when it is stopped at `at`.
-    pub fn stopped_at(&self, at: Seconds) -> Profile {
-        Profile::braking(self.position(at), self.velocity(at), MmPerS2(self.accel))
+    pub fn stopped_at(&self, at: Seconds) -> MotionProfile {
+        MotionProfile::braking(self.position(at), self.velocity(at), MmPerS2(self.accel))
     }
 
     /// Time from start to rest.
@@ -113,14 +113,14 @@ mod tests {
     use super::*;
 
     /// 0.75 mm in 2000 ticks of a millisecond.
-    fn sine(cycles: u32) -> Sine {
+    fn sine(cycles: u32) -> SinePath {
         let command = Oscillation {
             amplitude_pulses: 50,
             period_ticks: 2000,
             cycles,
             acceleration: MmPerS2(61.44),
         };
-        Sine::new(Position(45.0), &command, 0.015, Seconds(1e-3))
+        SinePath::new(Position(45.0), &command, 0.015, Seconds(1e-3))
     }
 
     #[test]
@@ -176,7 +176,7 @@ mod tests {
                 cycles,
                 acceleration: MmPerS2(61.44),
             };
-            let path = Sine::new(Position(45.0), &command, 0.015, Seconds(1e-3));
+            let path = SinePath::new(Position(45.0), &command, 0.015, Seconds(1e-3));
             let err = path.check(MmPerS(20.0), MmPerS2(61.44)).unwrap_err();
             assert!(err.contains("zero"), "{err}");
         }

@@ -7,8 +7,8 @@
 use super::command::{MoveTo, Oscillation, position_from_pulses};
 use super::course::Course;
 use super::description::RigDescription;
-use super::oscillation::Sine;
-use super::profile::Profile;
+use super::oscillation::SinePath;
+use super::profile::MotionProfile;
 use super::reading::{AxisStatus, Reading};
 use crate::units::{MmPerS, Position, Seconds};
 use thiserror::Error;
@@ -169,10 +169,10 @@ impl PathTracker {
             PendingMotion::Move(command) => {
                 let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
                 let (speed, acceleration) = (command.speed, command.acceleration);
-                Course::Move(Profile::to_rest(from, target, speed, acceleration))
+                Course::Move(MotionProfile::to_rest(from, target, speed, acceleration))
             }
             PendingMotion::Sine(command) => {
-                Course::Sine(Sine::new(from, &command, self.mm_per_pulse, self.tick))
+                Course::Sine(SinePath::new(from, &command, self.mm_per_pulse, self.tick))
             }
         }
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A point-to-point move with symmetric acceleration, or the deceleration that cuts it short.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Profile {
+pub struct MotionProfile {
     from: f64,
     sign: f64,
     /// Speed at time zero, along `sign`.
@@ -18,7 +18,7 @@ pub struct Profile {
     cruise_speed: f64,
 }
 
-impl Profile {
+impl MotionProfile {
     /// A move from rest to rest.
     ///
     /// A move too short to reach `speed` peaks below it.
@@ -113,8 +113,8 @@ impl Profile {
 mod tests {
     use super::*;
 
-    fn thesis_ramp() -> Profile {
-        Profile::to_rest(Position(41.0), Position(71.0), MmPerS(0.75), MmPerS2(15.36))
+    fn thesis_ramp() -> MotionProfile {
+        MotionProfile::to_rest(Position(41.0), Position(71.0), MmPerS(0.75), MmPerS2(15.36))
     }
 
     #[test]
@@ -140,7 +140,8 @@ mod tests {
 
     #[test]
     fn a_short_move_is_a_triangle() {
-        let short = Profile::to_rest(Position(0.0), Position(-0.01), MmPerS(5.0), MmPerS2(15.36));
+        let short =
+            MotionProfile::to_rest(Position(0.0), Position(-0.01), MmPerS(5.0), MmPerS2(15.36));
         assert!((short.end().0 + 0.01).abs() < 1e-15);
         let peak = short.velocity(Seconds(0.5 * short.duration().0)).0;
         assert!((peak + (0.01f64 * 15.36).sqrt()).abs() < 1e-9);

@@ -53,12 +53,12 @@ pub struct Reading {
     pub status: AxisStatus,
     /// Age of the sample when it reached the host, if the link reports it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub age: Option<Age>,
+    pub age: Option<SampleAge>,
 }
 
 /// How long before its arrival at the host a sample was taken: what ties the controller's time to the host's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Age {
+pub struct SampleAge {
     /// The best estimate.
     pub by: Nanos,
     /// Largest error of the estimate either way.

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 /// A position with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touched {
+pub struct TouchPosition {
     /// Position from home.
     pub position: Position,
     /// Standard error in mm.
@@ -34,7 +34,7 @@ pub struct ThicknessError {
 }
 
 /// The distance from tissue to base. Both positions must come from one homing; their errors are independent.
-pub fn thickness(tissue: Touched, base: Touched) -> Result<Thickness, ThicknessError> {
+pub fn thickness(tissue: TouchPosition, base: TouchPosition) -> Result<Thickness, ThicknessError> {
     let mm = base.position.distance_from(tissue.position);
     let std_error_mm = base.std_error_mm.hypot(tissue.std_error_mm);
     let is_known = mm.is_finite() && std_error_mm.is_finite();
@@ -50,8 +50,8 @@ pub fn thickness(tissue: Touched, base: Touched) -> Result<Thickness, ThicknessE
 mod tests {
     use super::*;
 
-    fn touched(position: f64, std_error_mm: f64) -> Touched {
-        Touched { position: Position(position), std_error_mm }
+    fn touched(position: f64, std_error_mm: f64) -> TouchPosition {
+        TouchPosition { position: Position(position), std_error_mm }
     }
 
     #[test]

@@ -11,6 +11,6 @@ mod work;
 
 pub use contact::{ContactEstimate, ContactFitError, ContactPoint, fit_contact};
 pub use filter::MovingMean;
-pub use touch::{TouchEstimate, TouchPoint, fit_touch};
+pub use touch::{ContactSearchPoint, TouchEstimate, fit_touch};
 pub use trace::{LiveTrace, TracePoint};
 pub use work::work;

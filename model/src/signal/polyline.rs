@@ -9,7 +9,7 @@
 //! to it. Memory while it works: a bit for each cell, 16 for each pixel.
 //!
 //! Where so much of the picture is crossed that a line would have more points than can be drawn in a frame, the cells
-//! themselves are the picture ([`Reducer::coverage`]).
+//! themselves are the picture ([`PolylineReducer::coverage`]).
 
 /// The furthest that a sample left out is from the line drawn, in pixels.
 pub const ERROR_PIXELS: f64 = 0.5;
@@ -20,7 +20,7 @@ const CELL: f64 = 0.25;
 
 /// A line in pixels, reduced as it comes.
 #[derive(Clone, Debug)]
-pub struct Reducer {
+pub struct PolylineReducer {
     size: [f64; 2],
     cells: [usize; 2],
     covered: Vec<u64>,
@@ -35,16 +35,16 @@ pub struct Reducer {
     points: [usize; 2],
 }
 
-/// Coverage of every pixel by the line.
+/// PixelCoverage of every pixel by the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Coverage {
+pub struct PixelCoverage {
     /// Pixels across and up.
     pub size: [usize; 2],
     /// From the corner where both axes begin, row by row: 0 to 255, which is a line straight across and more.
     pub pixels: Vec<u8>,
 }
 
-impl Reducer {
+impl PolylineReducer {
     /// For a picture of so many pixels each way. What lies outside is left out.
     #[must_use]
     pub fn new(width: f64, height: f64) -> Self {
@@ -71,7 +71,7 @@ impl Reducer {
     }
 
     /// The picture in the place of a line of too many points.
-    pub fn coverage(&self) -> Option<Coverage> {
+    pub fn coverage(&self) -> Option<PixelCoverage> {
         if !self.is_dense() {
             return None;
         }
@@ -87,7 +87,7 @@ impl Reducer {
             rows.map(row).sum::<usize>()
         };
         let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
-        Some(Coverage {
+        Some(PixelCoverage {
             size,
             pixels: pixels.map(|(x, y)| (crossed(x, y) * 255 / side).min(255) as u8).collect(),
         })
@@ -310,7 +310,7 @@ mod tests {
     use crate::random::SplitMix;
 
     fn reduced(points: &[[f64; 2]], size: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
-        let mut reducer = Reducer::new(size[0], size[1]);
+        let mut reducer = PolylineReducer::new(size[0], size[1]);
         points.iter().for_each(|[x, y]| reducer.push(*x, *y));
         reducer.finish().0
     }
@@ -420,7 +420,7 @@ mod tests {
         let mut random = SplitMix::seeded(32);
         let size = [120.0, 80.5];
         let points = loops(&mut random, 3.0, size);
-        let mut reducer = Reducer::new(size[0], size[1]).with_points_max(100);
+        let mut reducer = PolylineReducer::new(size[0], size[1]).with_points_max(100);
         points.iter().for_each(|[x, y]| reducer.push(*x, *y));
         let coverage = reducer.coverage().expect("more than 100 points");
         assert_eq!(coverage.size, [120, 81]);
@@ -440,7 +440,7 @@ mod tests {
         let away = furthest(&crossed, &lines(&points));
         assert!(away <= 0.5f64.sqrt() + 1e-9, "{away}");
         // With room for its points it is a line.
-        let mut reducer = Reducer::new(size[0], size[1]).with_points_max(points.len());
+        let mut reducer = PolylineReducer::new(size[0], size[1]).with_points_max(points.len());
         points.iter().for_each(|[x, y]| reducer.push(*x, *y));
         assert_eq!(reducer.coverage(), None);
         assert_eq!(reducer.finish().0, reduced(&points, size));
@@ -448,7 +448,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_fills_its_pixels() {
-        let mut reducer = Reducer::new(10.0, 4.0).with_points_max(1);
+        let mut reducer = PolylineReducer::new(10.0, 4.0).with_points_max(1);
         reducer.push(0.0, 1.5);
         reducer.push(10.0, 1.5);
         reducer.lift();

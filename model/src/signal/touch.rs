@@ -20,7 +20,7 @@ use crate::viscoelastic::{KelvinState, ModifiedKelvin};
 
 /// One averaged sample of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TouchPoint {
+pub struct ContactSearchPoint {
     /// Time in the search.
     pub t: Seconds,
     /// Commanded position from home.
@@ -33,9 +33,9 @@ pub struct TouchPoint {
 /// Fewer forces than this do not carry two outer and six linear parameters.
 const FORCES_MIN: usize = 100;
 
-/// Relaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
+/// StressRelaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
 const TAU_RANGE: [f64; 2] = [0.02, 60.0];
-/// Relaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
+/// StressRelaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
 const TAU_COUNT: u32 = 10;
 /// Contact positions scanned, evenly over the search.
 const CONTACT_COUNT: u32 = 60;
@@ -67,12 +67,12 @@ pub struct TouchEstimate {
     pub contact: ContactEstimate,
     /// How much deeper the second touch met the tissue than the first, in mm, if there were two and this is
     /// more than noise.
-    pub apart_mm: Option<f64>,
+    pub separation_mm: Option<f64>,
 }
 
 /// Estimates the contact position from a whole search. The path must begin out of contact and go on without
 /// gaps; times rise. What follows the last point without force is the second touch.
-pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactFitError> {
+pub fn fit_touch(points: &[ContactSearchPoint]) -> Result<TouchEstimate, ContactFitError> {
     let mut search = Search::new(points.to_vec())?;
     let mut starts = search.coarse().scan();
     let mut found = search.best(&starts).ok_or(ContactFitError::NoOnset)?;
@@ -122,14 +122,14 @@ struct Search {
     has_separation: bool,
     /// The last point before the second touch, if there is one.
     between: Option<usize>,
-    points: Vec<TouchPoint>,
+    points: Vec<ContactSearchPoint>,
     shallow: f64,
     deep: f64,
     span: f64,
 }
 
 impl Search {
-    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactFitError> {
+    fn new(points: Vec<ContactSearchPoint>) -> Result<Self, ContactFitError> {
         let forces = points.iter().filter(|point| point.force.is_some()).count();
         if forces < FORCES_MIN {
             return Err(ContactFitError::TooShort { points: forces });
@@ -194,13 +194,13 @@ impl Search {
 
     /// The same search with means of so many points in the place of one.
     fn thinned(&self, group: usize) -> Self {
-        let mean_of = |points: &[TouchPoint]| {
-            let mean = |of: &dyn Fn(&TouchPoint) -> f64| {
+        let mean_of = |points: &[ContactSearchPoint]| {
+            let mean = |of: &dyn Fn(&ContactSearchPoint) -> f64| {
                 points.iter().map(of).sum::<f64>() / points.len() as f64
             };
             let forces: Option<Vec<f64>> =
                 points.iter().map(|point| point.force.map(|force| force.0)).collect();
-            TouchPoint {
+            ContactSearchPoint {
                 t: Seconds(mean(&|point| point.t.0)),
                 position: Position(mean(&|point| point.position.0)),
                 force: forces.map(|f| Newtons(f.iter().sum::<f64>() / f.len() as f64)),
@@ -211,9 +211,13 @@ impl Search {
     }
 
     /// Follows the path; hands out the body's columns at every force, zero where nothing is touched.
-    fn follow(&self, trial: Trial, mut at: impl FnMut(usize, &TouchPoint, f64, [f64; BODY])) {
+    fn follow(
+        &self,
+        trial: Trial,
+        mut at: impl FnMut(usize, &ContactSearchPoint, f64, [f64; BODY]),
+    ) {
         let body = ModifiedKelvin { tau_eps: trial.log_tau.exp(), mu: [0.0; 3], tau_sig: 0.0 };
-        let depth = |index: usize, point: &TouchPoint| {
+        let depth = |index: usize, point: &ContactSearchPoint| {
             let is_second = self.between.is_some_and(|between| index > between);
             let separation = if is_second { trial.separation } else { 0.0 };
             Depth(point.position.0 - trial.contact - separation)
@@ -244,7 +248,7 @@ impl Search {
     }
 
     /// The linear columns, and the force.
-    fn row(&self, point: &TouchPoint, force: f64, columns: [f64; BODY]) -> Row {
+    fn row(&self, point: &ContactSearchPoint, force: f64, columns: [f64; BODY]) -> Row {
         let mut row = [0.0; SPACE];
         row[..2].copy_from_slice(&[1.0, point.t.0 / self.span]);
         row[2..2 + BODY].copy_from_slice(&columns);
@@ -367,7 +371,8 @@ impl Search {
             std_error_mm,
             rmse_n: bottom.variance.sqrt(),
         };
-        (gain > 100.0 && std_error_mm.is_finite()).then_some(TouchEstimate { contact, apart_mm })
+        (gain > 100.0 && std_error_mm.is_finite())
+            .then_some(TouchEstimate { contact, separation_mm: apart_mm })
     }
 
     /// How much deeper the second touch met the tissue, if that is more than noise: everything is

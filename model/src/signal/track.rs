@@ -12,12 +12,12 @@ pub const SEGMENT: usize = 1 << 16;
 
 /// Samples that follow each other: their times, and a pyramid for each quantity.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Segment {
+pub struct TrackSegment {
     times: Vec<f64>,
     columns: Vec<Pyramid>,
 }
 
-impl Segment {
+impl TrackSegment {
     /// A segment of times in s, not decreasing, with as many values of each quantity; what is not a finite
     /// number is a gap.
     ///
@@ -52,7 +52,7 @@ impl Segment {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
+pub struct DrawStatistics {
     pub points: usize,
     /// The most samples that share a lowest and a highest one; 1 where every sample is drawn.
     pub samples_per_column: usize,
@@ -70,16 +70,16 @@ pub struct TrackPosition {
 
 /// A recording as segments in order of time.
 #[derive(Clone, Debug, Default)]
-pub struct Track {
-    segments: Vec<Arc<Segment>>,
+pub struct SignalTrack {
+    segments: Vec<Arc<TrackSegment>>,
     /// Samples before each segment.
     before: Vec<usize>,
     samples: usize,
 }
 
-impl Track {
+impl SignalTrack {
     /// Adds what follows; a segment without samples is none.
-    pub fn push(&mut self, segment: Arc<Segment>) {
+    pub fn push(&mut self, segment: Arc<TrackSegment>) {
         if segment.times.is_empty() {
             return;
         }
@@ -102,7 +102,7 @@ impl Track {
     }
 
     /// The segments in order of time.
-    pub fn segments(&self) -> &[Arc<Segment>] {
+    pub fn segments(&self) -> &[Arc<TrackSegment>] {
         &self.segments
     }
 
@@ -179,9 +179,9 @@ impl Track {
         [from, to]: [f64; 2],
         pixels: f64,
         mut draw: impl FnMut(Option<[f64; 2]>),
-    ) -> Drawn {
+    ) -> DrawStatistics {
         let per_second = pixels / (to - from);
-        let mut pen = Pen { draw: &mut draw, newest: None, drawn: Drawn::default() };
+        let mut pen = Pen { draw: &mut draw, newest: None, drawn: DrawStatistics::default() };
         if self.segments.is_empty() || !(per_second.is_finite() && per_second > 0.0) {
             return pen.drawn;
         }
@@ -224,7 +224,7 @@ impl Track {
 struct Pen<'a, F> {
     draw: &'a mut F,
     newest: Option<usize>,
-    drawn: Drawn,
+    drawn: DrawStatistics,
 }
 
 impl<F: FnMut(Option<[f64; 2]>)> Pen<'_, F> {
@@ -247,8 +247,8 @@ mod tests {
     use crate::random::SplitMix;
 
     /// Segments of any length at a rate that changes, with gaps; with the raw samples.
-    fn track(random: &mut SplitMix, segments: usize) -> (Track, Vec<(f64, f32)>) {
-        let (mut track, mut raw, mut t) = (Track::default(), Vec::new(), 0.0);
+    fn track(random: &mut SplitMix, segments: usize) -> (SignalTrack, Vec<(f64, f32)>) {
+        let (mut track, mut raw, mut t) = (SignalTrack::default(), Vec::new(), 0.0);
         for _ in 0..segments {
             let count = 1 + random.below(3000);
             let step = [1e-3, 0.05, 1.0][random.below(3)];
@@ -263,7 +263,7 @@ mod tests {
                 t += step;
             }
             raw.extend(times.iter().copied().zip(values.iter().copied()));
-            track.push(Arc::new(Segment::new(times, &[values])));
+            track.push(Arc::new(TrackSegment::new(times, &[values])));
         }
         (track, raw)
     }
@@ -326,7 +326,7 @@ mod tests {
             let high = own.map(|one| f64::from(one.1)).reduce(f64::max);
             assert_eq!(track.extremes(0, from, to).map(|ends| ends[1].1), high);
         }
-        assert_eq!(Track::default().place(1.0), None);
+        assert_eq!(SignalTrack::default().place(1.0), None);
         assert_eq!(track.time_of(usize::MAX), Some(end));
         assert_eq!(track.extremes(3, 0, 10), None);
     }
@@ -335,9 +335,9 @@ mod tests {
     fn memory_is_as_stated() {
         let count = 1 << 16;
         let times = (0..count).map(f64::from).collect();
-        let mut track = Track::default();
+        let mut track = SignalTrack::default();
         let values = vec![1.0f32; count as usize];
-        track.push(Arc::new(Segment::new(times, &vec![values; 4])));
+        track.push(Arc::new(TrackSegment::new(times, &vec![values; 4])));
         let per_sample = track.bytes() as f64 / f64::from(count);
         assert!((26.6..26.7).contains(&per_sample), "{per_sample}");
     }

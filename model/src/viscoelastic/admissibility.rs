@@ -25,7 +25,7 @@ const SHALLOW_MM: f64 = 5e-4;
 
 /// Depths at which the elastic force falls with depth.
 #[must_use]
-pub fn unstable(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
+pub fn unstable_bands(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
     let [mu1, mu2, mu3] = body.mu;
     negative([mu1, 2.0 * mu2, 3.0 * mu3])
 }
@@ -49,7 +49,7 @@ pub fn active_pokes(body: &ModifiedKelvin) -> Vec<InadmissibleBand> {
 pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
     let cases = [
         (
-            unstable(body),
+            unstable_bands(body),
             "the elastic force falls with depth {bands}: there this body is unstable if held by force",
         ),
         (active_cycles(body), "around depths {bands} a small slow cycle returns energy"),
@@ -127,7 +127,7 @@ mod tests {
         let close = |value: f64, wanted: f64, digits: f64| {
             assert!((value - wanted).abs() < digits, "{value} {wanted}");
         };
-        let bands = unstable(&THESIS);
+        let bands = unstable_bands(&THESIS);
         assert_eq!(bands.len(), 1);
         close(bands[0].from, 4.98, 0.005);
         close(bands[0].to, 8.21, 0.005);

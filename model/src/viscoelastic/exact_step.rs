@@ -21,12 +21,12 @@ pub const NEGLIGIBLE: f64 = 1e-200;
 /// 224-242: exact where the sum outweighs the increment, and where it does not, there is little to
 /// lose yet).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Compensated {
+pub struct CompensatedSum {
     pub value: f64,
     carry: f64,
 }
 
-impl Compensated {
+impl CompensatedSum {
     /// A sum that starts at `value`.
     pub const fn new(value: f64) -> Self {
         Self { value, carry: 0.0 }
@@ -85,7 +85,7 @@ pub fn forcing(x0: f64, d: f64, psi: &[f64]) -> [f64; 3] {
 
 /// A straight piece of depth, cut where it crosses the surface: at most one part in contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pieces {
+pub enum ContactPieces {
     /// In contact all the way.
     Inside,
     /// Out of contact all the way.
@@ -96,7 +96,7 @@ pub enum Pieces {
     Leaving([f64; 2]),
 }
 
-impl Pieces {
+impl ContactPieces {
     /// Where a straight move from depth `from` to depth `to` touches; depth 0 is the surface.
     ///
     /// Each share is formed on its own: one less the other would keep no digit of a touch at the very
@@ -118,7 +118,7 @@ mod tests {
 
     #[test]
     fn compensation_keeps_what_plain_sums_lose() {
-        let mut sum = Compensated::new(1.0);
+        let mut sum = CompensatedSum::new(1.0);
         for _ in 0..1_000_000 {
             sum.add(1e-17);
         }
@@ -137,11 +137,11 @@ mod tests {
 
     #[test]
     fn crossings_are_cut_at_the_surface() {
-        assert_eq!(Pieces::of(0.0, 0.0), Pieces::Inside);
-        assert_eq!(Pieces::of(-2.0, -0.1), Pieces::Outside);
-        assert_eq!(Pieces::of(-1.0, 3.0), Pieces::Entering([0.25, 0.75]));
-        assert_eq!(Pieces::of(3.0, -1.0), Pieces::Leaving([0.75, 0.25]));
-        assert_eq!(Pieces::of(0.0, -1.0), Pieces::Leaving([0.0, 1.0]));
-        assert_eq!(Pieces::of(-1.0, 1e-20), Pieces::Entering([1.0, 1e-20]));
+        assert_eq!(ContactPieces::of(0.0, 0.0), ContactPieces::Inside);
+        assert_eq!(ContactPieces::of(-2.0, -0.1), ContactPieces::Outside);
+        assert_eq!(ContactPieces::of(-1.0, 3.0), ContactPieces::Entering([0.25, 0.75]));
+        assert_eq!(ContactPieces::of(3.0, -1.0), ContactPieces::Leaving([0.75, 0.25]));
+        assert_eq!(ContactPieces::of(0.0, -1.0), ContactPieces::Leaving([0.0, 1.0]));
+        assert_eq!(ContactPieces::of(-1.0, 1e-20), ContactPieces::Entering([1.0, 1e-20]));
     }
 }

@@ -5,7 +5,7 @@
 //! feedback for endoscopic surgery); with `mu2 = mu3 = 0` and a viscous term `mu1 tau_sig x'` it
 //! would be the standard linear solid.
 
-use super::exact_step::{Compensated, Pieces, StepWeights, forcing};
+use super::exact_step::{CompensatedSum, ContactPieces, StepWeights, forcing};
 use crate::units::{Depth, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -13,7 +13,7 @@ use thiserror::Error;
 /// Parameters of the modified Kelvin body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModifiedKelvin {
-    /// Relaxation time of the force at constant depth, in s.
+    /// StressRelaxation time of the force at constant depth, in s.
     pub tau_eps: f64,
     /// Elastic coefficients `mu1, mu2, mu3` in N/mm, N/mm^2, N/mm^3.
     pub mu: [f64; 3],
@@ -64,8 +64,8 @@ impl ModifiedKelvin {
 /// is cut exactly where the straight path crosses it, so splitting steps never changes the force.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KelvinState {
-    powers: [Compensated; 3],
-    viscous: Compensated,
+    powers: [CompensatedSum; 3],
+    viscous: CompensatedSum,
     depth: f64,
     weights: StepWeights,
     tau: f64,
@@ -89,8 +89,8 @@ impl KelvinState {
     #[must_use]
     pub fn at_rest_from(depth: Depth) -> Self {
         Self {
-            powers: [Compensated::default(); 3],
-            viscous: Compensated::default(),
+            powers: [CompensatedSum::default(); 3],
+            viscous: CompensatedSum::default(),
             depth: depth.0.min(0.0),
             weights: StepWeights::new(0.0, 1.0),
             tau: 1.0,
@@ -138,14 +138,14 @@ impl KelvinState {
             self.weights = StepWeights::new(dt, tau);
             self.tau = tau;
         }
-        match Pieces::of(from, to) {
-            Pieces::Inside => self.advance(from, to - from, &self.weights.clone()),
-            Pieces::Outside => self.advance(0.0, 0.0, &self.weights.clone()),
-            Pieces::Entering([outside, inside]) => {
+        match ContactPieces::of(from, to) {
+            ContactPieces::Inside => self.advance(from, to - from, &self.weights.clone()),
+            ContactPieces::Outside => self.advance(0.0, 0.0, &self.weights.clone()),
+            ContactPieces::Entering([outside, inside]) => {
                 self.advance(0.0, 0.0, &StepWeights::new(dt * outside, tau));
                 self.advance(0.0, to, &StepWeights::new(dt * inside, tau));
             }
-            Pieces::Leaving([inside, outside]) => {
+            ContactPieces::Leaving([inside, outside]) => {
                 self.advance(from, -from, &StepWeights::new(dt * inside, tau));
                 self.advance(0.0, 0.0, &StepWeights::new(dt * outside, tau));
             }

@@ -5,7 +5,7 @@ mod exact_step;
 mod kelvin;
 mod psi;
 
-pub use exact_step::{Compensated, NEGLIGIBLE, Pieces, StepWeights, forcing};
+pub use exact_step::{CompensatedSum, ContactPieces, NEGLIGIBLE, StepWeights, forcing};
 pub use kelvin::{BodyError, KelvinState, ModifiedKelvin};
 pub use psi::{PSI_COUNT, psi_all, psi_derivatives, psi_first};
 pub use psi::{psi, psi_derivative};

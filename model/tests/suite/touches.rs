@@ -1,6 +1,6 @@
 //! The contact position from two touches, for bodies unlike the one that is fitted: integrated here by small steps.
 
-use palpate_model::signal::{TouchEstimate, TouchPoint, fit_touch};
+use palpate_model::signal::{ContactSearchPoint, TouchEstimate, fit_touch};
 use palpate_model::units::{Newtons, Position, Seconds};
 use palpate_test_support::record::Noise;
 
@@ -34,7 +34,7 @@ const WAY: [(f64, f64); 6] =
     [(16.4, 1.5), (5.0, 0.0), (11.7, 1.5), (10.0, 0.0), (14.9, 0.18), (5.0, 0.0)];
 
 /// What the two touches feel if the surface is elsewhere by `apart` mm at the second.
-fn touched(body: &Body, apart: f64, seed: u64) -> Vec<TouchPoint> {
+fn touched(body: &Body, apart: f64, seed: u64) -> Vec<ContactSearchPoint> {
     let mut noise = Noise::seeded(seed);
     let (mut t, mut place, mut force, mut points) = (0.0, 4.0f64, 0.0, Vec::new());
     for (number, (amount, speed)) in WAY.into_iter().enumerate() {
@@ -56,7 +56,7 @@ fn touched(body: &Body, apart: f64, seed: u64) -> Vec<TouchPoint> {
             }
             t += POINT_S;
             let felt = sum / STEPS as f64 + NOISE * noise.normal();
-            points.push(TouchPoint {
+            points.push(ContactSearchPoint {
                 t: Seconds(t),
                 position: Position(at / STEPS as f64),
                 force: (number != 2).then_some(Newtons(felt)),
@@ -74,7 +74,7 @@ fn found(body: &Body, apart: f64, seed: u64) -> TouchEstimate {
 fn bodies_of_every_kind_are_met_where_they_are() {
     for (name, body) in [("linear", LINEAR), ("thesis", THESIS), ("quasi-linear", QUASI_LINEAR)] {
         for seed in 0..8 {
-            let TouchEstimate { contact, apart_mm } = found(&body, 0.0, seed);
+            let TouchEstimate { contact, separation_mm } = found(&body, 0.0, seed);
             let off = contact.position.0 - SURFACE;
             // Five standard errors: 24 of a hundred million searches.
             assert!(
@@ -84,7 +84,10 @@ fn bodies_of_every_kind_are_met_where_they_are() {
             );
             assert!(contact.rmse_n < 1.2 * NOISE, "{name}: {}", contact.rmse_n);
             // Noise is taken for a distance once in three hundred; never for one that matters.
-            assert!(apart_mm.is_none_or(|apart| apart.abs() < 0.02), "{name}: {apart_mm:?}");
+            assert!(
+                separation_mm.is_none_or(|apart| apart.abs() < 0.02),
+                "{name}: {separation_mm:?}"
+            );
         }
     }
 }
@@ -93,7 +96,7 @@ fn bodies_of_every_kind_are_met_where_they_are() {
 fn a_surface_that_moved_between_the_touches_is_reported() {
     for (name, body) in [("linear", LINEAR), ("thesis", THESIS), ("quasi-linear", QUASI_LINEAR)] {
         for apart in [-0.3, 0.2] {
-            let found = found(&body, apart, 1).apart_mm.unwrap_or(0.0);
+            let found = found(&body, apart, 1).separation_mm.unwrap_or(0.0);
             assert!((found - apart).abs() < 0.02, "{name}: {found} for {apart}");
         }
     }

@@ -8,7 +8,7 @@ use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Ack, AxisStatus, Limits, Reading, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
-use palpate_protocols::engine::{Config, Effect, Input, Operator, State, step};
+use palpate_protocols::engine::{Effect, EngineConfig, EngineInput, EngineState, Operator, step};
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::{Hold, HoldRate, Plan, Rest, SelfTest, Step, Tare};
 use palpate_protocols::preview::preview;
@@ -79,10 +79,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         (0..PREVIEWS).map(|_| preview(&ten_cycles, &rig(), &limits, &curve, true).expected.0);
     let expected = expected.fold(0.0, f64::max);
     let preview_us = watch.seconds() / f64::from(PREVIEWS) * 1e6;
-    let config = Config { rig: rig(), limits, curve, plan: plan(hours), is_homed: true };
-    let mut state = State::new(Arc::new(config));
+    let config = EngineConfig { rig: rig(), limits, curve, plan: plan(hours), is_homed: true };
+    let mut state = EngineState::new(Arc::new(config));
     let choice = Operator::Start;
-    state = step(state, Nanos::ZERO, Input::Operator { choice }).0;
+    state = step(state, Nanos::ZERO, EngineInput::Operator { choice }).0;
     let (mut tick, mut per_hour, mut memory) = (0u64, Vec::new(), Vec::new());
     while state.outcome().is_none() && (per_hour.len() as u64) < hours {
         let watch = Stopwatch::start();
@@ -99,13 +99,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 age: None,
             };
             let now = Nanos(tick * 1_000_000);
-            let (next, effects) = step(state, now, Input::Reading(reading));
+            let (next, effects) = step(state, now, EngineInput::Reading(reading));
             state = next;
             for effect in effects {
                 if let Effect::Command(command @ (RigCommand::EnableMotor | RigCommand::Stop)) =
                     effect
                 {
-                    let (next, _) = step(state, now, Input::Ack(Ack { command }));
+                    let (next, _) = step(state, now, EngineInput::Ack(Ack { command }));
                     state = next;
                 }
             }

@@ -6,18 +6,20 @@ use super::leading::LeadFeed;
 use super::live_feed::LiveFeed;
 use super::run_log::RunLog;
 use super::snapshot::{Lateness, RunView};
-use super::start::{AfterStop, Answers, RigContext, RunRequest};
+use super::start::{AfterStop, PromptResponder, RigContext, RunRequest};
 use super::watch::HostWatch;
-use crate::fidelity::{FidelityMeter, first_verdict};
+use crate::fidelity::{FidelityMeter, assess_data_quality};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, HandAction, RawBytes, Reading, RigCommand};
 use palpate_model::units::Seconds;
-use palpate_protocols::engine::{self, Config, Effect, Input, Operator, Outcome, PauseView, State};
+use palpate_protocols::engine::{
+    self, Effect, EngineConfig, EngineInput, EngineState, Operator, PauseView, RunOutcome,
+};
 use palpate_protocols::preview::Preview;
-use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
-use palpate_sessions::health::Told;
-use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
-use palpate_sessions::{Health, LogError, SessionWriter};
+use palpate_sessions::edits::{DataQuality, Edit, EditChange, add_edit};
+use palpate_sessions::health::HealthContent;
+use palpate_sessions::record::{EndRecord, EntryKind, LogEntry, SampleRow};
+use palpate_sessions::{HealthMessage, LogError, SessionWriter};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,17 +30,17 @@ const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
 
 pub(super) struct ActiveRun {
     /// `None` only while `engine::step` has it.
-    engine: Option<State>,
+    engine: Option<EngineState>,
     writer: Option<SessionWriter>,
     folder: PathBuf,
     session_id: String,
     board: Board,
     run_log: RunLog,
     fidelity: FidelityMeter,
-    verdict: Option<(Verdict, String)>,
+    verdict: Option<(DataQuality, String)>,
     origin: Nanos,
     after_stop: AfterStop,
-    answers: Answers,
+    answers: PromptResponder,
     paused_since: Option<Nanos>,
     lateness: Option<Lateness>,
     reported_given_up: Seconds,
@@ -57,7 +59,7 @@ pub(super) struct ActiveRun {
 
 impl ActiveRun {
     pub fn new(
-        config: Config,
+        config: EngineConfig,
         preview: Preview,
         (writer, session_id): (SessionWriter, String),
         folder: PathBuf,
@@ -70,7 +72,7 @@ impl ActiveRun {
         let board = Board::new(&config, preview.steps, folder.clone());
         let begin = watch.as_ref().map(HostWatch::begin);
         let mut run = Self {
-            engine: Some(State::new(Arc::new(config))),
+            engine: Some(EngineState::new(Arc::new(config))),
             writer: Some(writer),
             folder,
             session_id,
@@ -101,7 +103,7 @@ impl ActiveRun {
     }
 
     /// The engine's state, except inside [`Self::feed`].
-    pub fn engine(&self) -> Option<&State> {
+    pub fn engine(&self) -> Option<&EngineState> {
         self.engine.as_ref()
     }
 
@@ -129,17 +131,17 @@ impl ActiveRun {
 
     /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
     /// written down, other commands after. Commands keep the engine's order.
-    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(RigAction)) {
+    pub fn feed(&mut self, now: Nanos, input: EngineInput, send: &mut dyn FnMut(RigAction)) {
         let Some(state) = self.engine.take() else {
             return;
         };
         *self.time_use.entry(state.phase().name()).or_default() += now.since(self.board.now()).0;
         self.board.push_input(now, &input);
         let (reading, logged) = match &input {
-            Input::Reading(reading) => (Some(*reading), None),
+            EngineInput::Reading(reading) => (Some(*reading), None),
             other => (None, Some((kind_of(other), to_json(other)))),
         };
-        let is_reported = matches!(input, Input::Fault(_) | Input::Operator { .. });
+        let is_reported = matches!(input, EngineInput::Fault(_) | EngineInput::Operator { .. });
         let reported = is_reported.then(|| input.clone());
         let (state, effects) = engine::step(state, now, input);
         let commands: Vec<RigAction> = effects.iter().filter_map(to_rig).collect();
@@ -147,7 +149,7 @@ impl ActiveRun {
         if is_urgent {
             commands.iter().copied().for_each(&mut *send);
         }
-        effects.iter().for_each(|effect| self.fidelity.effect(effect));
+        effects.iter().for_each(|effect| self.fidelity.push_effect(effect));
         if let Some(input) = &reported {
             self.run_log.log_input(now, input);
         }
@@ -161,7 +163,7 @@ impl ActiveRun {
         let lead = reading.and_then(|reading| self.lead.push(now, &reading, &state));
         if let Some(text) = self.live.take_failure() {
             self.report_trouble(&text);
-            self.log_health(Health { now, told: Told::Event { text } });
+            self.log_health(HealthMessage { now, content: HealthContent::Event { text } });
         }
         self.engine = Some(state);
         for effect in effects {
@@ -179,10 +181,10 @@ impl ActiveRun {
             commands.iter().copied().for_each(&mut *send);
         }
         if let Some(estimate) = estimate {
-            self.feed(now, Input::LiveFit(estimate), send);
+            self.feed(now, EngineInput::LiveFit(estimate), send);
         }
         if let Some(depth) = lead {
-            self.feed(now, Input::Lead { depth }, send);
+            self.feed(now, EngineInput::Lead { depth }, send);
         }
         self.after_feed(now, send);
     }
@@ -192,22 +194,24 @@ impl ActiveRun {
         self.handle_log_notices();
         if let (Some(fault), false) = (&self.log_failure, self.is_log_failure_reported) {
             self.is_log_failure_reported = true;
-            let fault = Input::Fault(fault.clone());
+            let fault = EngineInput::Fault(fault.clone());
             self.feed(now, fault, send);
         }
-        let mut choose = |run: &mut Self, choice| run.feed(now, Input::Operator { choice }, send);
+        let mut choose =
+            |run: &mut Self, choice| run.feed(now, EngineInput::Operator { choice }, send);
         if self.after_stop == AfterStop::Close && self.is_in(|state| state.holding().is_some()) {
             choose(self, Operator::Close);
         }
         if self.after_stop != AfterStop::Wait && self.is_left_alone(now) {
             choose(self, Operator::Leave);
         }
-        if self.answers == Answers::Confirm && self.is_in(|state| state.prompt().is_some()) {
+        if self.answers == PromptResponder::Confirm && self.is_in(|state| state.prompt().is_some())
+        {
             choose(self, Operator::Confirm);
         }
     }
 
-    fn is_in(&self, is_so: impl FnOnce(&State) -> bool) -> bool {
+    fn is_in(&self, is_so: impl FnOnce(&EngineState) -> bool) -> bool {
         self.engine.as_ref().is_some_and(is_so)
     }
 
@@ -217,7 +221,7 @@ impl ActiveRun {
         for notice in notices.into_iter().flatten() {
             let detail = notice.to_string();
             self.report_trouble(&detail);
-            if notice.ends_the_run() {
+            if notice.is_reason_to_end() {
                 self.log_failure.get_or_insert(Fault::LogAtRisk { detail });
             }
         }
@@ -251,7 +255,7 @@ impl ActiveRun {
         }
         if let Some(missed) = stood {
             let fault = Fault::HostPaused { missed };
-            self.feed(now, Input::Fault(fault), send);
+            self.feed(now, EngineInput::Fault(fault), send);
         }
     }
 
@@ -263,13 +267,13 @@ impl ActiveRun {
         }
     }
 
-    fn log_health(&mut self, health: Health) {
+    fn log_health(&mut self, health: HealthMessage) {
         self.write(|writer| writer.push_health(health));
     }
 
     /// Whether a paused run cannot go on by itself, or has not for too long.
     fn is_left_alone(&mut self, now: Nanos) -> bool {
-        let pause = self.engine.as_ref().map(State::pause);
+        let pause = self.engine.as_ref().map(EngineState::pause);
         let Some(PauseView::Paused { no_resume }) = pause else {
             self.paused_since = None;
             return false;
@@ -278,10 +282,10 @@ impl ActiveRun {
         no_resume.is_some() || now.since(since).seconds() > PAUSE_ALONE_MAX
     }
 
-    fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
+    fn log_row(&mut self, now: Nanos, reading: &Reading, state: &EngineState) {
         let (derived, cycle) = (state.derived(), state.cycle());
         self.board.push_sample(state);
-        let row = Row {
+        let row = SampleRow {
             tick: reading.tick,
             host: now,
             age: reading.age,
@@ -294,13 +298,13 @@ impl ActiveRun {
             phase: state.phase(),
             cycle,
         };
-        self.fidelity.row(&row);
+        self.fidelity.push_row(&row);
         self.write(|writer| writer.push_row(row));
     }
 
     fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
         let after_sample = self.board.samples();
-        let entry = Entry { kind, order: self.order, after_sample, now, body };
+        let entry = LogEntry { kind, order: self.order, after_sample, now, body };
         self.order += 1;
         self.write(|writer| writer.push_entry(entry));
     }
@@ -313,7 +317,7 @@ impl ActiveRun {
         }
     }
 
-    fn close(&mut self, outcome: Outcome) {
+    fn close(&mut self, outcome: RunOutcome) {
         self.board.push_outcome(&outcome);
         let now = self.board.now();
         self.log_state(now);
@@ -339,11 +343,11 @@ impl ActiveRun {
             self.log_error = Some(err.to_string());
         }
         self.run_log.log_end(&outcome, self.log_error.as_deref());
-        let (mut verdict, mut reason) = first_verdict(&outcome, self.fidelity.found());
+        let (mut verdict, mut reason) = assess_data_quality(&outcome, self.fidelity.found());
         if let Some(err) = &self.log_error {
             // A measurement with an incomplete log is not valid.
-            if verdict == Verdict::Valid {
-                verdict = Verdict::Suspect;
+            if verdict == DataQuality::Valid {
+                verdict = DataQuality::Suspect;
             }
             reason = format!("the log may be incomplete: {err}; {reason}");
         }
@@ -352,12 +356,12 @@ impl ActiveRun {
     }
 
     /// The automatic assessment is an entry of the edits, as those of reviewers are.
-    fn record_verdict(&mut self, verdict: Verdict, reason: &str) {
+    fn record_verdict(&mut self, verdict: DataQuality, reason: &str) {
         let edit = Edit {
             at: wall_now().into(),
             by: "palpate".into(),
             reason: reason.to_owned(),
-            change: Change::Verdict { verdict },
+            change: EditChange::Verdict { verdict },
         };
         if let Err(err) = add_edit(&self.folder, &self.session_id, &edit) {
             self.verdict_error = Some(err.to_string());
@@ -399,8 +403,8 @@ fn to_rig(effect: &Effect) -> Option<RigAction> {
     }
 }
 
-fn kind_of(input: &Input) -> EntryKind {
-    if matches!(input, Input::LiveFit(_)) { EntryKind::Fit } else { EntryKind::Input }
+fn kind_of(input: &EngineInput) -> EntryKind {
+    if matches!(input, EngineInput::LiveFit(_)) { EntryKind::Fit } else { EntryKind::Input }
 }
 
 /// The on-disk form of an input or effect. The types have no map keys but strings and reject

@@ -1,17 +1,19 @@
 //! What is shown of a run, gathered from what goes into its engine and what comes out: the same for a run in
 //! progress and for one that is replayed.
 
-use super::snapshot::{Lateness, LogLine, PromptView, RunView, ToWeigh, Touch};
+use super::snapshot::{ContactTrigger, Lateness, LogLine, PlannedWeight, PromptView, RunView};
 use crate::base::FoundBase;
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
-use palpate_protocols::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
+use palpate_protocols::engine::{
+    ContactPosition, EndingKind, EngineConfig, EngineInput, EngineState, Record, RunOutcome,
+};
 use palpate_protocols::plans::Step;
 use palpate_protocols::preview::StepPreview;
-use palpate_protocols::weighed::{Readings, Weighed};
-use palpate_sessions::edits::Verdict;
+use palpate_protocols::weight_readings::{WeightReading, WeightReadings};
+use palpate_sessions::edits::DataQuality;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -28,19 +30,19 @@ pub(crate) struct Board {
     trace: Arc<LiveTrace>,
     force_peak: Option<Newtons>,
     /// Contact position of the tissue, also when depths count from a base.
-    tissue: Option<Contact>,
+    tissue: Option<ContactPosition>,
     base: FoundBase,
     events: VecDeque<LogLine>,
     phases: Arc<Vec<(f64, Phase)>>,
     cycle_starts: Arc<Vec<(f64, u32)>>,
     cycles: u32,
-    to_weigh: Arc<Vec<ToWeigh>>,
-    readings: Readings,
-    weighed: Arc<Vec<Weighed>>,
+    to_weigh: Arc<Vec<PlannedWeight>>,
+    readings: WeightReadings,
+    weighed: Arc<Vec<WeightReading>>,
     /// Force over position while the surface is searched.
     approach: Arc<LiveTrace>,
-    touches: Arc<Vec<Touch>>,
-    outcome: Option<Outcome>,
+    touches: Arc<Vec<ContactTrigger>>,
+    outcome: Option<RunOutcome>,
 }
 
 /// What is known of a run's log and of its pace.
@@ -49,13 +51,13 @@ pub(crate) struct LogState {
     /// Session time through which everything is on disk.
     pub saved_through: Nanos,
     pub lateness: Option<Lateness>,
-    pub verdict: Option<(Verdict, String)>,
+    pub verdict: Option<(DataQuality, String)>,
     pub error: Option<String>,
     pub verdict_error: Option<String>,
 }
 
 impl Board {
-    pub fn new(config: &Config, steps: Vec<StepPreview>, folder: PathBuf) -> Self {
+    pub fn new(config: &EngineConfig, steps: Vec<StepPreview>, folder: PathBuf) -> Self {
         let cycles = config.plan.steps.iter().map(|planned| planned.cycle).max();
         Self {
             steps: Arc::new(steps),
@@ -71,7 +73,7 @@ impl Board {
             cycle_starts: Arc::new(Vec::new()),
             cycles: cycles.unwrap_or(0),
             to_weigh: Arc::new(to_weigh(config)),
-            readings: Readings::default(),
+            readings: WeightReadings::default(),
             weighed: Arc::default(),
             approach: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
             touches: Arc::default(),
@@ -89,21 +91,21 @@ impl Board {
     }
 
     /// How it ended, once it has.
-    pub fn outcome(&self) -> Option<&Outcome> {
+    pub fn outcome(&self) -> Option<&RunOutcome> {
         self.outcome.as_ref()
     }
 
     /// Samples come through [`Self::push_sample`], after the engine has taken them.
-    pub fn push_input(&mut self, now: Nanos, input: &Input) {
+    pub fn push_input(&mut self, now: Nanos, input: &EngineInput) {
         self.now = now;
         match input {
-            Input::Operator { choice } => self.note(format!("operator: {choice}"), false),
-            Input::Fault(fault) => self.note(fault.to_string(), true),
+            EngineInput::Operator { choice } => self.note(format!("operator: {choice}"), false),
+            EngineInput::Fault(fault) => self.note(fault.to_string(), true),
             _ => {}
         }
     }
 
-    pub fn push_sample(&mut self, state: &State) {
+    pub fn push_sample(&mut self, state: &EngineState) {
         self.samples += 1;
         let (cycle, last) = (state.cycle(), self.cycle_starts.last());
         if cycle > 0 && last.is_none_or(|(_, last)| *last != cycle) {
@@ -133,14 +135,15 @@ impl Board {
         }
         if let Record::ContactTriggered { pass, position, force, .. } = record {
             let (pass, position, force) = (*pass, *position, *force);
-            Arc::make_mut(&mut self.touches).push(Touch { pass, position, force });
+            Arc::make_mut(&mut self.touches).push(ContactTrigger { pass, position, force });
         }
         self.readings.record(record);
         if self.readings.all() != self.weighed.as_slice() {
             self.weighed = Arc::new(self.readings.all().to_vec());
         }
         if let Record::ContactFound { position, std_error_mm } = record {
-            self.tissue = Some(Contact { position: *position, std_error_mm: *std_error_mm });
+            self.tissue =
+                Some(ContactPosition { position: *position, std_error_mm: *std_error_mm });
         }
         if let Some(base) = FoundBase::of(record) {
             // Without a thickness no tissue is known in front of it.
@@ -155,7 +158,7 @@ impl Board {
         self.note(record.to_string(), is_alarm);
     }
 
-    pub fn push_outcome(&mut self, outcome: &Outcome) {
+    pub fn push_outcome(&mut self, outcome: &RunOutcome) {
         let text = format!("{}: {}", outcome.ending, outcome.reason);
         self.note(text, is_alarming(outcome.ending));
         self.outcome = Some(outcome.clone());
@@ -169,7 +172,7 @@ impl Board {
         self.events.push_back(LogLine { at, text, is_alarm });
     }
 
-    pub fn view(&self, state: &State, log: LogState) -> RunView {
+    pub fn view(&self, state: &EngineState, log: LogState) -> RunView {
         let (step_index, step_started) = state.step_progress();
         let (time_left, fraction) = self.progress(step_index, step_started);
         RunView {
@@ -203,24 +206,24 @@ impl Board {
             cycle: state.cycle(),
             cycles: self.cycles,
             cycle_starts: Arc::clone(&self.cycle_starts),
-            to_weigh: Arc::clone(&self.to_weigh),
-            weighed: Arc::clone(&self.weighed),
+            planned_weights: Arc::clone(&self.to_weigh),
+            weight_readings: Arc::clone(&self.weighed),
             settling: state.settling(),
             can_redo: state.can_redo().map_err(String::from),
             approach: Arc::clone(&self.approach),
-            touches: Arc::clone(&self.touches),
+            contact_triggers: Arc::clone(&self.touches),
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
             outcome: self.outcome.clone(),
-            verdict: log.verdict,
+            data_quality: log.verdict,
             log_error: log.error,
-            verdict_error: log.verdict_error,
+            data_quality_error: log.verdict_error,
             events: Arc::new(self.events.iter().cloned().collect()),
         }
     }
 
     /// Contact position of the tissue, also when depths count from the base behind it.
-    fn contact(&self, state: &State) -> Option<Contact> {
+    fn contact(&self, state: &EngineState) -> Option<ContactPosition> {
         let counted = state.contact()?;
         match self.base.base_mm == Some(counted.position.0) {
             true => self.tissue,
@@ -243,10 +246,10 @@ impl Board {
 }
 
 /// The readings under known masses that a plan has.
-fn to_weigh(config: &Config) -> Vec<ToWeigh> {
+fn to_weigh(config: &EngineConfig) -> Vec<PlannedWeight> {
     let steps = config.plan.steps.iter().enumerate();
     let weigh = steps.filter_map(|(step_index, planned)| match &planned.step {
-        Step::Weigh(weigh) => Some(ToWeigh {
+        Step::Weigh(weigh) => Some(PlannedWeight {
             step_index,
             mass_g: weigh.mass_g,
             is_loading: weigh.is_loading,
@@ -258,7 +261,7 @@ fn to_weigh(config: &Config) -> Vec<ToWeigh> {
 }
 
 /// Index of the step before it, and its name.
-fn next_checkpoint(state: &State, step_index: usize) -> Option<(usize, String)> {
+fn next_checkpoint(state: &EngineState, step_index: usize) -> Option<(usize, String)> {
     let mut ahead = state.config().plan.checkpoints_from(step_index);
     ahead.next().map(|(index, name)| (index, name.to_owned()))
 }

@@ -3,7 +3,7 @@
 use palpate_model::Nanos;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons};
-use palpate_protocols::engine::State;
+use palpate_protocols::engine::EngineState;
 use std::fmt::Debug;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,7 +12,7 @@ const LEAD_EVERY: Nanos = Nanos::from_millis(5);
 
 /// What the rig measured with one sample of a slave that follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Felt {
+pub struct SlaveSample {
     /// When it was taken, by the controller's clock, from any start.
     pub at: Nanos,
     pub depth: Depth,
@@ -23,34 +23,39 @@ pub struct Felt {
 }
 
 /// Called on the runner's thread with every sample of a step that follows.
-pub trait Leading: Debug + Send {
+pub trait LeadSource: Debug + Send {
     /// Takes a sample; where the slave is to be now, in mm from contact, or `None` where there is nothing
     /// new of what leads. Must not wait.
-    fn lead(&mut self, sample: &Felt) -> Option<f64>;
+    fn lead(&mut self, sample: &SlaveSample) -> Option<f64>;
 }
 
 /// Shared, so that its results can be read after the run.
-pub type Leader = Arc<Mutex<dyn Leading>>;
+pub type SharedLeadSource = Arc<Mutex<dyn LeadSource>>;
 
 #[derive(Debug)]
 pub(super) struct LeadFeed {
-    leader: Option<Leader>,
+    leader: Option<SharedLeadSource>,
     last: Option<Nanos>,
 }
 
 impl LeadFeed {
-    pub fn new(leader: Option<Leader>) -> Self {
+    pub fn new(leader: Option<SharedLeadSource>) -> Self {
         Self { leader, last: None }
     }
 
     /// Takes a sample after the engine; a lead for the engine if one is due, empty where it is not finite.
-    pub fn push(&mut self, now: Nanos, reading: &Reading, state: &State) -> Option<Option<Depth>> {
+    pub fn push(
+        &mut self,
+        now: Nanos,
+        reading: &Reading,
+        state: &EngineState,
+    ) -> Option<Option<Depth>> {
         let leader = self.leader.as_ref()?;
         let derived = state.derived();
         if state.phase() != Phase::Follow {
             return None;
         }
-        let sample = Felt {
+        let sample = SlaveSample {
             at: Nanos(reading.tick.saturating_mul(state.config().rig.tick_nanos)),
             depth: derived.depth?,
             force: derived.force?,

@@ -28,8 +28,10 @@ mod watch;
 use active_run::to_json;
 use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
-pub use leading::{Felt, Leader, Leading};
+pub use leading::{LeadSource, SharedLeadSource, SlaveSample};
 use live_feed::LiveFeed;
-pub use main_loop::{Request, Runner};
-pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot, ToWeigh, Touch};
-pub use start::{AfterStop, Answers, RunRequest, StartError};
+pub use main_loop::{Runner, RunnerRequest};
+pub use snapshot::{
+    ContactTrigger, Lateness, LogLine, PlannedWeight, PromptView, RigView, RunView, RunnerSnapshot,
+};
+pub use start::{AfterStop, PromptResponder, RunRequest, StartError};

@@ -1,10 +1,10 @@
 //! The live fit of a run, fed sample by sample. A panic in it switches it off and stops nothing else.
 
-use palpate_model::contained::contained;
 use palpate_model::estimate::LiveEstimate;
+use palpate_model::panics::catch_panic;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons, Seconds};
-use palpate_protocols::engine::{Config, State};
+use palpate_protocols::engine::{EngineConfig, EngineState};
 use palpate_rheology::fit::LiveFit;
 use std::any::Any;
 
@@ -45,11 +45,11 @@ pub(crate) struct LiveFeed {
 }
 
 impl LiveFeed {
-    pub fn new(config: &Config) -> Self {
+    pub fn new(config: &EngineConfig) -> Self {
         Self::with(config, |deepest| Box::new(LiveFit::new(deepest)))
     }
 
-    pub(super) fn with(config: &Config, make: MakeEstimator) -> Self {
+    pub(super) fn with(config: &EngineConfig, make: MakeEstimator) -> Self {
         Self {
             make,
             fit: Some(make(deepest(config))),
@@ -64,7 +64,7 @@ impl LiveFeed {
     }
 
     /// Takes a sample after the engine did; every half second there is an answer.
-    pub fn push(&mut self, reading: &Reading, state: &State) -> Option<LiveEstimate> {
+    pub fn push(&mut self, reading: &Reading, state: &EngineState) -> Option<LiveEstimate> {
         let derived = state.derived();
         if !matches!(state.phase(), Phase::Ramp | Phase::Hold) {
             return None;
@@ -82,7 +82,7 @@ impl LiveFeed {
         self.samples += 1;
         let is_due = self.samples.is_multiple_of(self.every);
         let fit = self.fit.as_mut()?;
-        let fed = contained(|| {
+        let fed = catch_panic(|| {
             fit.push(t, depth, force, sigma);
             is_due.then(|| fit.estimate()).flatten()
         });
@@ -109,7 +109,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 }
 
 /// The deepest point of the plan: the scale of the fit's basis.
-fn deepest(config: &Config) -> Depth {
+fn deepest(config: &EngineConfig) -> Depth {
     let depths = config.plan.steps.iter();
     let depths = depths.filter_map(|planned| planned.step.deepest());
     let deepest = depths.fold(0.0f64, |deepest, depth| deepest.max(depth.0));

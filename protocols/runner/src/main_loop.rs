@@ -9,7 +9,7 @@ use super::active_run::{ActiveRun, RigAction};
 use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
 use super::panic_stop::RigRegistration;
 use super::run_log::FaultLog;
-use super::snapshot::{RigView, Snapshot};
+use super::snapshot::{RigView, RunnerSnapshot};
 use super::start::{RigContext, RunRequest, StartError, start};
 use super::watch::HostWatch;
 use arc_swap::ArcSwap;
@@ -17,7 +17,7 @@ use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
 use palpate_model::units::Seconds;
-use palpate_protocols::engine::{Input, Operator};
+use palpate_protocols::engine::{EngineInput, Operator};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -44,7 +44,7 @@ const PUBLISH_EVERY: Duration = Duration::from_millis(33);
 /// Requests that may wait. An operator cannot press faster than the loop turns.
 const REQUESTS_MAX: usize = 64;
 
-pub enum Request {
+pub enum RunnerRequest {
     /// Start a run; the reply says whether it started.
     Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
@@ -57,8 +57,8 @@ pub enum Request {
 
 /// The runner's thread and the two ways to talk with it: requests in, snapshots out.
 pub struct Runner {
-    requests: SyncSender<Request>,
-    snapshot: Arc<ArcSwap<Snapshot>>,
+    requests: SyncSender<RunnerRequest>,
+    snapshot: Arc<ArcSwap<RunnerSnapshot>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -70,7 +70,7 @@ impl Runner {
     pub fn start(
         rig: Box<dyn Rig>,
         scale: TimeScale,
-        first: Option<Request>,
+        first: Option<RunnerRequest>,
         wake: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(REQUESTS_MAX);
@@ -91,19 +91,19 @@ impl Runner {
     }
 
     /// Asks for something. Fails only when the runner has ended or is swamped.
-    pub fn request(&self, request: Request) -> Result<(), String> {
+    pub fn request(&self, request: RunnerRequest) -> Result<(), String> {
         self.requests
             .try_send(request)
             .map_err(|_| "the runner does not answer; close palpate and check the rig".to_string())
     }
 
     /// Passes on the operator's choice.
-    pub fn operator(&self, choice: Operator) -> Result<(), String> {
-        self.request(Request::Operator(choice))
+    pub fn send_choice(&self, choice: Operator) -> Result<(), String> {
+        self.request(RunnerRequest::Operator(choice))
     }
 
     /// A sender of requests for another thread, such as a signal handler.
-    pub fn requests(&self) -> SyncSender<Request> {
+    pub fn requests(&self) -> SyncSender<RunnerRequest> {
         self.requests.clone()
     }
 
@@ -117,7 +117,7 @@ impl Runner {
     }
 
     /// The newest snapshot.
-    pub fn snapshot(&self) -> Arc<Snapshot> {
+    pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
         self.snapshot.load_full()
     }
 }
@@ -125,7 +125,7 @@ impl Runner {
 impl Drop for Runner {
     fn drop(&mut self) {
         // The thread drains its queue, so this waits at most a moment; if it is gone there is no need.
-        let _ = self.requests.send(Request::Shutdown);
+        let _ = self.requests.send(RunnerRequest::Shutdown);
         let (closed, _) = sync_channel(1);
         self.requests = closed;
         if let Some(thread) = self.thread.take() {
@@ -177,9 +177,9 @@ impl MainLoop {
 
     pub(super) fn run(
         mut self,
-        first: Option<Request>,
-        requests: &Receiver<Request>,
-        shared: &ArcSwap<Snapshot>,
+        first: Option<RunnerRequest>,
+        requests: &Receiver<RunnerRequest>,
+        shared: &ArcSwap<RunnerSnapshot>,
         wake: &impl Fn(),
     ) {
         let mut publish = Throttle::new(PUBLISH_EVERY);
@@ -241,7 +241,7 @@ impl MainLoop {
         let late = behind.saturating_sub(std::mem::replace(&mut self.behind, behind));
         let late = Nanos::from_seconds(Seconds(late.as_secs_f64()));
         if late > TICK && !self.rig.is_virtual() {
-            self.feed(Input::HostLate { late });
+            self.feed(EngineInput::HostLate { late });
         }
     }
 
@@ -278,7 +278,7 @@ impl MainLoop {
             if limit == self.next_tick {
                 self.next_tick = limit + TICK;
                 if !std::mem::take(&mut self.is_sample_seen) {
-                    self.feed(Input::Tick);
+                    self.feed(EngineInput::Tick);
                 }
             }
         }
@@ -287,7 +287,7 @@ impl MainLoop {
     fn feed_sensors(&mut self) {
         for value in self.rig.take_sensors() {
             if value.is_possible() {
-                self.feed(Input::Sensor { value });
+                self.feed(EngineInput::Sensor { value });
             }
         }
     }
@@ -297,7 +297,7 @@ impl MainLoop {
             // A signal that is not a number must not reach a plot, a fit or a file.
             RigEventBody::Reading(reading) if !reading.volts.is_finite() => {
                 let tick = reading.tick;
-                self.feed(Input::Fault(Fault::SignalInvalid { tick }));
+                self.feed(EngineInput::Fault(Fault::SignalInvalid { tick }));
             }
             RigEventBody::Reading(reading) => {
                 self.is_sample_seen = true;
@@ -309,9 +309,9 @@ impl MainLoop {
                     self.is_homed = false;
                 }
                 self.reading = Some(reading);
-                self.feed(Input::Reading(reading));
+                self.feed(EngineInput::Reading(reading));
             }
-            RigEventBody::Ack(ack) => self.feed(Input::Ack(ack)),
+            RigEventBody::Ack(ack) => self.feed(EngineInput::Ack(ack)),
             RigEventBody::Fault(fault) => {
                 if !self.is_running() {
                     self.faults.log_fault(self.now, &fault);
@@ -325,7 +325,7 @@ impl MainLoop {
                     // A reset controller has lost its settings.
                     self.link_error = Some("the controller was reset".into());
                 }
-                self.feed(Input::Fault(fault));
+                self.feed(EngineInput::Fault(fault));
             }
         }
     }
@@ -342,7 +342,7 @@ impl MainLoop {
     }
 
     /// One input to the run in progress, if there is one, and its commands to the rig.
-    fn feed(&mut self, input: Input) {
+    fn feed(&mut self, input: EngineInput) {
         // Also between runs, so that nothing piles up.
         let raw = self.rig.take_raw();
         let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else {
@@ -357,17 +357,17 @@ impl MainLoop {
         }
     }
 
-    fn serve(&mut self, request: Request) -> bool {
+    fn serve(&mut self, request: RunnerRequest) -> bool {
         match request {
-            Request::Run(request, reply) => {
+            RunnerRequest::Run(request, reply) => {
                 let answer = self.start_run(&request);
                 self.refusal = answer.as_ref().err().map(ToString::to_string);
                 // The caller may have stopped waiting; the snapshot holds the same answer.
                 let _ = reply.try_send(answer);
             }
-            Request::Operator(choice) => {
+            RunnerRequest::Operator(choice) => {
                 if self.is_running() {
-                    self.feed(Input::Operator { choice });
+                    self.feed(EngineInput::Operator { choice });
                 } else if matches!(choice, Operator::Stop | Operator::Abort) {
                     self.rig.send(RigCommand::Stop);
                 } else if choice == Operator::Halt {
@@ -375,9 +375,9 @@ impl MainLoop {
                     self.is_homed = false;
                 }
             }
-            Request::Note(text) => self.feed(Input::Note { text }),
-            Request::Reconnect if self.is_running() => {}
-            Request::Reconnect => {
+            RunnerRequest::Note(text) => self.feed(EngineInput::Note { text }),
+            RunnerRequest::Reconnect if self.is_running() => {}
+            RunnerRequest::Reconnect => {
                 self.reading = None;
                 self.is_homed = false;
                 self.link_error = self.rig.reconnect().err().map(|err| err.to_string());
@@ -389,7 +389,7 @@ impl MainLoop {
                     None => tracing::info!("connected again"),
                 }
             }
-            Request::Shutdown => return true,
+            RunnerRequest::Shutdown => return true,
         }
         false
     }
@@ -415,14 +415,14 @@ impl MainLoop {
         self.run = Some(start(request, context)?);
         // What was exchanged before belongs to no run.
         drop(self.rig.take_raw());
-        self.feed(Input::Operator { choice: Operator::Start });
+        self.feed(EngineInput::Operator { choice: Operator::Start });
         Ok(())
     }
 
     /// Stops whatever moves, waits until it rests and closes the session.
     fn shut_down(&mut self) {
         if self.is_running() {
-            self.feed(Input::Operator { choice: Operator::Stop });
+            self.feed(EngineInput::Operator { choice: Operator::Stop });
             // Braking has two seconds, the halt after it two more.
             let give_up = self.now + Nanos::from_millis(6_000);
             while self.is_running() && self.now < give_up {
@@ -433,7 +433,7 @@ impl MainLoop {
                     .and_then(ActiveRun::engine)
                     .is_some_and(|state| state.holding().is_some());
                 if is_holding {
-                    self.feed(Input::Operator { choice: Operator::Close });
+                    self.feed(EngineInput::Operator { choice: Operator::Close });
                 }
             }
         } else if self.reading.is_some_and(|reading| reading.status.has(AxisStatus::MOVING)) {
@@ -441,8 +441,8 @@ impl MainLoop {
         }
     }
 
-    pub(super) fn snapshot(&self, sequence: u64) -> Snapshot {
-        Snapshot {
+    pub(super) fn snapshot(&self, sequence: u64) -> RunnerSnapshot {
+        RunnerSnapshot {
             rig: RigView {
                 description: Arc::clone(&self.description),
                 reading: self.reading,
@@ -460,6 +460,6 @@ impl MainLoop {
 fn act(rig: &mut dyn Rig, action: RigAction) {
     match action {
         RigAction::Command(command) => rig.send(command),
-        RigAction::Hand(by_hand) => rig.by_hand(by_hand),
+        RigAction::Hand(by_hand) => rig.apply_hand_action(by_hand),
     }
 }

@@ -3,7 +3,7 @@
 //! The runner is asked for the immediate stop, so that the session says how it ended. Where a runner does not answer or panics
 //! itself, the link's own thread sends the stop.
 
-use super::main_loop::Request;
+use super::main_loop::RunnerRequest;
 use arc_swap::ArcSwap;
 use palpate_drivers::wire::HaltHandle;
 use palpate_protocols::engine::Operator;
@@ -20,7 +20,7 @@ const LINK_PATIENCE: Duration = Duration::from_millis(50);
 /// One runner's rig.
 struct OpenRig {
     runner: ThreadId,
-    requests: SyncSender<Request>,
+    requests: SyncSender<RunnerRequest>,
     link: Option<HaltHandle>,
 }
 
@@ -31,7 +31,7 @@ static OPEN: LazyLock<ArcSwap<Vec<Arc<OpenRig>>>> = LazyLock::new(ArcSwap::defau
 pub(super) struct RigRegistration(Arc<OpenRig>);
 
 impl RigRegistration {
-    pub fn new(requests: SyncSender<Request>, link: Option<HaltHandle>) -> Self {
+    pub fn new(requests: SyncSender<RunnerRequest>, link: Option<HaltHandle>) -> Self {
         let rig = Arc::new(OpenRig { runner: std::thread::current().id(), requests, link });
         OPEN.rcu(|open| [open.as_slice(), &[Arc::clone(&rig)]].concat());
         Self(rig)
@@ -71,7 +71,7 @@ impl OpenRig {
         let written = self.link.as_ref().map_or(0, HaltHandle::written);
         let choice = Operator::Halt;
         let is_asked = std::thread::current().id() != self.runner
-            && self.requests.try_send(Request::Operator(choice)).is_ok();
+            && self.requests.try_send(RunnerRequest::Operator(choice)).is_ok();
         // A rig without wires moves only while its runner asks it; a link's own thread stops it with the farewell.
         let Some(link) = self.link.as_ref().filter(|link| !link.is_own_thread()) else {
             return;

@@ -3,7 +3,7 @@
 
 use palpate_model::Nanos;
 use palpate_model::rig::Fault;
-use palpate_protocols::engine::{EndingKind, FailureResponse, Input, Outcome, Record};
+use palpate_protocols::engine::{EndingKind, EngineInput, FailureResponse, Record, RunOutcome};
 use palpate_protocols::plans::Plan;
 use std::mem::{Discriminant, discriminant};
 use std::path::Path;
@@ -69,10 +69,10 @@ impl RunLog {
         }
     }
 
-    pub fn log_input(&mut self, now: Nanos, input: &Input) {
+    pub fn log_input(&mut self, now: Nanos, input: &EngineInput) {
         match input {
-            Input::Fault(fault) => self.step.in_scope(|| self.faults.log_fault(now, fault)),
-            Input::Operator { choice } => info!(parent: &self.step, "operator: {choice}"),
+            EngineInput::Fault(fault) => self.step.in_scope(|| self.faults.log_fault(now, fault)),
+            EngineInput::Operator { choice } => info!(parent: &self.step, "operator: {choice}"),
             _ => {}
         }
     }
@@ -124,7 +124,7 @@ impl RunLog {
         warn!(parent: &self.step, "{text}");
     }
 
-    pub fn log_end(&self, outcome: &Outcome, log_error: Option<&str>) {
+    pub fn log_end(&self, outcome: &RunOutcome, log_error: Option<&str>) {
         info!(parent: &self.run, "session closed, {}", outcome.ending);
         if let Some(err) = log_error {
             error!(parent: &self.run, "{err}");

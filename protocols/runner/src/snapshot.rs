@@ -2,20 +2,22 @@
 
 use crate::base::FoundBase;
 use palpate_model::Nanos;
-use palpate_model::calibration::SettlingNow;
+use palpate_model::calibration::SettleProgress;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Newtons, Position, Seconds};
-use palpate_protocols::engine::{Contact, Derived, Outcome, PauseView, Power, UnloadedSignal};
+use palpate_protocols::engine::{
+    ContactPosition, DerivedValues, PauseView, Power, RunOutcome, UnloadedSignal,
+};
 use palpate_protocols::preview::StepPreview;
-use palpate_protocols::weighed::Weighed;
-use palpate_sessions::edits::Verdict;
+use palpate_protocols::weight_readings::WeightReading;
+use palpate_sessions::edits::DataQuality;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 #[derive(Clone, Debug)]
-pub struct Snapshot {
+pub struct RunnerSnapshot {
     /// The rig and its newest sample.
     pub rig: RigView,
     /// The run in progress or the last one; `None` before the first.
@@ -56,9 +58,9 @@ pub struct RunView {
     pub time_left: Seconds,
     /// Share done, 0 to 1.
     pub fraction: f64,
-    pub derived: Derived,
+    pub derived: DerivedValues,
     pub tare: Option<UnloadedSignal>,
-    pub contact: Option<Contact>,
+    pub contact: Option<ContactPosition>,
     /// The base behind it and the thickness between, once found.
     pub base: FoundBase,
     /// Highest force so far.
@@ -84,25 +86,25 @@ pub struct RunView {
     /// Session time in s at which each repeat began, with its number.
     pub cycle_starts: Arc<Vec<(f64, u32)>>,
     /// Every reading under a known mass that the plan has.
-    pub to_weigh: Arc<Vec<ToWeigh>>,
-    pub weighed: Arc<Vec<Weighed>>,
+    pub planned_weights: Arc<Vec<PlannedWeight>>,
+    pub weight_readings: Arc<Vec<WeightReading>>,
     /// How far the signal under the mass on the cell has come to rest; `None` where nothing is weighed.
-    pub settling: Option<SettlingNow>,
+    pub settling: Option<SettleProgress>,
     /// Whether the last weight can be read again now, or why not.
     pub can_redo: Result<(), String>,
     /// Force over machine position (as its depth) of the last search for the surface.
     pub approach: Arc<LiveTrace>,
-    pub touches: Arc<Vec<Touch>>,
+    pub contact_triggers: Arc<Vec<ContactTrigger>>,
     /// Set while the run waits for retract or close after a stop.
-    pub holding: Option<Outcome>,
+    pub holding: Option<RunOutcome>,
     pub can_retract: Result<(), String>,
     /// How it ended, once it has and the log is closed.
-    pub outcome: Option<Outcome>,
+    pub outcome: Option<RunOutcome>,
     /// Data quality with its reason, once the run has ended.
-    pub verdict: Option<(Verdict, String)>,
+    pub data_quality: Option<(DataQuality, String)>,
     pub log_error: Option<String>,
     /// Why the data quality could not be written beside the log.
-    pub verdict_error: Option<String>,
+    pub data_quality_error: Option<String>,
     /// What happened, newest last; the oldest lines fall out past [`RunView::EVENTS_MAX`].
     pub events: Arc<Vec<LogLine>>,
 }
@@ -114,7 +116,7 @@ impl RunView {
 
 /// A reading under a known mass as the plan has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ToWeigh {
+pub struct PlannedWeight {
     pub step_index: usize,
     /// The mass in g, platform included.
     pub mass_g: f64,
@@ -124,7 +126,7 @@ pub struct ToWeigh {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct ContactTrigger {
     /// 1 for the approach, 2 for the slow pass.
     pub pass: u8,
     /// Where, from home.

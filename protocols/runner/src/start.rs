@@ -2,18 +2,18 @@
 
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
-use super::leading::Leader;
+use super::leading::SharedLeadSource;
 use super::watch::HostWatch;
 use palpate_model::Nanos;
-use palpate_model::about::Labels;
 use palpate_model::calibration::Calibration;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::{Limits, RigDescription};
-use palpate_protocols::engine::{Config, ENGINE_VERSION};
+use palpate_protocols::engine::{ENGINE_VERSION, EngineConfig};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_sessions::{
-    Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space, library_folder,
-    new_session_folder, new_session_id, spare_folder,
+    Manifest, RECORD_VERSION, RecordingPace, SessionFolder, SessionWriter, check_free_space,
+    library_folder, new_session_folder, new_session_id, spare_folder,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub enum AfterStop {
 
 /// Who answers the plan's prompts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Answers {
+pub enum PromptResponder {
     /// The operator, within the prompt's time.
     #[default]
     Operator,
@@ -49,15 +49,15 @@ pub struct RunRequest {
     pub limits: Limits,
     /// Session folder; a new one in the library if none.
     pub out: Option<PathBuf>,
-    pub labels: Labels,
+    pub labels: SessionLabels,
     /// Whether the operator acknowledged what the preview asks to acknowledge.
     pub is_acknowledged: bool,
     /// What beside the preview is to be acknowledged, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
     pub after_stop: AfterStop,
-    pub answers: Answers,
+    pub answers: PromptResponder,
     /// Source of leads for a step that follows; without it such a step times out.
-    pub leader: Option<Leader>,
+    pub leader: Option<SharedLeadSource>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -87,7 +87,7 @@ pub(super) fn start(
     let refused = |reason: String| StartError::Refused(reason);
     let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
     let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);
-    preview.verdict(request.is_acknowledged).map_err(refused)?;
+    preview.check_start(request.is_acknowledged).map_err(refused)?;
     if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
         return Err(refused(format!("{first}; acknowledge this to go on")));
     }
@@ -106,10 +106,10 @@ pub(super) fn start(
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
 
     let manifest = manifest(request, &context, &preview, session_id.clone(), started_at)?;
-    let pace = if context.is_virtual { Pace::Virtual } else { Pace::Real };
+    let pace = if context.is_virtual { RecordingPace::Virtual } else { RecordingPace::Real };
     let writer = SessionWriter::start(folder, spare_folder().as_deref(), &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
-    let config = Config {
+    let config = EngineConfig {
         rig: context.rig.as_ref().clone(),
         limits: request.plan.limits.tighten(request.limits),
         curve,

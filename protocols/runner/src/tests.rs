@@ -5,20 +5,20 @@ use super::live_feed::{Estimator, LiveFeed};
 use super::main_loop::{MainLoop, Runner};
 use super::panic_stop::is_registered;
 use super::run_log::FaultLog;
-use super::snapshot::Snapshot;
-use super::start::{AfterStop, Answers, RunRequest};
+use super::snapshot::RunnerSnapshot;
+use super::start::{AfterStop, PromptResponder, RunRequest};
 use crate::replay::replay;
 use arc_swap::ArcSwap;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::about::Labels;
 use palpate_model::estimate::LiveEstimate;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::{Fault, Limits};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::plans::RampHold;
-use palpate_sessions::health::{Told, Why};
-use palpate_sessions::{Health, Part, Session};
+use palpate_sessions::health::{AnchorReason, HealthContent};
+use palpate_sessions::{HealthMessage, LogPart, Session};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -37,11 +37,11 @@ fn request(out: &Path) -> RunRequest {
         calibration: rig.calibration(),
         limits: Limits::for_travel(rig.description().travel),
         out: Some(out.to_path_buf()),
-        labels: Labels::default(),
+        labels: SessionLabels::default(),
         is_acknowledged: true,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
-        answers: Answers::Confirm,
+        answers: PromptResponder::Confirm,
         leader: None,
     }
 }
@@ -69,7 +69,7 @@ fn run(main_loop: MainLoop) {
     let shared = Arc::new(shared);
     let seen = Arc::clone(&shared);
     let wake = move || {
-        let snapshot: Arc<Snapshot> = seen.load_full();
+        let snapshot: Arc<RunnerSnapshot> = seen.load_full();
         let is_over = snapshot.run.as_ref().is_some_and(|run| run.outcome.is_some());
         if is_over {
             sender.lock().unwrap().take();
@@ -79,10 +79,10 @@ fn run(main_loop: MainLoop) {
 }
 
 /// Everything that a session tells of the computer.
-fn health_of(path: &Path) -> Vec<Health> {
+fn health_of(path: &Path) -> Vec<HealthMessage> {
     let mut found = Vec::new();
     Session::scan_parts(path, &mut |part| {
-        if let Part::Health(one) = part {
+        if let LogPart::Health(one) = part {
             found.push(one.clone());
         }
     })
@@ -116,15 +116,15 @@ fn wall_clock_jump_changes_no_sample_and_is_logged() {
         assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
         rows.push(session.rows);
         let found = health_of(&out);
-        let anchors: Vec<(Why, f64)> = found
+        let anchors: Vec<(AnchorReason, f64)> = found
             .iter()
-            .filter_map(|one| match &one.told {
-                Told::Anchor { why, shift_s, .. } => Some((*why, *shift_s)),
+            .filter_map(|one| match &one.content {
+                HealthContent::Anchor { reason: why, shift_s, .. } => Some((*why, *shift_s)),
                 _ => None,
             })
             .collect();
-        assert_eq!(anchors.first().unwrap().0, Why::Start);
-        assert_eq!(anchors.last().unwrap().0, Why::End);
+        assert_eq!(anchors.first().unwrap().0, AnchorReason::Start);
+        assert_eq!(anchors.last().unwrap().0, AnchorReason::End);
         let jumps: Vec<f64> = anchors[1..anchors.len() - 1].iter().map(|one| one.1).collect();
         match name {
             "calm" => assert_eq!(jumps, Vec::<f64>::new()),
@@ -133,8 +133,8 @@ fn wall_clock_jump_changes_no_sample_and_is_logged() {
                 assert!((jumps[0] + 3600.0).abs() < 1e-6, "{jumps:?}");
             }
         }
-        assert_eq!(session.beside.health.clock_jumps, jumps.len() as u64);
-        let worst = session.beside.health.worst.unwrap();
+        assert_eq!(session.auxiliary.health.clock_jumps, jumps.len() as u64);
+        let worst = session.auxiliary.health.worst.unwrap();
         assert!(worst.free_bytes.is_some_and(|free| free > 0), "{worst:?}");
         assert!(worst.sync_s.is_some_and(|sync_s| sync_s > 0.0), "{worst:?}");
         assert_eq!(worst.missed_readings, 0);
@@ -162,7 +162,7 @@ fn a_computer_that_was_suspended_ends_the_run() {
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "abort");
     assert!(end.reason.contains("stood still for 20.0 s"), "{}", end.reason);
-    assert_eq!(session.beside.health.clock_jumps, 1);
+    assert_eq!(session.auxiliary.health.clock_jumps, 1);
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }
 
@@ -199,13 +199,13 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
     };
     assert_eq!(panicking.end.as_ref().unwrap().outcome, "finish");
     assert_eq!(panicking.rows, sound.rows);
-    let events = &panicking.beside.health.events;
+    let events = &panicking.auxiliary.health.events;
     assert_eq!(events.len(), 1, "{events:?}");
     let text = &events[0].1;
     assert!(text.contains("as if a matrix had no inverse") && text.contains("is off"), "{text}");
     // At full pace the log does not depend on the computer.
-    assert_eq!(panicking.beside.health.messages, 1);
-    assert_eq!(sound.beside.health.messages, 0);
+    assert_eq!(panicking.auxiliary.health.messages, 1);
+    assert_eq!(sound.auxiliary.health.messages, 0);
 }
 
 #[test]

@@ -4,8 +4,8 @@
 use super::clock::{HostClock, HostTimes};
 use palpate_model::Nanos;
 use palpate_model::units::Seconds;
-use palpate_sessions::health::{Told, Why};
-use palpate_sessions::{Health, MachineState};
+use palpate_sessions::health::{AnchorReason, HealthContent};
+use palpate_sessions::{HealthMessage, MachineState};
 use std::time::{Duration, SystemTime};
 
 const EVERY: Duration = Duration::from_secs(1);
@@ -39,18 +39,22 @@ impl HostWatch {
         }
     }
 
-    pub fn begin(&self) -> Health {
-        anchor(Nanos::ZERO, Why::Start, self.anchor.wall, 0.0)
+    pub fn begin(&self) -> HealthMessage {
+        anchor(Nanos::ZERO, AnchorReason::Start, self.anchor.wall, 0.0)
     }
 
     /// One turn of the loop, late by `lateness`: a jump of the wall clock, and for how long the computer stood still.
-    pub fn turn(&mut self, now: Nanos, lateness: Duration) -> (Option<Health>, Option<Seconds>) {
+    pub fn turn(
+        &mut self,
+        now: Nanos,
+        lateness: Duration,
+    ) -> (Option<HealthMessage>, Option<Seconds>) {
         self.lateness = self.lateness.max(lateness);
         let times = (self.clock)();
         let shift_s = self.shift_s(&times);
         let jump = (shift_s.abs() > APART.as_secs_f64()).then(|| {
             self.anchor = times;
-            anchor(now, Why::Jump, times.wall, shift_s)
+            anchor(now, AnchorReason::Jump, times.wall, shift_s)
         });
         let asleep = times.all.saturating_sub(times.awake);
         let slept = asleep.saturating_sub(std::mem::replace(&mut self.asleep, asleep));
@@ -68,12 +72,12 @@ impl HostWatch {
     }
 
     /// The state since the last report; `missed` are the readings that are missing since the start.
-    pub fn state(&mut self, now: Nanos, disk: MachineState, missed: u64) -> Health {
+    pub fn state(&mut self, now: Nanos, disk: MachineState, missed: u64) -> HealthMessage {
         self.reported_at = (self.clock)().awake;
         let before = std::mem::replace(&mut self.missed, missed);
-        Health {
+        HealthMessage {
             now,
-            told: Told::State(MachineState {
+            content: HealthContent::State(MachineState {
                 lateness_s: std::mem::take(&mut self.lateness).as_secs_f64(),
                 missed_readings: missed.saturating_sub(before),
                 ..disk
@@ -81,9 +85,9 @@ impl HostWatch {
         }
     }
 
-    pub fn end(&self, now: Nanos) -> Health {
+    pub fn end(&self, now: Nanos) -> HealthMessage {
         let times = (self.clock)();
-        anchor(now, Why::End, times.wall, self.shift_s(&times))
+        anchor(now, AnchorReason::End, times.wall, self.shift_s(&times))
     }
 
     /// By how much the wall clock went ahead of the monotonic one since the last anchor.
@@ -96,7 +100,7 @@ impl HostWatch {
     }
 }
 
-fn anchor(now: Nanos, why: Why, wall: SystemTime, shift_s: f64) -> Health {
+fn anchor(now: Nanos, why: AnchorReason, wall: SystemTime, shift_s: f64) -> HealthMessage {
     let wall = wall.into();
-    Health { now, told: Told::Anchor { why, wall, shift_s } }
+    HealthMessage { now, content: HealthContent::Anchor { reason: why, wall, shift_s } }
 }

@@ -3,21 +3,23 @@
 use super::input::Effect;
 use super::pause;
 use super::record::Record;
-use super::state::{Contact, Derived, MoveInFlight, Pause, Power, State, UnloadedSignal};
+use super::state::{
+    ContactPosition, DerivedValues, EngineState, MoveInFlight, Pause, Power, UnloadedSignal,
+};
 use palpate_model::Nanos;
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::command::{position_from_pulses, pulses_from_position};
 use palpate_model::rig::{
-    AxisStatus, HandAction, Limits, MoveTo, Oscillation, Phase, Profile, RigCommand,
-    RigDescription, SensorValues, Sine,
+    AxisStatus, HandAction, Limits, MotionProfile, MoveTo, Oscillation, Phase, RigCommand,
+    RigDescription, SensorValues, SinePath,
 };
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
 /// The state, the time and the effects of one call of `step`. A step sees the state only through
 /// these methods: they change no interlock, no limit and no plan.
 pub(crate) struct Context<'a> {
-    pub(super) state: &'a mut State,
+    pub(super) state: &'a mut EngineState,
     pub now: Nanos,
     pub(super) effects: &'a mut Vec<Effect>,
 }
@@ -41,7 +43,7 @@ impl Context<'_> {
         &self.state.config.limits
     }
 
-    pub fn curve(&self) -> &Curve {
+    pub fn curve(&self) -> &CalibrationCurve {
         &self.state.config.curve
     }
 
@@ -51,7 +53,7 @@ impl Context<'_> {
     }
 
     /// What was derived from the newest sample.
-    pub fn derived(&self) -> &Derived {
+    pub fn derived(&self) -> &DerivedValues {
         &self.state.derived
     }
 
@@ -106,16 +108,16 @@ impl Context<'_> {
         self.state.tare = signal;
     }
 
-    pub fn known_contact(&self) -> Option<Contact> {
+    pub fn known_contact(&self) -> Option<ContactPosition> {
         self.state.contact
     }
 
-    pub fn contact(&self) -> Result<Contact, String> {
+    pub fn contact(&self) -> Result<ContactPosition, String> {
         let unknown = "contact is not known; find it first";
         self.state.contact.ok_or_else(|| unknown.to_owned())
     }
 
-    pub fn set_contact(&mut self, contact: Option<Contact>) {
+    pub fn set_contact(&mut self, contact: Option<ContactPosition>) {
         self.state.contact = contact;
     }
 
@@ -218,7 +220,7 @@ impl Context<'_> {
         let command = MoveTo { target_pulses, speed, acceleration: rig.acceleration };
         let from = self.state.derived.position;
         let to = position_from_pulses(target_pulses, rig.mm_per_pulse);
-        let duration = Profile::to_rest(from, to, speed, rig.acceleration).duration();
+        let duration = MotionProfile::to_rest(from, to, speed, rig.acceleration).duration();
         let deadline = self.now + Nanos::from_seconds(duration + MOVE_GRACE);
         let is_forward = target_pulses > self.state.pulses;
         self.state.in_flight = Some(MoveInFlight { deadline, speed, is_forward });
@@ -234,7 +236,7 @@ impl Context<'_> {
             return Err("motion is not enabled".into());
         }
         let from = self.state.derived.position;
-        let sine = Sine::new(from, &command, rig.mm_per_pulse, rig.tick());
+        let sine = SinePath::new(from, &command, rig.mm_per_pulse, rig.tick());
         let deepest = 2.0 * command.amplitude_pulses as f64 * rig.mm_per_pulse;
         let travel = self.state.config.limits.travel_max;
         if from.moved_by(deepest) > travel {

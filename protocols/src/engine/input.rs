@@ -1,6 +1,6 @@
 //! The two closed enums of the engine: what it sees and what it does.
 
-use super::record::{Outcome, Record};
+use super::record::{Record, RunOutcome};
 use palpate_model::Nanos;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Ack, Fault, HandAction, Reading, RigCommand, SensorReading};
@@ -10,7 +10,7 @@ use std::fmt;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "input", rename_all = "snake_case")]
-pub enum Input {
+pub enum EngineInput {
     Reading(Reading),
     Ack(Ack),
     Fault(Fault),
@@ -98,5 +98,5 @@ pub enum Effect {
     /// A person has done this at the rig; a simulated rig does it now.
     ByHand(HandAction),
     Record(Record),
-    Finished(Outcome),
+    Finished(RunOutcome),
 }

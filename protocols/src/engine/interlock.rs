@@ -1,7 +1,7 @@
 //! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
 
 use super::block_mean::BlockMean;
-use super::state::{Power, State};
+use super::state::{EngineState, Power};
 use crate::steps::Step;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Limits, Phase, Reading, RigDescription};
@@ -144,7 +144,7 @@ impl InterlockWatch {
 
 /// Judges one sample. `state.derived` already belongs to it; `path_error` is the tracker's error.
 pub(super) fn judge(
-    state: &mut State,
+    state: &mut EngineState,
     now: Nanos,
     reading: &Reading,
     path_error: Option<String>,
@@ -204,7 +204,7 @@ fn trip(interlock: Interlock, reason: impl Into<String>) -> Option<Trip> {
 
 /// A closed limit switch trips unless the axis leaves it, or only stands there before it homes or
 /// retracts: otherwise a probe on a switch could never leave it.
-fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip> {
+fn travel_trip(state: &EngineState, reading: &Reading, limits: &Limits) -> Option<Trip> {
     let position = state.derived.position;
     let is_parked = state.in_flight.is_none()
         && (state.phase == Phase::SelfTest && !state.is_homed || state.phase == Phase::Retract);
@@ -228,7 +228,7 @@ fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip
 }
 
 /// A motor that was energised for motion and no longer is: the position is not held.
-fn motor_trip(state: &mut State, reading: &Reading) -> Option<Trip> {
+fn motor_trip(state: &mut EngineState, reading: &Reading) -> Option<Trip> {
     if state.power != Power::Enabled || reading.status.has(AxisStatus::MOTOR_ON) {
         return None;
     }
@@ -256,7 +256,7 @@ fn rate_trip(rate: Option<f64>, rate_max: f64, step: Option<&Step>) -> Option<Tr
     )
 }
 
-pub(super) fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
+pub(super) fn age_trip(state: &EngineState, now: Nanos) -> Option<Trip> {
     let last_at = state.watch.last_at?;
     let age = now.since(last_at).seconds();
     // A move just begun counts at its full speed: the newest sample cannot know it yet.

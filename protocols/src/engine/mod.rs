@@ -1,6 +1,6 @@
 //! The engine: `step(state, now, input) -> (state, effects)`, pure and total.
 //!
-//! [`Input`] is everything the engine can see and [`Effect`] everything it can do. It reads no
+//! [`EngineInput`] is everything the engine can see and [`Effect`] everything it can do. It reads no
 //! clock, holds no device and knows no disk, so a dry run, a replay and a real run are the same
 //! code fed from different places.
 
@@ -20,10 +20,13 @@ mod tests;
 
 pub(crate) use block_mean::BlockMean;
 pub(crate) use context::{Context, NOT_TARED, outside_travel};
-pub use input::{Effect, Input, Operator};
+pub use input::{Effect, EngineInput, Operator};
 pub use interlock::Interlock;
-pub use record::{Answer, EndingKind, FailureResponse, Outcome, Record};
-pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, UnloadedSignal};
+pub use record::{EndingKind, FailureResponse, PromptAnswer, Record, RunOutcome};
+pub use state::{
+    ContactPosition, DerivedValues, Drift, EngineConfig, EngineState, PauseView, Power,
+    UnloadedSignal,
+};
 pub(crate) use step::NOT_HOMED;
 pub use step::{PLAN_COMPLETE, step};
 

@@ -5,7 +5,7 @@ use super::pause::PauseRequester;
 use super::record::{EndingKind, Record};
 use super::state::Activity;
 use super::{pause, stop};
-use crate::plans::{Action, Source};
+use crate::plans::{MonitorAction, MonitorSource};
 use palpate_model::Nanos;
 use palpate_model::rig::Reading;
 
@@ -32,10 +32,10 @@ pub(super) fn judge(cx: &mut Context<'_>, reading: &Reading) {
         let monitor = &cx.state.config.plan.monitors[index];
         let derived = &cx.state.derived;
         let value = match monitor.source {
-            Source::Force => derived.force.map(|force| force.0),
-            Source::Depth => derived.depth.map(|depth| depth.0),
-            Source::Volts => Some(reading.volts.0),
-            Source::Position => cx.state.is_homed.then_some(derived.position.0),
+            MonitorSource::Force => derived.force.map(|force| force.0),
+            MonitorSource::Depth => derived.depth.map(|depth| depth.0),
+            MonitorSource::Volts => Some(reading.volts.0),
+            MonitorSource::Position => cx.state.is_homed.then_some(derived.position.0),
         };
         let Some(value) = value else { continue };
         let condition = &cx.state.monitors[index];
@@ -57,22 +57,22 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     if condition.pauses.0 != step_index {
         condition.pauses = (step_index, 0);
     }
-    condition.pauses.1 += u32::from(action == Action::Pause);
+    condition.pauses.1 += u32::from(action == MonitorAction::Pause);
     let is_endless = condition.pauses.1 > PAUSES_MAX;
     cx.record(Record::MonitorTripped { index, value, message: message.clone() });
     match action {
-        Action::Note => {}
-        Action::Pause if is_endless => {
+        MonitorAction::Note => {}
+        MonitorAction::Pause if is_endless => {
             let reason = format!("{message}; this has paused the step {PAUSES_MAX} times already");
             stop::begin(cx, EndingKind::Stop, reason);
         }
-        Action::Pause => pause::now(cx, PauseRequester::Monitor, message),
-        Action::Stop => stop::begin(cx, EndingKind::Stop, message),
-        Action::Retract => {
+        MonitorAction::Pause => pause::now(cx, PauseRequester::Monitor, message),
+        MonitorAction::Stop => stop::begin(cx, EndingKind::Stop, message),
+        MonitorAction::Retract => {
             cx.state.leaves_after_stop = true;
             stop::begin(cx, EndingKind::Stop, message);
         }
-        Action::Halt => stop::begin(cx, EndingKind::Halt, message),
+        MonitorAction::Halt => stop::begin(cx, EndingKind::Halt, message),
     }
 }
 
@@ -99,8 +99,8 @@ fn judge_past(cx: &mut Context<'_>, index: usize, value: f64) {
         .monitors
         .iter()
         .zip(&cx.state.config.plan.monitors)
-        .any(|(one, monitor)| one.is_tripped && monitor.action == Action::Pause);
-    if action == Action::Pause && !is_another_tripped {
+        .any(|(one, monitor)| one.is_tripped && monitor.action == MonitorAction::Pause);
+    if action == MonitorAction::Pause && !is_another_tripped {
         pause::resume_by_itself(cx);
     }
 }

@@ -96,7 +96,7 @@ pub enum Record {
         timeout: Seconds,
     },
     Answered {
-        answer: Answer,
+        answer: PromptAnswer,
     },
     /// A pause was asked for, and will begin behind a step.
     PausePending {
@@ -170,7 +170,7 @@ pub enum Record {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Answer {
+pub enum PromptAnswer {
     Confirmed,
     Declined,
     TimedOut,
@@ -200,7 +200,7 @@ palpate_model::named! {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct RunOutcome {
     pub ending: EndingKind,
     pub reason: String,
 }
@@ -264,9 +264,9 @@ impl fmt::Display for Record {
                 write!(f, "{message} (waits {:.0})", *timeout)
             }
             Self::Answered { answer } => f.write_str(match answer {
-                Answer::Confirmed => "done",
-                Answer::Declined => "declined",
-                Answer::TimedOut => "no answer in time",
+                PromptAnswer::Confirmed => "done",
+                PromptAnswer::Declined => "declined",
+                PromptAnswer::TimedOut => "no answer in time",
             }),
             Self::PausePending { step_index } => {
                 write!(f, "will pause after step {}", step_index + 1)

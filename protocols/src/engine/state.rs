@@ -2,11 +2,11 @@
 
 use super::interlock::InterlockWatch;
 use super::monitor::MonitorState;
-use super::record::{EndingKind, Outcome};
+use super::record::{EndingKind, RunOutcome};
 use crate::plans::Plan;
 use crate::steps::{ActiveStep, Step};
 use palpate_model::Nanos;
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{
     AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription, SensorValues,
@@ -17,12 +17,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Config {
+pub struct EngineConfig {
     pub rig: RigDescription,
     /// Interlock thresholds.
     pub limits: Limits,
     /// Volts to newtons and back.
-    pub curve: Curve,
+    pub curve: CalibrationCurve,
     pub plan: Plan,
     /// Whether the axis was homed earlier on this connection.
     pub is_homed: bool,
@@ -58,7 +58,7 @@ pub struct Drift {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
+pub struct ContactPosition {
     /// Estimated contact position from home.
     pub position: Position,
     /// Its standard error in mm.
@@ -67,7 +67,7 @@ pub struct Contact {
 
 /// What was derived from the newest sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Derived {
+pub struct DerivedValues {
     /// Commanded position; from home once the axis is homed.
     pub position: Position,
     pub velocity: MmPerS,
@@ -108,18 +108,18 @@ pub(super) enum Activity {
     },
     /// Decelerating because of `ending`.
     Braking {
-        ending: Outcome,
+        ending: RunOutcome,
         deadline: Nanos,
     },
     /// At rest after a stop; the operator may retract or close.
     Holding {
-        ending: Outcome,
+        ending: RunOutcome,
     },
     /// Leaving the tissue after a stop, at the operator's request.
     Retracting {
-        ending: Outcome,
+        ending: RunOutcome,
     },
-    Ended(Outcome),
+    Ended(RunOutcome),
 }
 
 impl Activity {
@@ -155,8 +155,8 @@ pub(super) struct MoveInFlight {
 
 /// Everything the engine remembers between inputs.
 #[derive(Clone, Debug, PartialEq)]
-pub struct State {
-    pub(super) config: Arc<Config>,
+pub struct EngineState {
+    pub(super) config: Arc<EngineConfig>,
     pub(super) activity: Activity,
     pub(super) power: Power,
     pub(super) is_homed: bool,
@@ -172,8 +172,8 @@ pub struct State {
     /// Axis status of the newest sample.
     pub(super) status: AxisStatus,
     pub(super) tare: Option<UnloadedSignal>,
-    pub(super) contact: Option<Contact>,
-    pub(super) derived: Derived,
+    pub(super) contact: Option<ContactPosition>,
+    pub(super) derived: DerivedValues,
     pub(super) watch: InterlockWatch,
     pub(super) unacknowledged: VecDeque<(Nanos, RigCommand)>,
     pub(super) in_flight: Option<MoveInFlight>,
@@ -191,9 +191,9 @@ pub struct State {
     pub(super) is_finished_early: bool,
 }
 
-impl State {
+impl EngineState {
     #[must_use]
-    pub fn new(config: Arc<Config>) -> Self {
+    pub fn new(config: Arc<EngineConfig>) -> Self {
         Self {
             activity: Activity::Waiting,
             power: Power::Stopped,
@@ -209,7 +209,7 @@ impl State {
             status: AxisStatus::default(),
             tare: None,
             contact: None,
-            derived: Derived::default(),
+            derived: DerivedValues::default(),
             watch: InterlockWatch::new(&config.rig),
             unacknowledged: VecDeque::new(),
             in_flight: None,
@@ -270,7 +270,7 @@ impl State {
     }
 
     /// Values derived from the newest sample.
-    pub fn derived(&self) -> &Derived {
+    pub fn derived(&self) -> &DerivedValues {
         &self.derived
     }
 
@@ -287,7 +287,7 @@ impl State {
     }
 
     /// Where the tissue begins, once found.
-    pub fn contact(&self) -> Option<Contact> {
+    pub fn contact(&self) -> Option<ContactPosition> {
         self.contact
     }
 
@@ -312,7 +312,7 @@ impl State {
     }
 
     /// Set while the run has stopped and awaits the operator's choice to retract or close.
-    pub fn holding(&self) -> Option<&Outcome> {
+    pub fn holding(&self) -> Option<&RunOutcome> {
         match &self.activity {
             // A monitor has requested a retract, which comes first.
             Activity::Holding { ending } if !self.leaves_after_stop => Some(ending),
@@ -331,7 +331,7 @@ impl State {
     }
 
     /// How the run ended, once it has.
-    pub fn outcome(&self) -> Option<&Outcome> {
+    pub fn outcome(&self) -> Option<&RunOutcome> {
         match &self.activity {
             Activity::Ended(outcome) => Some(outcome),
             _ => None,
@@ -344,7 +344,7 @@ impl State {
         Some(&planned.step)
     }
 
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &EngineConfig {
         &self.config
     }
 
@@ -362,6 +362,6 @@ impl State {
     /// Force above tare of a signal; before tare, above the calibration's own zero.
     pub(super) fn force_from_volts(&self, volts: Volts) -> Newtons {
         let tare = self.tare.map(|tare| tare.volts);
-        self.config.curve.newtons_above(volts, tare)
+        self.config.curve.newtons_above_tare(volts, tare)
     }
 }

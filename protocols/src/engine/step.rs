@@ -1,10 +1,10 @@
 //! The one entry point: interlocks first, then the plan.
 
 use super::context::Context;
-use super::input::{Effect, Input, Operator};
+use super::input::{Effect, EngineInput, Operator};
 use super::interlock::{self, Interlock, Trip};
-use super::record::{Answer, EndingKind, Outcome, Record};
-use super::state::{Activity, Derived, Pause, PauseView, Power, State};
+use super::record::{EndingKind, PromptAnswer, Record, RunOutcome};
+use super::state::{Activity, DerivedValues, EngineState, Pause, PauseView, Power};
 use super::{between, monitor, pause, stop};
 use crate::steps::{ActiveStep, Progress, Step, StepEvent};
 use palpate_model::Nanos;
@@ -19,23 +19,23 @@ const ACK_MAX: Seconds = Seconds(1.0);
 
 /// Advances a run by one input. Pure: the same arguments give the same answer, for ever.
 #[must_use]
-pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) {
+pub fn step(mut state: EngineState, now: Nanos, input: EngineInput) -> (EngineState, Vec<Effect>) {
     let mut effects = Vec::new();
     let mut cx = Context { state: &mut state, now, effects: &mut effects };
     match input {
-        Input::Reading(reading) => on_reading(&mut cx, &reading),
-        Input::Tick => on_tick(&mut cx),
-        Input::Ack(ack) => on_ack(&mut cx, ack),
-        Input::Fault(fault) => on_fault(&mut cx, &fault),
-        Input::Operator { choice } => on_operator(&mut cx, choice),
-        Input::HostLate { late } => cx.state.watch.excuse(late),
-        Input::Note { text } => cx.record(Record::Noted { text }),
-        Input::LiveFit(estimate) => {
+        EngineInput::Reading(reading) => on_reading(&mut cx, &reading),
+        EngineInput::Tick => on_tick(&mut cx),
+        EngineInput::Ack(ack) => on_ack(&mut cx, ack),
+        EngineInput::Fault(fault) => on_fault(&mut cx, &fault),
+        EngineInput::Operator { choice } => on_operator(&mut cx, choice),
+        EngineInput::HostLate { late } => cx.state.watch.excuse(late),
+        EngineInput::Note { text } => cx.record(Record::Noted { text }),
+        EngineInput::LiveFit(estimate) => {
             cx.state.live = Some(estimate);
             pass_event(&mut cx, &StepEvent::LiveFit);
         }
-        Input::Sensor { value } => cx.state.sensors.update(&value),
-        Input::Lead { depth } => {
+        EngineInput::Sensor { value } => cx.state.sensors.update(&value),
+        EngineInput::Lead { depth } => {
             pass_event(&mut cx, &StepEvent::Lead(depth));
         }
     }
@@ -68,7 +68,7 @@ fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
 }
 
 /// Computes what a sample means; the error is the path tracker's.
-fn derive(state: &mut State, reading: &Reading) -> Option<String> {
+fn derive(state: &mut EngineState, reading: &Reading) -> Option<String> {
     state.tick = reading.tick;
     state.pulses = reading.pulses;
     state.status = reading.status;
@@ -80,7 +80,7 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
     };
     let tare = state.tare.filter(|_| reading.volts.is_finite());
     let force = tare.map(|_| state.force_from_volts(reading.volts));
-    state.derived = Derived {
+    state.derived = DerivedValues {
         position,
         velocity: state.path.velocity(),
         force,
@@ -144,7 +144,7 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
         cx.state.power = Power::Stopped;
         let is_early = cx.state.is_finished_early;
         let reason = if is_early { "finished early by the operator" } else { PLAN_COMPLETE };
-        return stop::end(cx, Outcome { ending: EndingKind::Finish, reason: reason.into() });
+        return stop::end(cx, RunOutcome { ending: EndingKind::Finish, reason: reason.into() });
     };
     if step_index != cx.state.step_index || cx.state.phase == Phase::Idle {
         cx.state.retries = 0;
@@ -286,13 +286,13 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         Operator::PauseAfter { step_index } => pause::after(cx, step_index),
         Operator::Resume => pause::resume(cx),
         Operator::Finish => pause::finish(cx),
-        Operator::Confirm => answer(cx, Answer::Confirmed),
-        Operator::Decline => answer(cx, Answer::Declined),
+        Operator::Confirm => answer(cx, PromptAnswer::Confirmed),
+        Operator::Decline => answer(cx, PromptAnswer::Declined),
         Operator::Redo => redo(cx),
     }
 }
 
-fn answer(cx: &mut Context<'_>, answer: Answer) {
+fn answer(cx: &mut Context<'_>, answer: PromptAnswer) {
     if !pass_event(cx, &StepEvent::Answer(answer)) {
         cx.refuse("there is no question to answer");
     }

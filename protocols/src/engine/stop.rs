@@ -6,8 +6,8 @@
 use super::context::Context;
 use super::input::Effect;
 use super::interlock::Interlock;
-use super::record::{EndingKind, Outcome, Record};
-use super::state::{Activity, Power, State};
+use super::record::{EndingKind, Record, RunOutcome};
+use super::state::{Activity, EngineState, Power};
 use palpate_model::Nanos;
 use palpate_model::rig::{Phase, RigCommand};
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
@@ -32,7 +32,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: impl Into<
         | Activity::Retracting { ending } => ending.clone(),
         _ => {
             cx.record(Record::EndingStarted { ending, reason: reason.clone() });
-            Outcome { ending, reason }
+            RunOutcome { ending, reason }
         }
     };
     cx.state.power = Power::Stopped;
@@ -72,7 +72,7 @@ fn cut(cx: &mut Context<'_>) {
     cx.command(RigCommand::Halt);
 }
 
-pub(super) fn is_braking(state: &State) -> bool {
+pub(super) fn is_braking(state: &EngineState) -> bool {
     matches!(&state.activity, Activity::Braking { .. })
 }
 
@@ -148,7 +148,7 @@ pub(super) fn close(cx: &mut Context<'_>) {
     }
 }
 
-pub(super) fn end(cx: &mut Context<'_>, outcome: Outcome) {
+pub(super) fn end(cx: &mut Context<'_>, outcome: RunOutcome) {
     cx.state.power = Power::Stopped;
     cx.enter_phase(Phase::Ended);
     cx.state.activity = Activity::Ended(outcome.clone());

@@ -7,14 +7,15 @@ use crate::plans::{Hold, HoldUntil, Jog, LoadTo, Plan, Ramp, SelfTest, Step, Tar
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
-    Ack, AdcDescription, Age, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
+    Ack, AdcDescription, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
+    SampleAge,
 };
 use palpate_model::units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use std::sync::Arc;
 
 /// A rig of straight lines: 0.15 V/N from 1.28 V, one sample a millisecond.
 struct Bench {
-    state: Option<State>,
+    state: Option<EngineState>,
     now: Nanos,
     tick: u64,
     pulses: i64,
@@ -55,14 +56,14 @@ impl Bench {
 
     fn on(rig: RigDescription, steps: Vec<Step>) -> Self {
         let calibration = Calibration::linear("line", Volts(ZERO), 0.15, Newtons(50.0));
-        let config = Config {
+        let config = EngineConfig {
             rig,
             limits: Limits::for_travel(Position(150.0)),
             curve: calibration.curve().unwrap(),
             plan: Plan::of("table", 1, steps),
             is_homed: true,
         };
-        let state = Some(State::new(Arc::new(config)));
+        let state = Some(EngineState::new(Arc::new(config)));
         Self { state, now: Nanos::ZERO, tick: 0, pulses: 0, status: AxisStatus::MOTOR_ON }
     }
 
@@ -93,11 +94,11 @@ impl Bench {
         panic!("no hold: {:?}", bench.state());
     }
 
-    fn state(&self) -> &State {
+    fn state(&self) -> &EngineState {
         self.state.as_ref().unwrap()
     }
 
-    fn give(&mut self, input: Input) -> Vec<Effect> {
+    fn give(&mut self, input: EngineInput) -> Vec<Effect> {
         let (state, effects) = step(self.state.take().unwrap(), self.now, input);
         self.state = Some(state);
         effects
@@ -105,10 +106,10 @@ impl Bench {
 
     /// Starts the plan and acknowledges what the self-test sends.
     fn start(&mut self) {
-        self.give(Input::Operator { choice: Operator::Start });
+        self.give(EngineInput::Operator { choice: Operator::Start });
         self.sample(volts(0.0));
         for command in [RigCommand::EnableMotor, RigCommand::Stop] {
-            self.give(Input::Ack(Ack { command }));
+            self.give(EngineInput::Ack(Ack { command }));
         }
     }
 
@@ -121,7 +122,7 @@ impl Bench {
         self.tick += ticks;
         self.now = self.now + Nanos::from_millis(ticks);
         let noise = if self.tick.is_multiple_of(2) { 1e-4 } else { -1e-4 };
-        self.give(Input::Reading(Reading {
+        self.give(EngineInput::Reading(Reading {
             tick: self.tick,
             counts: None,
             volts: Volts(volts + noise),
@@ -134,7 +135,7 @@ impl Bench {
     /// Acknowledges stops until the run holds or has ended.
     fn settle(&mut self) {
         for _ in 0..100 {
-            self.give(Input::Ack(Ack { command: RigCommand::Stop }));
+            self.give(EngineInput::Ack(Ack { command: RigCommand::Stop }));
             self.sample(volts(0.0));
             if self.state().holding().is_some() {
                 return;
@@ -262,7 +263,7 @@ fn a_cell_whose_counts_hide_its_noise_is_not_dead() {
                 status: AxisStatus::MOTOR_ON,
                 age: None,
             };
-            tripped(&bench.give(Input::Reading(reading)))
+            tripped(&bench.give(EngineInput::Reading(reading)))
         })
     };
     assert_eq!(stuck(slow()), None);
@@ -274,9 +275,9 @@ fn a_cell_whose_counts_hide_its_noise_is_not_dead() {
 fn silence_trips_by_the_speed() {
     let mut bench = Bench::holding(10.0);
     bench.now = bench.now + Nanos::from_millis(250);
-    assert_eq!(tripped(&bench.give(Input::Tick)), None);
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), None);
     bench.now = bench.now + Nanos::from_millis(1);
-    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), Some(Interlock::SampleAge));
     assert_eq!(
         Limits::sample_age_max(MmPerS(0.75), Position(0.1), Seconds(0.0)),
         Seconds(0.1 / 0.75)
@@ -302,17 +303,17 @@ fn the_filter_of_a_cell_is_no_lateness() {
         let mut bench = Bench::holding_on(rig, 10.0, None);
         bench.tick += 1;
         bench.now = bench.now + Nanos::from_millis(1);
-        bench.give(Input::Reading(Reading {
+        bench.give(EngineInput::Reading(Reading {
             tick: bench.tick,
             counts: None,
             volts: Volts(volts(0.0)),
             pulses: bench.pulses,
             status: bench.status,
-            age: Some(Age { by: filter, within: Nanos::ZERO }),
+            age: Some(SampleAge { by: filter, within: Nanos::ZERO }),
         }));
         // A quarter of a second is what a silence may last at rest.
         bench.now = bench.now + Nanos::from_millis(100);
-        let trip = tripped(&bench.give(Input::Tick));
+        let trip = tripped(&bench.give(EngineInput::Tick));
         assert_eq!(trip == Some(Interlock::SampleAge), is_tripped, "{trip:?}");
     }
 }
@@ -325,13 +326,13 @@ fn every_ending_stops_the_axis_and_says_why() {
         (Operator::Halt, EndingKind::Halt, RigCommand::Halt),
     ] {
         let mut bench = Bench::holding(10.0);
-        let effects = bench.give(Input::Operator { choice });
+        let effects = bench.give(EngineInput::Operator { choice });
         assert_eq!(commands(&effects), [command]);
-        bench.give(Input::Ack(Ack { command }));
+        bench.give(EngineInput::Ack(Ack { command }));
         bench.sample(volts(0.0));
         assert_eq!(bench.state().holding().unwrap().ending, ending);
         assert_eq!(bench.state().is_homed(), choice != Operator::Halt, "a halt may lose steps");
-        let effects = bench.give(Input::Operator { choice: Operator::Close });
+        let effects = bench.give(EngineInput::Operator { choice: Operator::Close });
         assert!(
             matches!(&effects[..], [.., Effect::Finished(outcome)] if outcome.ending == ending)
         );
@@ -348,10 +349,10 @@ fn faults_end_the_run_and_unhome_where_position_is_lost() {
         (Fault::LogAtRisk { detail: "slow".into() }, EndingKind::Abort, true),
     ] {
         let mut bench = Bench::holding(10.0);
-        let effects = bench.give(Input::Fault(fault.clone()));
+        let effects = bench.give(EngineInput::Fault(fault.clone()));
         assert_eq!(commands(&effects), [RigCommand::Stop], "{fault:?}");
         bench.now = bench.now + Nanos::from_millis(2_001);
-        bench.give(Input::Tick);
+        bench.give(EngineInput::Tick);
         assert_eq!(bench.state().holding().unwrap().ending, ending, "{fault:?}");
         assert_eq!(bench.state().is_homed(), is_homed, "{fault:?}");
     }
@@ -368,7 +369,7 @@ fn a_clock_that_runs_back_is_a_reset_controller() {
 #[test]
 fn a_command_without_acknowledgement_is_a_lost_link() {
     let mut bench = Bench::new(vec![Step::SelfTest(SelfTest { duration: Seconds(0.1) })]);
-    bench.give(Input::Operator { choice: Operator::Start });
+    bench.give(EngineInput::Operator { choice: Operator::Start });
     let trip = (0..1100).find_map(|_| tripped(&bench.sample(volts(0.0))));
     assert_eq!(trip, Some(Interlock::Link));
 }
@@ -379,7 +380,7 @@ fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
         let mut bench = Bench::new(vec![Step::SelfTest(SelfTest { duration: Seconds(0.1) }), step]);
         let mut config = bench.state().config().clone();
         config.is_homed = false;
-        bench.state = Some(State::new(Arc::new(config)));
+        bench.state = Some(EngineState::new(Arc::new(config)));
         bench.start();
         let sent: Vec<_> = (0..150).flat_map(|_| commands(&bench.sample(volts(0.0)))).collect();
         sent
@@ -403,7 +404,7 @@ fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
             let (tick, volts) = (bench.tick, Volts(signal(bench.tick)));
             let status = AxisStatus::MOTOR_ON;
             let reading = Reading { tick, counts: None, volts, pulses: 0, status, age: None };
-            let effects = bench.give(Input::Reading(reading));
+            let effects = bench.give(EngineInput::Reading(reading));
             if let Some(Effect::Record(Record::EndingStarted { reason, .. })) = effects.first() {
                 return reason.clone();
             }
@@ -430,8 +431,8 @@ fn same_state_and_input_give_the_same_result() {
         age: None,
     };
     let (a, b) = (
-        step(state.clone(), bench.now, Input::Reading(reading)),
-        step(state, bench.now, Input::Reading(reading)),
+        step(state.clone(), bench.now, EngineInput::Reading(reading)),
+        step(state, bench.now, EngineInput::Reading(reading)),
     );
     assert_eq!(a, b);
     bench.sample(volts(0.0));
@@ -447,7 +448,7 @@ fn jogging() -> Bench {
     for _ in 0..200 {
         let sent = commands(&bench.sample(volts(0.0)));
         if let [command @ RigCommand::MoveTo(_)] = sent[..] {
-            bench.give(Input::Ack(Ack { command }));
+            bench.give(EngineInput::Ack(Ack { command }));
             return bench;
         }
     }
@@ -460,7 +461,7 @@ fn silence_counts_at_the_commanded_speed_before_any_sample_shows_it() {
     assert_eq!(bench.state().derived().velocity, MmPerS(0.0));
     // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms.
     bench.now = bench.now + Nanos::from_millis(21);
-    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), Some(Interlock::SampleAge));
 }
 
 #[test]
@@ -469,13 +470,13 @@ fn a_lost_stop_is_followed_by_a_halt() {
     bench.status = AxisStatus::MOTOR_ON | AxisStatus::MOVING;
     bench.sample(volts(0.0));
     let detail = "unplugged".to_owned();
-    let effects = bench.give(Input::Fault(Fault::LinkLost { detail }));
+    let effects = bench.give(EngineInput::Fault(Fault::LinkLost { detail }));
     assert_eq!(commands(&effects), [RigCommand::Stop]);
     bench.now = bench.now + Nanos::from_millis(2_001);
-    assert_eq!(commands(&bench.give(Input::Tick)), [RigCommand::Halt]);
+    assert_eq!(commands(&bench.give(EngineInput::Tick)), [RigCommand::Halt]);
     assert_eq!(bench.state().holding(), None);
     bench.now = bench.now + Nanos::from_millis(2_001);
-    bench.give(Input::Tick);
+    bench.give(EngineInput::Tick);
     assert_eq!(bench.state().holding().unwrap().ending, EndingKind::Interlock);
 }
 
@@ -483,7 +484,7 @@ fn a_lost_stop_is_followed_by_a_halt() {
 fn an_axis_that_moves_after_a_stop_is_cut() {
     let mut bench = Bench::holding(10.0);
     let choice = Operator::Stop;
-    bench.give(Input::Operator { choice });
+    bench.give(EngineInput::Operator { choice });
     bench.settle();
     bench.status = AxisStatus::MOTOR_ON | AxisStatus::MOVING;
     let effects = bench.sample(volts(0.0));
@@ -510,7 +511,7 @@ fn reached_at_once(brake: Option<Newtons>) -> Bench {
     for _ in 0..1000 {
         if bench.state().phase() == Phase::Hold {
             bench.state.as_mut().unwrap().contact =
-                Some(Contact { position: Position(0.0), std_error_mm: 0.01 });
+                Some(ContactPosition { position: Position(0.0), std_error_mm: 0.01 });
             // 20 N/s, as no interlock minds.
             force = (force + 0.02).min(1.1);
         }
@@ -526,13 +527,13 @@ fn reached_at_once(brake: Option<Newtons>) -> Bench {
 #[test]
 fn a_stop_of_the_plan_may_come_before_the_move_that_it_ends() {
     // A driver drops the move, which waits in its queue, and says so; or the move is over between two samples.
-    let dropped = Input::Fault(Fault::CommandRefused { detail: "a stop came first".into() });
+    let dropped = EngineInput::Fault(Fault::CommandRefused { detail: "a stop came first".into() });
     let (_, command) = reached_at_once(None).state().unacknowledged[0];
-    for answer in [dropped, Input::Ack(Ack { command })] {
+    for answer in [dropped, EngineInput::Ack(Ack { command })] {
         let mut bench = reached_at_once(None);
         bench.give(answer.clone());
         let command = RigCommand::Stop;
-        bench.give(Input::Ack(Ack { command }));
+        bench.give(EngineInput::Ack(Ack { command }));
         let effects = bench.sample(volts(1.1));
         let is_reached =
             |effect: &Effect| matches!(effect, Effect::Record(Record::ForceReached { .. }));
@@ -548,12 +549,12 @@ fn a_stop_of_the_plan_may_come_before_the_move_that_it_ends() {
 fn a_stop_that_is_accepted_late_does_not_end_the_next_move() {
     let mut bench = reached_at_once(Some(Newtons(0.5)));
     let detail = "a stop came first".into();
-    bench.give(Input::Fault(Fault::CommandRefused { detail }));
+    bench.give(EngineInput::Fault(Fault::CommandRefused { detail }));
     // At rest the slower approach begins, before the stop of the first one is accepted.
     let sent = commands(&bench.sample(volts(0.6)));
     assert!(sent[0].is_motion(), "{sent:?}");
     let command = RigCommand::Stop;
-    bench.give(Input::Ack(Ack { command }));
+    bench.give(EngineInput::Ack(Ack { command }));
     bench.sample(volts(0.6));
     assert!(!bench.state().is_at_rest(), "the move is still to come");
 }
@@ -562,7 +563,7 @@ fn a_stop_that_is_accepted_late_does_not_end_the_next_move() {
 fn a_move_that_is_refused_without_a_stop_ends_the_run() {
     let mut bench = jogging();
     let detail = "speed".into();
-    let effects = bench.give(Input::Fault(Fault::CommandRefused { detail }));
+    let effects = bench.give(EngineInput::Fault(Fault::CommandRefused { detail }));
     assert_eq!(commands(&effects), [RigCommand::Stop]);
 }
 
@@ -582,37 +583,37 @@ fn a_probe_on_the_far_switch_may_leave_it_but_not_press_on() {
 
     let mut bench = Bench::holding(10.0);
     let state = bench.state.as_mut().unwrap();
-    state.contact = Some(Contact { position: Position(0.0), std_error_mm: 0.01 });
+    state.contact = Some(ContactPosition { position: Position(0.0), std_error_mm: 0.01 });
     bench.pulses = 8000;
     bench.status = AxisStatus::MOTOR_ON | AxisStatus::FORWARD_LIMIT;
     bench.state.as_mut().unwrap().path.on_define(8000);
     assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Travel));
-    bench.give(Input::Ack(Ack { command: RigCommand::Stop }));
+    bench.give(EngineInput::Ack(Ack { command: RigCommand::Stop }));
     bench.sample(volts(0.0));
     let choice = Operator::Retract;
-    bench.give(Input::Operator { choice });
+    bench.give(EngineInput::Operator { choice });
     assert_eq!(tripped(&bench.sample(volts(0.0))), None);
     let command = RigCommand::EnableMotor;
-    let sent = commands(&bench.give(Input::Ack(Ack { command })));
+    let sent = commands(&bench.give(EngineInput::Ack(Ack { command })));
     assert!(matches!(sent[..], [RigCommand::MoveTo(command)] if command.target_pulses == 0));
     assert_eq!(tripped(&bench.sample(volts(0.0))), None);
 }
 
 #[test]
 fn a_pause_of_the_computer_is_no_silence_of_the_rig() {
-    let late = |ms| Input::HostLate { late: Nanos::from_millis(ms) };
+    let late = |ms| EngineInput::HostLate { late: Nanos::from_millis(ms) };
     let wait = |bench: &mut Bench, ms| bench.now = bench.now + Nanos::from_millis(ms);
     // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms. Sixty of 75 were the computer's.
     let mut bench = jogging();
     bench.give(late(60));
     wait(&mut bench, 75);
-    assert_eq!(tripped(&bench.give(Input::Tick)), None);
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), None);
     // What is silent then is silent.
     wait(&mut bench, 6);
-    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), Some(Interlock::SampleAge));
     // A computer that stood still for longer than a rig may keep silent at rest has no excuse.
     let mut bench = jogging();
     bench.give(late(251));
     wait(&mut bench, 21);
-    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(tripped(&bench.give(EngineInput::Tick)), Some(Interlock::SampleAge));
 }

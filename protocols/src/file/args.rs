@@ -2,7 +2,7 @@
 
 use super::keys::{Key, KeyNeed, Range};
 use super::problem::{Problems, nearest, suggestion};
-use super::quantity::{Given, Kind, What};
+use super::quantity::{ProtocolValue, QuantityKind, ValueContent};
 use super::scope::Scope;
 use super::tree::DocumentTable;
 use palpate_model::units::{MmPerS, Seconds};
@@ -18,7 +18,7 @@ pub(super) const COUNT_MAX: f64 = 10_000.0;
 /// What to do about steps below another [table]: everything belongs to the last one above it.
 pub(super) const STEPS_HINT: &str = "write [procedure] on a line above it";
 
-pub(crate) struct Args(Vec<(&'static str, Given)>);
+pub(crate) struct Args(Vec<(&'static str, ProtocolValue)>);
 
 impl Args {
     /// Reads the keys of a table. `what` names it in sentences, `other_keys` are keys that are read elsewhere.
@@ -55,22 +55,25 @@ impl Args {
                 .map_err(|reason| format!("'{}' of {what}: {reason}", key.name));
             match problems.take(entry.line, value) {
                 // "none" counts as a missing key where the key is optional.
-                Some(given) if given.what == What::None && key.kind != Kind::Flag => match key.need
+                Some(given)
+                    if given.content == ValueContent::None && key.kind != QuantityKind::Flag =>
                 {
-                    KeyNeed::Required
-                        if !table.entries.iter().any(|entry| entry.key == "only_if") =>
-                    {
-                        problems.error(
-                            entry.line,
-                            format!(
-                                "'{}' of {what} cannot be none; give {}",
-                                key.name,
-                                key.kind.example()
-                            ),
-                        );
+                    match key.need {
+                        KeyNeed::Required
+                            if !table.entries.iter().any(|entry| entry.key == "only_if") =>
+                        {
+                            problems.error(
+                                entry.line,
+                                format!(
+                                    "'{}' of {what} cannot be none; give {}",
+                                    key.name,
+                                    key.kind.example()
+                                ),
+                            );
+                        }
+                        _ => {}
                     }
-                    _ => {}
-                },
+                }
                 Some(given) => args.push((key.name, given)),
                 None => {}
             }
@@ -82,7 +85,7 @@ impl Args {
                 KeyNeed::Required if near_misses.contains(&key.name) => {}
                 KeyNeed::Required => problems.error(table.line, describe_missing(what, key)),
                 KeyNeed::Usual(text) if !args.has(key.name) => {
-                    args.0.push((key.name, Given::of_text(text)));
+                    args.0.push((key.name, ProtocolValue::of_text(text)));
                 }
                 KeyNeed::Usual(_) | KeyNeed::Optional => {}
             }
@@ -90,7 +93,7 @@ impl Args {
         args
     }
 
-    fn get(&self, key: &str) -> Option<&Given> {
+    fn get(&self, key: &str) -> Option<&ProtocolValue> {
         let found = self.0.iter().find(|(name, _)| *name == key);
         found.map(|(_, given)| given)
     }
@@ -100,8 +103,8 @@ impl Args {
     }
 
     pub fn maybe(&self, key: &str) -> Option<f64> {
-        match self.get(key)?.what {
-            What::Number(_, number) => Some(number),
+        match self.get(key)?.content {
+            ValueContent::Number(_, number) => Some(number),
             _ => None,
         }
     }
@@ -132,25 +135,27 @@ impl Args {
     }
 
     pub fn is_true(&self, key: &str) -> bool {
-        self.get(key).is_some_and(|given| given.what == What::Flag(true))
+        self.get(key).is_some_and(|given| given.content == ValueContent::Flag(true))
     }
 
     pub fn is_no(&self, key: &str) -> bool {
-        self.get(key).is_some_and(|given| matches!(given.what, What::Flag(false) | What::None))
+        self.get(key).is_some_and(|given| {
+            matches!(given.content, ValueContent::Flag(false) | ValueContent::None)
+        })
     }
 }
 
 /// A value of the right kind and within the range of its key.
-fn checked(key: &Key, given: Given) -> Result<Given, String> {
+fn checked(key: &Key, given: ProtocolValue) -> Result<ProtocolValue, String> {
     match key.kind {
-        _ if given.what == What::None => Ok(given),
+        _ if given.content == ValueContent::None => Ok(given),
         // Every value but false counts as true.
-        Kind::Flag if key.name == "only_if" => Ok(given),
-        Kind::Flag => match given.what {
-            What::Flag(_) => Ok(given),
-            _ => Err(given.is_not(Kind::Flag)),
+        QuantityKind::Flag if key.name == "only_if" => Ok(given),
+        QuantityKind::Flag => match given.content {
+            ValueContent::Flag(_) => Ok(given),
+            _ => Err(given.is_not(QuantityKind::Flag)),
         },
-        Kind::Text => match key.range {
+        QuantityKind::Text => match key.range {
             Range::OneOf(words) if !words.contains(&given.text.as_str()) => {
                 Err(format!("'{}' is not possible; {}", given.text, suggestion(&given.text, words)))
             }
@@ -167,11 +172,11 @@ fn checked(key: &Key, given: Given) -> Result<Given, String> {
 }
 
 /// Whether a number of a kind is within a range, or what to give.
-pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), String> {
+pub(super) fn check_range(kind: QuantityKind, range: Range, number: f64) -> Result<(), String> {
     let most = match kind {
-        Kind::Time => TIME_MAX,
-        Kind::Count => COUNT_MAX,
-        Kind::Mass => MASS_MAX,
+        QuantityKind::Time => TIME_MAX,
+        QuantityKind::Count => COUNT_MAX,
+        QuantityKind::Mass => MASS_MAX,
         _ => SIZE_MAX,
     };
     let (is_within, least) = match range {

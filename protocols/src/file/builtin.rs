@@ -1,7 +1,7 @@
 //! The protocols that come with the program: files like any other, and the examples to copy.
 
 use super::Protocol;
-use super::problem::{Problem, nearest};
+use super::problem::{ProtocolProblem, nearest};
 
 macro_rules! built_in {
     ($($name:literal)*) => {
@@ -32,7 +32,7 @@ built_in! {
 
 /// The built-in protocol of a name, `None` if there is none.
 #[must_use]
-pub fn built_in(name: &str) -> Option<Result<Protocol, Vec<Problem>>> {
+pub fn built_in(name: &str) -> Option<Result<Protocol, Vec<ProtocolProblem>>> {
     let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
     Some(Protocol::read(text))
 }

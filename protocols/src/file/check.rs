@@ -1,23 +1,23 @@
 //! Everything that can be said of a protocol before it runs: the language, the order of steps, and the rig.
 
-use super::problem::{PROBLEMS_MAX, Problem};
-use super::{Protocol, Written};
+use super::problem::{PROBLEMS_MAX, ProtocolProblem};
+use super::{ExpandedProtocol, Protocol};
 use crate::preview::{Preview, preview};
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{Limits, RigDescription};
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug)]
-pub struct Checked {
+pub struct ProtocolCheck {
     /// The protocol with its plan and preview for the chosen values; none if it cannot be read or written out.
-    pub plan: Option<(Protocol, Written, Preview)>,
+    pub plan: Option<(Protocol, ExpandedProtocol, Preview)>,
     /// Errors and warnings, in order of lines.
-    pub problems: Vec<Problem>,
+    pub problems: Vec<ProtocolProblem>,
 }
 
-impl Checked {
+impl ProtocolCheck {
     pub fn is_sound(&self) -> bool {
-        !self.problems.iter().any(Problem::is_error)
+        !self.problems.iter().any(ProtocolProblem::is_error)
     }
 }
 
@@ -28,21 +28,21 @@ pub fn check(
     values: &BTreeMap<String, String>,
     rig: &RigDescription,
     limits: &Limits,
-    curve: &Curve,
-) -> Checked {
+    curve: &CalibrationCurve,
+) -> ProtocolCheck {
     let written = Protocol::read(text)
         .and_then(|protocol| protocol.write_out(values).map(|written| (protocol, written)));
     let (protocol, written) = match written {
         Ok(pair) => pair,
         Err(problems) => {
-            return Checked { plan: None, problems };
+            return ProtocolCheck { plan: None, problems };
         }
     };
     let preview = preview(&written.plan, rig, limits, curve, false);
     let mut problems = written.warnings.clone();
     for (step, line) in preview.steps.iter().zip(&written.lines) {
         for reason in &step.refusals {
-            let problem = Problem::error(*line, reason.clone());
+            let problem = ProtocolProblem::error(*line, reason.clone());
             // Every pass of a loop is refused for the same reason.
             if problems.len() < PROBLEMS_MAX && !problems.contains(&problem) {
                 problems.push(problem);
@@ -50,8 +50,8 @@ pub fn check(
         }
     }
     for reason in written.plan.limits.unused(limits) {
-        problems.push(Problem::warning(protocol.limits_line(), reason));
+        problems.push(ProtocolProblem::warning(protocol.limits_line(), reason));
     }
     problems.sort_by_key(|problem| problem.line);
-    Checked { plan: Some((protocol, written, preview)), problems }
+    ProtocolCheck { plan: Some((protocol, written, preview)), problems }
 }

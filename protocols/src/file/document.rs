@@ -138,7 +138,8 @@ fn read_ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
             .error(node.line, "'ask' must be a list, such as ask = [\"operator\", \"specimen\"]");
         return Vec::new();
     };
-    let known: Vec<&str> = palpate_model::about::KEYS.iter().map(|key| key.name).collect();
+    let known: Vec<&str> =
+        palpate_model::metadata::METADATA_KEYS.iter().map(|key| key.name).collect();
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {

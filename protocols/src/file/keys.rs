@@ -1,12 +1,12 @@
 //! The keys of steps, loops, monitors and limits. Every step holds its own in its file; reading, checking and the
 //! reference all use them.
 
-use super::quantity::Kind;
+use super::quantity::QuantityKind;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Key {
     pub name: &'static str,
-    pub kind: Kind,
+    pub kind: QuantityKind,
     pub range: Range,
     pub need: KeyNeed,
     pub about: &'static str,
@@ -29,24 +29,29 @@ pub(crate) enum KeyNeed {
 }
 
 impl Key {
-    const fn new(name: &'static str, kind: Kind, need: KeyNeed, about: &'static str) -> Self {
+    const fn new(
+        name: &'static str,
+        kind: QuantityKind,
+        need: KeyNeed,
+        about: &'static str,
+    ) -> Self {
         Self { name, kind, range: Range::Above0, need, about }
     }
 
     /// A key that must be there.
-    pub const fn needed(name: &'static str, kind: Kind, about: &'static str) -> Self {
+    pub const fn needed(name: &'static str, kind: QuantityKind, about: &'static str) -> Self {
         Self::new(name, kind, KeyNeed::Required, about)
     }
 
     /// A key that may be left out.
-    pub const fn optional(name: &'static str, kind: Kind, about: &'static str) -> Self {
+    pub const fn optional(name: &'static str, kind: QuantityKind, about: &'static str) -> Self {
         Self::new(name, kind, KeyNeed::Optional, about)
     }
 
     /// A key with a value that holds without it, as one would write it.
     pub const fn usual(
         name: &'static str,
-        kind: Kind,
+        kind: QuantityKind,
         usual: &'static str,
         about: &'static str,
     ) -> Self {
@@ -76,14 +81,18 @@ impl Key {
 pub(super) const COMMON: [Key; 3] = [
     Key::optional(
         "checkpoint",
-        Kind::Text,
+        QuantityKind::Text,
         "name of a checkpoint after the step, where the run may pause",
     ),
     Key::usual(
         "on_failure",
-        Kind::Text,
+        QuantityKind::Text,
         "abort",
         "`abort`, `skip`, or `retry 2`: what follows if the step cannot be done",
     ),
-    Key::optional("only_if", Kind::Flag, "skips the step where this is `false` or `\"none\"`"),
+    Key::optional(
+        "only_if",
+        QuantityKind::Flag,
+        "skips the step where this is `false` or `\"none\"`",
+    ),
 ];

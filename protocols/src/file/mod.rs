@@ -20,16 +20,16 @@ pub mod tree;
 
 pub(crate) use args::Args;
 pub use builtin::{BUILT_IN, built_in, nearest_built_in};
-pub use check::{Checked, check};
+pub use check::{ProtocolCheck, check};
 pub(crate) use keys::Key;
-pub use parameter::Parameter;
-pub use problem::{Problem, Severity};
-pub use quantity::{Given, Kind, What};
+pub use parameter::ProtocolParameter;
+pub use problem::{ProblemSeverity, ProtocolProblem};
+pub use quantity::{ProtocolValue, QuantityKind, ValueContent};
 pub use reference::reference;
 
 use crate::plans::{Plan, PlanSource};
-use palpate_model::about::Labels;
-use palpate_model::about::{self, KEYS};
+use palpate_model::metadata::SessionLabels;
+use palpate_model::metadata::{self, METADATA_KEYS};
 use problem::{Problems, suggestion};
 use scope::Scope;
 use std::collections::BTreeMap;
@@ -48,9 +48,9 @@ pub struct Protocol {
     pub title: String,
     pub about: String,
     pub source: String,
-    /// Labels that must be set before the start: keys of [`KEYS`].
+    /// Labels that must be set before the start: keys of [`METADATA_KEYS`].
     pub ask: Vec<String>,
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<ProtocolParameter>,
     /// CRC-32 of the text, eight hexadecimal digits.
     pub crc32: String,
     limits: Option<DocumentNode>,
@@ -59,16 +59,16 @@ pub struct Protocol {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Written {
+pub struct ExpandedProtocol {
     pub plan: Plan,
     pub lines: Vec<u32>,
     /// What to look at before the start; nothing that forbids it.
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<ProtocolProblem>,
 }
 
 impl Protocol {
     /// Reads a protocol and writes it out once with the usual values; every problem found, in order of lines.
-    pub fn read(text: &str) -> Result<Self, Vec<Problem>> {
+    pub fn read(text: &str) -> Result<Self, Vec<ProtocolProblem>> {
         let mut problems = Problems::default();
         let protocol = document::read(text, &mut problems);
         if let Some(protocol) = &protocol {
@@ -82,19 +82,22 @@ impl Protocol {
     }
 
     /// The plan for chosen values, by name of the parameter; the usual value for every other.
-    pub fn plan(&self, values: &BTreeMap<String, String>) -> Result<Plan, Vec<Problem>> {
+    pub fn plan(&self, values: &BTreeMap<String, String>) -> Result<Plan, Vec<ProtocolProblem>> {
         self.write_out(values).map(|written| written.plan)
     }
 
     /// The same with the lines of the steps, for messages, and with warnings.
-    pub fn write_out(&self, values: &BTreeMap<String, String>) -> Result<Written, Vec<Problem>> {
+    pub fn write_out(
+        &self,
+        values: &BTreeMap<String, String>,
+    ) -> Result<ExpandedProtocol, Vec<ProtocolProblem>> {
         let mut problems = Problems::default();
         let (plan, lines) = self.written_out(values, &mut problems);
         if problems.has_errors() {
             return Err(problems.into_list());
         }
         let warnings = problems.into_list();
-        Ok(Written { plan, lines, warnings })
+        Ok(ExpandedProtocol { plan, lines, warnings })
     }
 
     fn written_out(
@@ -151,16 +154,16 @@ impl Protocol {
         self.limits.as_ref().map_or(0, |node| node.line)
     }
 
-    /// Labels it asks for that are not set, in the order of [`KEYS`].
-    pub fn open_questions(&self, labels: &Labels) -> Vec<&'static about::Key> {
-        let is_open = |key: &&about::Key| {
-            self.ask.iter().any(|name| name == key.name) && !labels.is_told(key.name)
+    /// Labels it asks for that are not set, in the order of [`METADATA_KEYS`].
+    pub fn open_questions(&self, labels: &SessionLabels) -> Vec<&'static metadata::MetadataKey> {
+        let is_open = |key: &&metadata::MetadataKey| {
+            self.ask.iter().any(|name| name == key.name) && !labels.is_set(key.name)
         };
-        KEYS.iter().filter(is_open).collect()
+        METADATA_KEYS.iter().filter(is_open).collect()
     }
 
     /// The error lists the labels that are missing.
-    pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
+    pub fn check_labels(&self, labels: &SessionLabels) -> Result<(), String> {
         let open = self.open_questions(labels);
         let open: Vec<String> =
             open.iter().map(|key| format!("{} ({})", key.name, key.meaning)).collect();

@@ -2,22 +2,22 @@
 
 use super::args::{Args, check_range};
 use super::keys::{Key, Range};
-use super::problem::{Problem, Problems};
-use super::quantity::Kind;
+use super::problem::{Problems, ProtocolProblem};
+use super::quantity::QuantityKind;
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
-use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
+use crate::plans::{Monitor, MonitorAction, MonitorSource, PlanLimits, ThresholdSide};
 use palpate_model::units::{Newtons, Position, Seconds};
 
 const LIMIT_KEYS: [Key; 2] = [
     Key::optional(
         "force_max",
-        Kind::Force,
+        QuantityKind::Force,
         "highest force above tare; the rig's own limit holds too",
     ),
     Key::optional(
         "travel_max",
-        Kind::Length,
+        QuantityKind::Length,
         "furthest position from home, such as a little before the base; the rig's own end holds too",
     ),
 ];
@@ -45,35 +45,35 @@ pub(super) fn read_limits(
 }
 
 /// What a monitor can look at, with its kind.
-const SOURCES: [(&str, Source, Kind); 4] = [
-    ("force", Source::Force, Kind::Force),
-    ("depth", Source::Depth, Kind::Length),
-    ("signal", Source::Volts, Kind::Voltage),
-    ("position", Source::Position, Kind::Length),
+const SOURCES: [(&str, MonitorSource, QuantityKind); 4] = [
+    ("force", MonitorSource::Force, QuantityKind::Force),
+    ("depth", MonitorSource::Depth, QuantityKind::Length),
+    ("signal", MonitorSource::Volts, QuantityKind::Voltage),
+    ("position", MonitorSource::Position, QuantityKind::Length),
 ];
 
-const ACTIONS: [(&str, Action); 5] = [
-    ("note", Action::Note),
-    ("pause", Action::Pause),
-    ("stop", Action::Stop),
-    ("retract", Action::Retract),
-    ("halt", Action::Halt),
+const ACTIONS: [(&str, MonitorAction); 5] = [
+    ("note", MonitorAction::Note),
+    ("pause", MonitorAction::Pause),
+    ("stop", MonitorAction::Stop),
+    ("retract", MonitorAction::Retract),
+    ("halt", MonitorAction::Halt),
 ];
 
 /// Keys of a monitor beside the values, whose unit depends on what is watched.
 pub(super) const MONITOR_KEYS: [Key; 4] = [
-    Key::needed("watch", Kind::Text, "`force`, `depth`, `signal` or `position`")
+    Key::needed("watch", QuantityKind::Text, "`force`, `depth`, `signal` or `position`")
         .one_of(&["force", "depth", "signal", "position"]),
     Key::usual(
         "settle",
-        Kind::Time,
+        QuantityKind::Time,
         "1 s",
         "how long the value must be in range before a paused run goes on",
     )
     .zero_allowed(),
-    Key::needed("action", Kind::Text, "`note`, `pause`, `stop`, `retract` or `halt`")
+    Key::needed("action", QuantityKind::Text, "`note`, `pause`, `stop`, `retract` or `halt`")
         .one_of(&["note", "pause", "stop", "retract", "halt"]),
-    Key::needed("message", Kind::Text, "what the operator reads"),
+    Key::needed("message", QuantityKind::Text, "what the operator reads"),
 ];
 
 pub(super) fn read_monitors(
@@ -110,8 +110,8 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
     };
     let (above, below, resume) = (value("above"), value("below"), value("resume"));
     let (side, threshold) = match (table.get("above").is_some(), table.get("below").is_some()) {
-        (true, false) => (Side::Above, above?),
-        (false, true) => (Side::Below, below?),
+        (true, false) => (ThresholdSide::Above, above?),
+        (false, true) => (ThresholdSide::Below, below?),
         _ => {
             let message = "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"";
             problems.error(table.line, message);
@@ -130,7 +130,7 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
     };
     if let Err(reason) = monitor.check() {
         let line = table.get("resume").map_or(table.line, |node| node.line);
-        problems.push(Problem::error(
+        problems.push(ProtocolProblem::error(
             line,
             format!("{reason}; give a 'resume' on the other side of the threshold"),
         ));

@@ -1,7 +1,7 @@
 //! What the order of steps must keep, on any rig: the motor is on, the axis is homed, the cell is tared and the
 //! surface is found before they are needed, and the probe is outside where it has to be.
 
-use super::problem::{Problem, Problems};
+use super::problem::{Problems, ProtocolProblem};
 use super::procedure::PlacedStep;
 use crate::steps::Preconditions;
 use std::collections::BTreeSet;
@@ -22,20 +22,20 @@ pub(super) fn check(steps: &[PlacedStep], problems: &mut Problems) {
         if let Some(warning) = step.warning(&known)
             && warned.insert(placed.line)
         {
-            problems.push(Problem::warning(placed.line, warning));
+            problems.push(ProtocolProblem::warning(placed.line, warning));
         }
         let checkpoint = placed.planned.checkpoint.as_ref();
         if let Some(checkpoint) =
             checkpoint.filter(|_| known.is_inside && warned.insert(placed.line))
         {
-            problems.push(Problem::warning(
+            problems.push(ProtocolProblem::warning(
                 placed.line,
                 format!("at the checkpoint '{checkpoint}' the probe is in the tissue, which goes on relaxing in a pause; put the checkpoint behind a retract or unload if that matters"),
             ));
         }
     }
     if let Some(last) = steps.last().filter(|_| known.is_inside) {
-        problems.push(Problem::warning(
+        problems.push(ProtocolProblem::warning(
             last.line,
             "the protocol ends with the probe in the tissue; end it with { do = \"retract\" } if that is not meant",
         ));

@@ -2,19 +2,19 @@
 
 use super::args::STEPS_HINT;
 use super::problem::{Problems, suggestion};
-use super::quantity::{Given, Kind, What};
+use super::quantity::{ProtocolValue, QuantityKind, ValueContent};
 use super::tree::{DocumentEntry, DocumentTable, DocumentValue};
 use serde::Serialize;
 
 /// Something a technician may change at the start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Parameter {
+pub struct ProtocolParameter {
     /// Its name, as in `--set name=value`.
     pub name: String,
-    pub kind: Kind,
+    pub kind: QuantityKind,
     /// Whether it takes several values, separated by commas.
     pub is_list: bool,
-    pub default: Given,
+    pub default: ProtocolValue,
     /// Smallest value, in the unit of its kind.
     pub min: Option<f64>,
     /// Largest value, in the unit of its kind.
@@ -25,34 +25,38 @@ pub struct Parameter {
     pub line: u32,
 }
 
-impl Parameter {
+impl ProtocolParameter {
     /// Reads a value that was typed, or says what is wrong with it.
-    pub fn read(&self, text: &str) -> Result<Given, String> {
+    pub fn read(&self, text: &str) -> Result<ProtocolValue, String> {
         let given = if self.is_list {
-            Given::of_list(text.split(',').map(Given::of_text).collect())
+            ProtocolValue::of_list(text.split(',').map(ProtocolValue::of_text).collect())
         } else {
-            Given::of_text(text)
+            ProtocolValue::of_text(text)
         };
         self.check(&given).map(|()| given)
     }
 
     /// Whether a value is of the right kind and within the range.
-    fn check(&self, given: &Given) -> Result<(), String> {
-        match &given.what {
-            What::List(items) if self.is_list => {
+    fn check(&self, given: &ProtocolValue) -> Result<(), String> {
+        match &given.content {
+            ValueContent::List(items) if self.is_list => {
                 items.iter().try_for_each(|item| self.check_one(item))
             }
             _ => self.check_one(given),
         }
     }
 
-    fn check_one(&self, given: &Given) -> Result<(), String> {
+    fn check_one(&self, given: &ProtocolValue) -> Result<(), String> {
         match self.kind {
             // "none" is a value only of what can be left out.
-            _ if given.what == What::None && self.default.what == What::None => Ok(()),
-            Kind::Text if !given.text.is_empty() => Ok(()),
-            Kind::Flag if matches!(given.what, What::Flag(_)) => Ok(()),
-            Kind::Text | Kind::Flag => Err(given.is_not(self.kind)),
+            _ if given.content == ValueContent::None
+                && self.default.content == ValueContent::None =>
+            {
+                Ok(())
+            }
+            QuantityKind::Text if !given.text.is_empty() => Ok(()),
+            QuantityKind::Flag if matches!(given.content, ValueContent::Flag(_)) => Ok(()),
+            QuantityKind::Text | QuantityKind::Flag => Err(given.is_not(self.kind)),
             kind => {
                 let number = given.number(kind)?;
                 // A count has no unit.
@@ -71,7 +75,10 @@ impl Parameter {
     }
 }
 
-pub(super) fn read_parameters(root: &DocumentTable, problems: &mut Problems) -> Vec<Parameter> {
+pub(super) fn read_parameters(
+    root: &DocumentTable,
+    problems: &mut Problems,
+) -> Vec<ProtocolParameter> {
     let Some(node) = root.get("parameters") else {
         return Vec::new();
     };
@@ -101,7 +108,11 @@ pub(super) fn read_parameters(root: &DocumentTable, problems: &mut Problems) -> 
 
 const PARAMETER_KEYS: [&str; 6] = ["default", "unit", "min", "max", "about", "source"];
 
-fn read_parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> Option<Parameter> {
+fn read_parameter(
+    name: &str,
+    keys: &DocumentTable,
+    problems: &mut Problems,
+) -> Option<ProtocolParameter> {
     let line = keys.line;
     for entry in &keys.entries {
         if !PARAMETER_KEYS.contains(&entry.key.as_str()) {
@@ -136,17 +147,17 @@ fn read_parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> 
         );
         return None;
     };
-    let default = problems.take(default.line, Given::of_node(default))?;
+    let default = problems.take(default.line, ProtocolValue::of_node(default))?;
     let kind = problems.take(line, kind_of(name, &default, &text_of("unit")))?;
     let mut bound = |key: &str| {
         let node = keys.get(key)?;
-        let number = Given::of_node(node).and_then(|given| given.number(kind));
+        let number = ProtocolValue::of_node(node).and_then(|given| given.number(kind));
         problems.take(node.line, number.map_err(|reason| format!("'{key}' of '{name}': {reason}")))
     };
-    let parameter = Parameter {
+    let parameter = ProtocolParameter {
         name: name.to_owned(),
         kind,
-        is_list: matches!(default.what, What::List(_)),
+        is_list: matches!(default.content, ValueContent::List(_)),
         min: bound("min"),
         max: bound("max"),
         default,
@@ -162,20 +173,22 @@ fn read_parameter(name: &str, keys: &DocumentTable, problems: &mut Problems) -> 
 }
 
 /// What kind of value a parameter takes, from its default and the unit that is written beside it.
-fn kind_of(name: &str, default: &Given, unit: &str) -> Result<Kind, String> {
+fn kind_of(name: &str, default: &ProtocolValue, unit: &str) -> Result<QuantityKind, String> {
     match (default.kind(), unit) {
         (Some(kind), "") => Ok(kind),
         (None, "") => Err(format!(
             "the default of '{name}' has no unit; add unit = \"mm\" or the unit it has"
         )),
-        (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
-            Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
-            Some(kind) => {
-                Err(format!("the default of '{name}' is wrong: {}", default.is_not(kind)))
+        (found, unit) => {
+            match QuantityKind::of_unit(unit).or((unit == "text").then_some(QuantityKind::Text)) {
+                Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
+                Some(kind) => {
+                    Err(format!("the default of '{name}' is wrong: {}", default.is_not(kind)))
+                }
+                None => Err(format!(
+                    "'{unit}' of '{name}' is not a unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
+                )),
             }
-            None => Err(format!(
-                "'{unit}' of '{name}' is not a unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
-            )),
-        },
+        }
     }
 }

@@ -8,43 +8,43 @@ pub const PROBLEMS_MAX: usize = 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Severity {
+pub enum ProblemSeverity {
     Error,
     /// The protocol can run, but perhaps not as intended.
     Warning,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Problem {
+pub struct ProtocolProblem {
     /// Line of the file, from 1; 0 where it is not in the file.
     pub line: u32,
-    pub severity: Severity,
+    pub severity: ProblemSeverity,
     pub message: String,
 }
 
-impl Problem {
+impl ProtocolProblem {
     /// Something that keeps the protocol from running.
     #[must_use]
     pub fn error(line: u32, message: impl Into<String>) -> Self {
-        Self { line, severity: Severity::Error, message: message.into() }
+        Self { line, severity: ProblemSeverity::Error, message: message.into() }
     }
 
     #[must_use]
     pub fn warning(line: u32, message: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, ..Self::error(line, message) }
+        Self { severity: ProblemSeverity::Warning, ..Self::error(line, message) }
     }
 
     pub fn is_error(&self) -> bool {
-        self.severity == Severity::Error
+        self.severity == ProblemSeverity::Error
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for ProtocolProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.line > 0 {
             write!(f, "line {}: ", self.line)?;
         }
-        if self.severity == Severity::Warning {
+        if self.severity == ProblemSeverity::Warning {
             f.write_str("warning: ")?;
         }
         f.write_str(&self.message)
@@ -54,7 +54,7 @@ impl fmt::Display for Problem {
 /// The problems found so far: each once, and not too many.
 #[derive(Debug, Default)]
 pub struct Problems {
-    found: Vec<Problem>,
+    found: Vec<ProtocolProblem>,
     dropped: usize,
     /// How often something was wrong, repeats included.
     count: usize,
@@ -62,11 +62,11 @@ pub struct Problems {
 
 impl Problems {
     pub fn error(&mut self, line: u32, message: impl Into<String>) {
-        self.push(Problem::error(line, message));
+        self.push(ProtocolProblem::error(line, message));
     }
 
     /// Every pass of a loop finds the same problem: it is listed once.
-    pub fn push(&mut self, problem: Problem) {
+    pub fn push(&mut self, problem: ProtocolProblem) {
         self.count += 1;
         if self.found.contains(&problem) {
             return;
@@ -88,7 +88,7 @@ impl Problems {
     }
 
     pub fn has_errors(&self) -> bool {
-        self.found.iter().any(Problem::is_error)
+        self.found.iter().any(ProtocolProblem::is_error)
     }
 
     pub fn is_full(&self) -> bool {
@@ -96,11 +96,11 @@ impl Problems {
     }
 
     /// All of them in the order of the text.
-    pub fn into_list(mut self) -> Vec<Problem> {
+    pub fn into_list(mut self) -> Vec<ProtocolProblem> {
         self.found.sort_by_key(|problem| problem.line);
         if self.dropped > 0 {
             let message = "there are more problems than these; correct these and check again";
-            self.found.push(Problem::error(0, message));
+            self.found.push(ProtocolProblem::error(0, message));
         }
         self.found
     }

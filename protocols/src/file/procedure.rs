@@ -3,7 +3,7 @@
 use super::args::{Args, COUNT_MAX};
 use super::keys::{COMMON, Key};
 use super::problem::{Problems, suggestion};
-use super::quantity::{Given, Kind, What};
+use super::quantity::{ProtocolValue, QuantityKind, ValueContent};
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
 use crate::plans::{OnFailure, PlannedStep};
@@ -18,21 +18,25 @@ const LOOPS_MAX: usize = 6;
 pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
-        Kind::Text,
+        QuantityKind::Text,
         "name for the number of the pass, from 1: `$name` in values, `{name}` in texts",
     ),
-    Key::optional("reverse", Kind::Flag, "`true` runs through the values backwards"),
+    Key::optional("reverse", QuantityKind::Flag, "`true` runs through the values backwards"),
     Key::optional(
         "cycle",
-        Kind::Flag,
+        QuantityKind::Flag,
         "`true`: each pass is one repeat of the measurement; repeats are numbered 1, 2, 3 through the whole plan",
     ),
     Key::optional(
         "checkpoint",
-        Kind::Text,
+        QuantityKind::Text,
         "name of a checkpoint after each pass, where the run may pause",
     ),
-    Key::optional("only_if", Kind::Flag, "skips the loop where this is `false` or `\"none\"`"),
+    Key::optional(
+        "only_if",
+        QuantityKind::Flag,
+        "skips the loop where this is `false` or `\"none\"`",
+    ),
 ];
 
 pub(super) struct PlacedStep {
@@ -173,7 +177,7 @@ impl Writer<'_> {
                 self.scope.push(&name, value);
             }
             if !number.is_empty() {
-                self.scope.push(number, Given::count(pass));
+                self.scope.push(number, ProtocolValue::count(pass));
             }
             let cycle = if args.is_true("cycle") {
                 self.cycles += 1;
@@ -197,7 +201,7 @@ impl Writer<'_> {
         let Some(node) = table.get("checkpoint") else {
             return;
         };
-        let named = self.scope.value(node, Kind::Text);
+        let named = self.scope.value(node, QuantityKind::Text);
         let named = named.map_err(|reason| format!("'checkpoint' of a loop: {reason}"));
         let named = self.problems.take(node.line, named);
         if let Some(last) = self.steps[begun..].last_mut() {
@@ -206,10 +210,10 @@ impl Writer<'_> {
     }
 
     /// What a loop runs through: the name of its values and the values; numbers have no name but `as`.
-    fn values(&self, table: &DocumentTable) -> Result<(String, Vec<Given>), Mistake> {
+    fn values(&self, table: &DocumentTable) -> Result<(String, Vec<ProtocolValue>), Mistake> {
         if let Some(node) = table.get("repeat") {
-            let value = self.scope.value(node, Kind::Count);
-            let count = value.and_then(|given| given.number(Kind::Count));
+            let value = self.scope.value(node, QuantityKind::Count);
+            let count = value.and_then(|given| given.number(QuantityKind::Count));
             let count =
                 count.map_err(|reason| (node.line, format!("'repeat' of a loop: {reason}")))?;
             if !(1.0..=COUNT_MAX).contains(&count) {
@@ -218,7 +222,10 @@ impl Writer<'_> {
                 );
                 return Err((node.line, message));
             }
-            return Ok((String::new(), (0..count as u32).map(|_| Given::count(0)).collect()));
+            return Ok((
+                String::new(),
+                (0..count as u32).map(|_| ProtocolValue::count(0)).collect(),
+            ));
         }
         let node = table.get("for_each");
         let entries = match node.map(|node| &node.value) {
@@ -232,7 +239,9 @@ impl Writer<'_> {
         let mistake =
             |reason: String| (entry.line, format!("the values of '{}': {reason}", entry.key));
         let values = self.scope.list(&entry.node).map_err(mistake)?;
-        let is_odd = |value: &&Given| matches!(value.what, What::List(_) | What::None);
+        let is_odd = |value: &&ProtocolValue| {
+            matches!(value.content, ValueContent::List(_) | ValueContent::None)
+        };
         if let Some(odd) = values.iter().find(is_odd) {
             let text = &odd.text;
             return Err(mistake(format!("'{text}' is not a single value; write each by itself")));

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum QuantityKind {
     Speed,
     /// Depth, distance or position in mm.
     Length,
@@ -28,22 +28,22 @@ pub enum Kind {
 
 /// Every kind in the order of its variants: name with its article, the unit numbers are kept in where it has one, and
 /// a value as one would write it.
-const KINDS: [(Kind, &str, &str, &str); 12] = [
-    (Kind::Speed, "a speed", "mm/s", "\"0.75 mm/s\""),
-    (Kind::Length, "a length", "mm", "\"20 mm\""),
-    (Kind::Force, "a force", "N", "\"1.5 N\""),
-    (Kind::Time, "a time", "s", "\"50 s\" or \"3 min\""),
-    (Kind::Mass, "a mass", "g", "\"240 g\""),
-    (Kind::Frequency, "a frequency", "Hz", "\"0.5 Hz\""),
-    (Kind::ForceRate, "a force over time", "N/s", "\"0.01 N/min\""),
-    (Kind::Voltage, "a voltage", "V", "\"1.8 V\""),
-    (Kind::Temperature, "a temperature", "°C", "\"37 °C\""),
-    (Kind::Count, "a whole number", "", "10"),
-    (Kind::Flag, "true or false", "", "true"),
-    (Kind::Text, "a text", "", "\"words\""),
+const KINDS: [(QuantityKind, &str, &str, &str); 12] = [
+    (QuantityKind::Speed, "a speed", "mm/s", "\"0.75 mm/s\""),
+    (QuantityKind::Length, "a length", "mm", "\"20 mm\""),
+    (QuantityKind::Force, "a force", "N", "\"1.5 N\""),
+    (QuantityKind::Time, "a time", "s", "\"50 s\" or \"3 min\""),
+    (QuantityKind::Mass, "a mass", "g", "\"240 g\""),
+    (QuantityKind::Frequency, "a frequency", "Hz", "\"0.5 Hz\""),
+    (QuantityKind::ForceRate, "a force over time", "N/s", "\"0.01 N/min\""),
+    (QuantityKind::Voltage, "a voltage", "V", "\"1.8 V\""),
+    (QuantityKind::Temperature, "a temperature", "°C", "\"37 °C\""),
+    (QuantityKind::Count, "a whole number", "", "10"),
+    (QuantityKind::Flag, "true or false", "", "true"),
+    (QuantityKind::Text, "a text", "", "\"words\""),
 ];
 
-impl Kind {
+impl QuantityKind {
     pub(super) fn with_units() -> impl Iterator<Item = Self> {
         KINDS.iter().filter(|(_, _, unit, _)| !unit.is_empty()).map(|(kind, ..)| *kind)
     }
@@ -80,31 +80,32 @@ impl Kind {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Given {
+pub struct ProtocolValue {
     pub text: String,
-    pub what: What,
+    #[serde(rename = "what")]
+    pub content: ValueContent,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum What {
+pub enum ValueContent {
     /// A number in the unit of its kind; a count has none.
-    Number(Kind, f64),
+    Number(QuantityKind, f64),
     Flag(bool),
     Text,
     /// `"none"`: no value.
     None,
-    List(Vec<Given>),
+    List(Vec<ProtocolValue>),
 }
 
-impl Given {
-    fn new(text: &str, what: What) -> Self {
-        Self { text: text.to_owned(), what }
+impl ProtocolValue {
+    fn new(text: &str, what: ValueContent) -> Self {
+        Self { text: text.to_owned(), content: what }
     }
 
     #[must_use]
     pub fn count(count: u32) -> Self {
-        Self::new(&count.to_string(), What::Number(Kind::Count, f64::from(count)))
+        Self::new(&count.to_string(), ValueContent::Number(QuantityKind::Count, f64::from(count)))
     }
 
     /// Recognises a number with a unit, a whole number, true, false and none; everything else is a text.
@@ -112,18 +113,20 @@ impl Given {
     pub fn of_text(text: &str) -> Self {
         let trimmed = text.trim();
         let what = match trimmed {
-            "none" => What::None,
-            "true" => What::Flag(true),
-            "false" => What::Flag(false),
+            "none" => ValueContent::None,
+            "true" => ValueContent::Flag(true),
+            "false" => ValueContent::Flag(false),
             _ => match split(trimmed) {
-                Some((number, "")) if is_whole(number) => What::Number(Kind::Count, number),
-                Some((number, unit)) => match Kind::of_unit(unit) {
+                Some((number, "")) if is_whole(number) => {
+                    ValueContent::Number(QuantityKind::Count, number)
+                }
+                Some((number, unit)) => match QuantityKind::of_unit(unit) {
                     Some(kind) => {
-                        What::Number(kind, in_base_unit(number, unit).unwrap_or(f64::NAN))
+                        ValueContent::Number(kind, in_base_unit(number, unit).unwrap_or(f64::NAN))
                     }
-                    None => What::Text,
+                    None => ValueContent::Text,
                 },
-                None => What::Text,
+                None => ValueContent::Text,
             },
         };
         Self::new(trimmed, what)
@@ -132,7 +135,9 @@ impl Given {
     pub(super) fn of_node(node: &DocumentNode) -> Result<Self, String> {
         match &node.value {
             DocumentValue::Text(text) | DocumentValue::Number(text) => Ok(Self::of_text(text)),
-            DocumentValue::Flag(flag) => Ok(Self::new(&flag.to_string(), What::Flag(*flag))),
+            DocumentValue::Flag(flag) => {
+                Ok(Self::new(&flag.to_string(), ValueContent::Flag(*flag)))
+            }
             DocumentValue::List(items) => {
                 let items: Result<Vec<Self>, String> = items.iter().map(Self::of_node).collect();
                 Ok(Self::of_list(items?))
@@ -146,17 +151,17 @@ impl Given {
     #[must_use]
     pub fn of_list(items: Vec<Self>) -> Self {
         let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
-        Self::new(&texts.join(", "), What::List(items.clone()))
+        Self::new(&texts.join(", "), ValueContent::List(items.clone()))
     }
 
     /// Its kind; none for "none" and for a list of different kinds.
-    pub fn kind(&self) -> Option<Kind> {
-        match &self.what {
-            What::Number(kind, _) => Some(*kind),
-            What::Flag(_) => Some(Kind::Flag),
-            What::Text => Some(Kind::Text),
-            What::None => None,
-            What::List(items) => {
+    pub fn kind(&self) -> Option<QuantityKind> {
+        match &self.content {
+            ValueContent::Number(kind, _) => Some(*kind),
+            ValueContent::Flag(_) => Some(QuantityKind::Flag),
+            ValueContent::Text => Some(QuantityKind::Text),
+            ValueContent::None => None,
+            ValueContent::List(items) => {
                 let first = items.first()?.kind()?;
                 items.iter().all(|item| item.kind() == Some(first)).then_some(first)
             }
@@ -164,29 +169,33 @@ impl Given {
     }
 
     /// The number of a value of one kind, or what is wrong with it.
-    pub(super) fn number(&self, kind: Kind) -> Result<f64, String> {
-        match self.what {
-            What::Number(found, number) if found == kind && number.is_finite() => Ok(number),
+    pub(super) fn number(&self, kind: QuantityKind) -> Result<f64, String> {
+        match self.content {
+            ValueContent::Number(found, number) if found == kind && number.is_finite() => {
+                Ok(number)
+            }
             _ => Err(self.is_not(kind)),
         }
     }
 
-    pub(super) fn is_not(&self, kind: Kind) -> String {
+    pub(super) fn is_not(&self, kind: QuantityKind) -> String {
         let text = &self.text;
         let write = format!("write {} like {}", kind.name(), kind.example());
-        match &self.what {
-            What::Number(found, number) if *found == kind && !number.is_finite() => {
+        match &self.content {
+            ValueContent::Number(found, number) if *found == kind && !number.is_finite() => {
                 format!("\"{text}\" is too large to count with; {write}")
             }
-            What::Number(Kind::Count, _) => format!("{text} has no unit; {write}"),
-            What::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
-            What::Flag(_) | What::None => format!("{text} is not a value here; {write}"),
-            What::List(_) => format!("[{text}] is a list; {write}"),
-            What::Text if is_overflow(text) => {
+            ValueContent::Number(QuantityKind::Count, _) => format!("{text} has no unit; {write}"),
+            ValueContent::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
+            ValueContent::Flag(_) | ValueContent::None => {
+                format!("{text} is not a value here; {write}")
+            }
+            ValueContent::List(_) => format!("[{text}] is a list; {write}"),
+            ValueContent::Text if is_overflow(text) => {
                 format!("\"{text}\" is too large to count with; {write}")
             }
-            What::Text => match split(text) {
-                Some((_, "")) if kind == Kind::Count => {
+            ValueContent::Text => match split(text) {
+                Some((_, "")) if kind == QuantityKind::Count => {
                     format!("{text} is not a whole number; {write}")
                 }
                 Some((_, "")) => format!("{text} has no unit; {write}"),
@@ -226,42 +235,42 @@ mod tests {
     #[test]
     fn values_with_units_are_read_exactly() {
         for (text, kind, number) in [
-            ("0.75 mm/s", Kind::Speed, 0.75),
-            ("45mm/min", Kind::Speed, 0.75),
-            ("30 mN", Kind::Force, 0.03),
-            ("3 min", Kind::Time, 180.0),
-            ("0.1 h", Kind::Time, 360.0),
-            ("0.01 N/min", Kind::ForceRate, 0.01 / 60.0),
-            ("-5 mm", Kind::Length, -5.0),
-            ("1.04 kg", Kind::Mass, 1040.0),
-            ("1e-3 V", Kind::Voltage, 1e-3),
-            ("10", Kind::Count, 10.0),
+            ("0.75 mm/s", QuantityKind::Speed, 0.75),
+            ("45mm/min", QuantityKind::Speed, 0.75),
+            ("30 mN", QuantityKind::Force, 0.03),
+            ("3 min", QuantityKind::Time, 180.0),
+            ("0.1 h", QuantityKind::Time, 360.0),
+            ("0.01 N/min", QuantityKind::ForceRate, 0.01 / 60.0),
+            ("-5 mm", QuantityKind::Length, -5.0),
+            ("1.04 kg", QuantityKind::Mass, 1040.0),
+            ("1e-3 V", QuantityKind::Voltage, 1e-3),
+            ("10", QuantityKind::Count, 10.0),
         ] {
-            assert_eq!(Given::of_text(text).number(kind), Ok(number), "{text}");
+            assert_eq!(ProtocolValue::of_text(text).number(kind), Ok(number), "{text}");
         }
     }
 
     #[test]
     fn wrong_values_get_a_message_with_an_example() {
         for (text, kind, words) in [
-            ("0.75", Kind::Speed, "has no unit"),
-            ("5", Kind::Length, "has no unit"),
-            ("5 N", Kind::Length, "is a force"),
-            ("5 mmm", Kind::Length, "did you mean 'mm'"),
-            ("0,75 mm/s", Kind::Speed, "a point, not a comma"),
-            ("fast", Kind::Speed, "is not a speed"),
-            ("2.5", Kind::Count, "not a whole number"),
-            ("1e999 N", Kind::Force, "is too large"),
-            ("-1e999", Kind::Count, "is too large"),
-            ("1e308 h", Kind::Time, "\"1e308 h\""),
-            ("inf N", Kind::Force, "is not a force"),
-            ("nan", Kind::Time, "is not a time"),
-            ("", Kind::Time, "is not a time"),
-            ("--1 s", Kind::Time, "is not a time"),
-            ("none", Kind::Time, "not a value here"),
-            ("2e s", Kind::Time, "of a time"),
+            ("0.75", QuantityKind::Speed, "has no unit"),
+            ("5", QuantityKind::Length, "has no unit"),
+            ("5 N", QuantityKind::Length, "is a force"),
+            ("5 mmm", QuantityKind::Length, "did you mean 'mm'"),
+            ("0,75 mm/s", QuantityKind::Speed, "a point, not a comma"),
+            ("fast", QuantityKind::Speed, "is not a speed"),
+            ("2.5", QuantityKind::Count, "not a whole number"),
+            ("1e999 N", QuantityKind::Force, "is too large"),
+            ("-1e999", QuantityKind::Count, "is too large"),
+            ("1e308 h", QuantityKind::Time, "\"1e308 h\""),
+            ("inf N", QuantityKind::Force, "is not a force"),
+            ("nan", QuantityKind::Time, "is not a time"),
+            ("", QuantityKind::Time, "is not a time"),
+            ("--1 s", QuantityKind::Time, "is not a time"),
+            ("none", QuantityKind::Time, "not a value here"),
+            ("2e s", QuantityKind::Time, "of a time"),
         ] {
-            let message = Given::of_text(text).number(kind).unwrap_err();
+            let message = ProtocolValue::of_text(text).number(kind).unwrap_err();
             assert!(message.contains(words), "{text}: {message}");
         }
     }

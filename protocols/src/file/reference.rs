@@ -3,9 +3,9 @@
 use super::keys::{COMMON, Key, KeyNeed};
 use super::monitors::MONITOR_KEYS;
 use super::procedure::LOOP_KEYS;
-use super::quantity::Kind;
+use super::quantity::QuantityKind;
 use crate::steps::KINDS;
-use palpate_model::about::KEYS;
+use palpate_model::metadata::METADATA_KEYS;
 use std::fmt::Write;
 
 /// Every step with its keys, units and usual values, then loops, monitors, units and what can be asked, in Markdown.
@@ -24,12 +24,12 @@ pub fn reference() -> String {
     let about = "`above` or `below` is the threshold and `resume` the value at which the monitor resets, in the unit of what is watched.";
     section(&mut text, "`[[monitor]]`", about, &MONITOR_KEYS);
     text.push_str("### Units\n\n| kind | units |\n|---|---|\n");
-    for kind in Kind::with_units() {
+    for kind in QuantityKind::with_units() {
         let units = kind.units().join(", ");
         let _ = writeln!(text, "| {} | {units} |", kind.name().trim_start_matches("a "));
     }
     text.push_str("\n### What `ask` knows\n\n| key | meaning |\n|---|---|\n");
-    for key in KEYS {
+    for key in METADATA_KEYS {
         let _ = writeln!(text, "| `{}` | {} |", key.name, key.meaning);
     }
     text

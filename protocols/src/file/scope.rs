@@ -1,14 +1,14 @@
 //! The names a value may use: parameters, and what the loops around it run through.
 
 use super::problem::suggestion;
-use super::quantity::{Given, Kind, What};
+use super::quantity::{ProtocolValue, QuantityKind, ValueContent};
 use super::tree::{DocumentNode, DocumentValue};
 
 #[derive(Debug, Default)]
-pub(super) struct Scope(Vec<(String, Given)>);
+pub(super) struct Scope(Vec<(String, ProtocolValue)>);
 
 impl Scope {
-    pub fn push(&mut self, name: &str, value: Given) {
+    pub fn push(&mut self, name: &str, value: ProtocolValue) {
         self.0.push((name.to_owned(), value));
     }
 
@@ -24,7 +24,7 @@ impl Scope {
         self.0.iter().any(|(known, _)| known == name)
     }
 
-    fn get(&self, name: &str) -> Result<&Given, String> {
+    fn get(&self, name: &str) -> Result<&ProtocolValue, String> {
         let found = self.0.iter().rev().find(|(known, _)| known == name);
         found.map(|(_, given)| given).ok_or_else(|| {
             let known: Vec<&str> = self.0.iter().map(|(known, _)| known.as_str()).collect();
@@ -34,63 +34,71 @@ impl Scope {
     }
 
     /// The value of a node for a key of a kind: `$name` stands for a value, `{name}` in a text for its words.
-    pub fn value(&self, node: &DocumentNode, kind: Kind) -> Result<Given, String> {
+    pub fn value(&self, node: &DocumentNode, kind: QuantityKind) -> Result<ProtocolValue, String> {
         match &node.value {
             DocumentValue::Text(text) => match text.strip_prefix('$') {
                 Some(name) => {
                     let given = self.get(name.trim())?.clone();
                     // The message of an unfit value has the name that it came by.
-                    let fits = matches!(kind, Kind::Text | Kind::Flag)
-                        || given.what == What::None
-                        || given.kind() == Some(kind) && !matches!(given.what, What::List(_));
+                    let fits = matches!(kind, QuantityKind::Text | QuantityKind::Flag)
+                        || given.content == ValueContent::None
+                        || given.kind() == Some(kind)
+                            && !matches!(given.content, ValueContent::List(_));
                     if fits {
                         Ok(given)
                     } else {
                         Err(format!("{text} does not fit: {}", given.is_not(kind)))
                     }
                 }
-                None if kind == Kind::Text => {
+                None if kind == QuantityKind::Text => {
                     let text = self.filled_in(text)?;
-                    Ok(Given { what: if text == "none" { What::None } else { What::Text }, text })
+                    Ok(ProtocolValue {
+                        content: if text == "none" {
+                            ValueContent::None
+                        } else {
+                            ValueContent::Text
+                        },
+                        text,
+                    })
                 }
-                None => Ok(Given::of_text(text)),
+                None => Ok(ProtocolValue::of_text(text)),
             },
-            _ if kind == Kind::Text => {
+            _ if kind == QuantityKind::Text => {
                 Err(format!("{} is not a text; write it in quotes", node.kind()))
             }
-            _ => Given::of_node(node),
+            _ => ProtocolValue::of_node(node),
         }
     }
 
-    pub fn list(&self, node: &DocumentNode) -> Result<Vec<Given>, String> {
+    pub fn list(&self, node: &DocumentNode) -> Result<Vec<ProtocolValue>, String> {
         let given = match &node.value {
             DocumentValue::Text(text) => match text.strip_prefix('$') {
                 Some(name) => self.get(name.trim())?.clone(),
-                None => Given::of_text(text),
+                None => ProtocolValue::of_text(text),
             },
             DocumentValue::List(items) => {
                 let items = items.iter().map(|item| match &item.value {
                     DocumentValue::Text(text) if text.starts_with('$') => {
                         self.get(text[1..].trim()).cloned()
                     }
-                    _ => Given::of_node(item),
+                    _ => ProtocolValue::of_node(item),
                 });
-                Given::of_list(items.collect::<Result<_, String>>()?)
+                ProtocolValue::of_list(items.collect::<Result<_, String>>()?)
             }
-            _ => Given::of_node(node)?,
+            _ => ProtocolValue::of_node(node)?,
         };
-        match given.what {
-            What::List(items) if items.is_empty() => {
+        match given.content {
+            ValueContent::List(items) if items.is_empty() => {
                 Err("the list is empty; give it a value".into())
             }
-            What::List(ref items) if given.kind().is_none() => {
+            ValueContent::List(ref items) if given.kind().is_none() => {
                 let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
                 Err(format!(
                     "[{}] has values of different kinds; give them one kind of unit",
                     texts.join(", ")
                 ))
             }
-            What::List(items) => Ok(items),
+            ValueContent::List(items) => Ok(items),
             _ => Err(format!(
                 "'{}' is one value, not a list; write [\"{}\"]",
                 given.text, given.text

@@ -1,6 +1,6 @@
 //! The text of a protocol as a tree of nodes with line numbers.
 
-use super::problem::Problem;
+use super::problem::ProtocolProblem;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -68,7 +68,7 @@ impl DocumentNode {
 }
 
 /// Reads a text. After a syntax error everything behind it is doubtful, so only the first is reported.
-pub fn read(text: &str) -> Result<DocumentTable, Problem> {
+pub fn read(text: &str) -> Result<DocumentTable, ProtocolProblem> {
     let lines = Lines::of(text);
     match DeTable::parse(text) {
         Ok(document) => Ok(lines.table(document.get_ref(), 0)),
@@ -78,7 +78,7 @@ pub fn read(text: &str) -> Result<DocumentTable, Problem> {
                 "this is not TOML: {}; look for a missing quote, comma, '=' or bracket here or just above",
                 err.message().trim().replace('\n', ", ")
             );
-            Err(Problem::error(line, message))
+            Err(ProtocolProblem::error(line, message))
         }
     }
 }

@@ -15,8 +15,8 @@ use std::fmt::Display;
 pub use crate::steps::*;
 pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
-pub use monitor::{Action, Monitor, Side, Source};
-pub use ramp_hold::{LEAVE, RampHold, approach};
+pub use monitor::{Monitor, MonitorAction, MonitorSource, ThresholdSide};
+pub use ramp_hold::{LEAVE_TISSUE, RampHold, approach_steps};
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

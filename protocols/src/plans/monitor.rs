@@ -7,21 +7,21 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Monitor {
-    pub source: Source,
+    pub source: MonitorSource,
     /// Whether values above the threshold trip it, or values below.
-    pub side: Side,
+    pub side: ThresholdSide,
     /// The value that trips it, in the source's unit.
     pub threshold: f64,
     pub resume: f64,
     /// How long it must be past before a paused run goes on.
     pub settle: Seconds,
-    pub action: Action,
+    pub action: MonitorAction,
     pub message: String,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Source {
+pub enum MonitorSource {
     /// Force above tare, in N.
     Force,
     /// Depth from contact, in mm.
@@ -34,14 +34,14 @@ pub enum Source {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Side {
+pub enum ThresholdSide {
     Above,
     Below,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Action {
+pub enum MonitorAction {
     Note,
     /// Pause; go on by itself once it is past, where going on is sound.
     Pause,
@@ -50,7 +50,7 @@ pub enum Action {
     Halt,
 }
 
-impl Source {
+impl MonitorSource {
     #[must_use]
     pub const fn unit(self) -> &'static str {
         match self {
@@ -64,15 +64,15 @@ impl Source {
 impl Monitor {
     pub fn is_tripped_by(&self, value: f64) -> bool {
         match self.side {
-            Side::Above => value >= self.threshold,
-            Side::Below => value <= self.threshold,
+            ThresholdSide::Above => value >= self.threshold,
+            ThresholdSide::Below => value <= self.threshold,
         }
     }
 
     pub fn is_past_at(&self, value: f64) -> bool {
         match self.side {
-            Side::Above => value <= self.resume,
-            Side::Below => value >= self.resume,
+            ThresholdSide::Above => value <= self.resume,
+            ThresholdSide::Below => value >= self.resume,
         }
     }
 
@@ -81,8 +81,8 @@ impl Monitor {
             return Err("a monitor's threshold and resume value must be numbers".into());
         }
         let is_apart = match self.side {
-            Side::Above => self.resume <= self.threshold,
-            Side::Below => self.resume >= self.threshold,
+            ThresholdSide::Above => self.resume <= self.threshold,
+            ThresholdSide::Below => self.resume >= self.threshold,
         };
         if !is_apart {
             return Err(format!(

@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
 /// The retract after a measurement.
-pub const LEAVE: Step = Step::Retract(Retract { speed: MmPerS(6.0), clearance_mm: 10.0 });
+pub const LEAVE_TISSUE: Step = Step::Retract(Retract { speed: MmPerS(6.0), clearance_mm: 10.0 });
 
 /// Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
 pub(super) const TARE: Seconds = Seconds(4.0);
 
 /// What comes before a measurement: self-test, home, tare and contact.
 #[must_use]
-pub fn approach(tare: Seconds, contact: FindContact) -> Vec<Step> {
+pub fn approach_steps(tare: Seconds, contact: FindContact) -> Vec<Step> {
     vec![
         SelfTest { duration: Seconds(0.5) }.into(),
         Home { speed: MmPerS(9.0), touch_speed: MmPerS(0.3) }.into(),
@@ -58,7 +58,7 @@ impl Default for RampHold {
 
 impl RampHold {
     pub fn plan(&self) -> Plan {
-        let mut steps = approach(TARE, FindContact::default());
+        let mut steps = approach_steps(TARE, FindContact::default());
         steps.extend([
             Ramp { speed: self.speed, depth: self.depth }.into(),
             Hold { until: self.until, ..Hold::of(self.hold) }.into(),
@@ -67,7 +67,7 @@ impl RampHold {
             self.unload
                 .map(|speed| Step::Unload(Unload { speed, clearance_mm: UNLOAD_CLEARANCE_MM })),
         );
-        steps.push(LEAVE);
+        steps.push(LEAVE_TISSUE);
         Plan::of("ramp-hold", 1, steps)
     }
 }

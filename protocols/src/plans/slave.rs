@@ -1,6 +1,6 @@
 //! A slave that follows: find the tissue, go where it is led, leave.
 
-use super::ramp_hold::{LEAVE, TARE, approach};
+use super::ramp_hold::{LEAVE_TISSUE, TARE, approach_steps};
 use super::{FindContact, Follow, Plan, Step};
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{Depth, MmPerS, Seconds};
@@ -26,8 +26,8 @@ impl Follow {
 
     #[must_use]
     pub fn plan(self) -> Plan {
-        let mut steps = approach(TARE, FindContact::default());
-        steps.extend([Step::Follow(self), LEAVE]);
+        let mut steps = approach_steps(TARE, FindContact::default());
+        steps.extend([Step::Follow(self), LEAVE_TISSUE]);
         Plan::of("slave", 1, steps)
     }
 }

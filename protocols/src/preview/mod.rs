@@ -13,7 +13,7 @@ pub(crate) use walk::{CONTACT_EXPECTED_SHARE, DurationEstimate, SETTLE_SECS, Wal
 use crate::plans::Plan;
 use crate::steps::Preconditions;
 use expected::ExpectedSpecimen;
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::units::{Newtons, Seconds};
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,7 @@ pub struct Preview {
 
 impl Preview {
     /// Whether the plan may start, or the reason why not, in words.
-    pub fn verdict(&self, is_acknowledged: bool) -> Result<(), String> {
+    pub fn check_start(&self, is_acknowledged: bool) -> Result<(), String> {
         match (self.refusals.first(), self.acknowledgements.first()) {
             (Some(refusal), _) => Err(refusal.clone()),
             (None, Some(warning)) if !is_acknowledged => Err(warning.clone()),
@@ -70,7 +70,7 @@ pub fn preview(
     plan: &Plan,
     rig: &RigDescription,
     limits: &Limits,
-    curve: &Curve,
+    curve: &CalibrationCurve,
     is_homed: bool,
 ) -> Preview {
     walk(plan, rig, limits, curve, is_homed, false).0
@@ -83,7 +83,7 @@ pub fn outline(
     plan: &Plan,
     rig: &RigDescription,
     limits: &Limits,
-    curve: &Curve,
+    curve: &CalibrationCurve,
 ) -> Vec<OutlinePoint> {
     walk(plan, rig, limits, curve, false, true).1
 }
@@ -92,7 +92,7 @@ fn walk(
     plan: &Plan,
     rig: &RigDescription,
     limits: &Limits,
-    curve: &Curve,
+    curve: &CalibrationCurve,
     is_homed: bool,
     has_outline: bool,
 ) -> (Preview, Vec<OutlinePoint>) {

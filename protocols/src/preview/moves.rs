@@ -1,7 +1,7 @@
 //! How long moves and waits take, and where a move may begin and end.
 
 use super::walk::{DurationEstimate, Walk};
-use palpate_model::rig::Profile;
+use palpate_model::rig::MotionProfile;
 use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
 /// Milliseconds from the sample that begins a move to the first tick of its motion, and from its last tick to the sample
@@ -117,7 +117,7 @@ impl Walk<'_> {
         // The axis ends on whole pulses.
         let pulse = self.rig.mm_per_pulse;
         let distance_mm = (distance_mm / pulse).round() * pulse;
-        Profile::to_rest(Position(0.0), Position(distance_mm), speed, self.rig.acceleration)
+        MotionProfile::to_rest(Position(0.0), Position(distance_mm), speed, self.rig.acceleration)
             .duration()
             .0
     }

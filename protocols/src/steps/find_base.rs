@@ -5,9 +5,9 @@
 
 use super::find_contact::{above_noise, second_touch_error};
 use super::prelude::*;
-use crate::engine::{Contact, NOT_TARED};
+use crate::engine::{ContactPosition, NOT_TARED};
 use crate::preview::CONTACT_EXPECTED_SHARE;
-use palpate_model::rig::{StiffSample, Thickness, Touched, fit_compliance, thickness};
+use palpate_model::rig::{StiffSample, Thickness, TouchPosition, fit_compliance, thickness};
 
 /// Find the stiff base the specimen lay on, with the specimen taken away: its thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,11 +26,11 @@ pub struct FindBase {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Find the base the specimen lay on, with the specimen taken away: its thickness.",
     keys: &[
-        Key::usual("speed", Kind::Speed, "0.6 mm/s", "of the first touch"),
-        Key::usual("criterion", Kind::Force, "0.05 N", "force that ends the first touch"),
-        Key::usual("retreat", Kind::Length, "0.3 mm", "retract before the second touch"),
-        Key::usual("pass_speed", Kind::Speed, "0.03 mm/s", "of the second touch"),
-        Key::usual("pass_force", Kind::Force, "0.4 N", "force that ends the second touch"),
+        Key::usual("speed", QuantityKind::Speed, "0.6 mm/s", "of the first touch"),
+        Key::usual("criterion", QuantityKind::Force, "0.05 N", "force that ends the first touch"),
+        Key::usual("retreat", QuantityKind::Length, "0.3 mm", "retract before the second touch"),
+        Key::usual("pass_speed", QuantityKind::Speed, "0.03 mm/s", "of the second touch"),
+        Key::usual("pass_force", QuantityKind::Force, "0.4 N", "force that ends the second touch"),
     ],
     build: Some(|args| {
         Ok(FindBase {
@@ -216,11 +216,12 @@ impl RunningStep for BaseSearch {
 
 impl BaseSearch {
     /// The surface from the slow touch; with a contact found before, the thickness between them.
-    fn found(&self, cx: &mut Context<'_>) -> Result<Contact, String> {
+    fn found(&self, cx: &mut Context<'_>) -> Result<ContactPosition, String> {
         let seated = Newtons(FindBase::SEATED_SHARE * self.plan.pass_force.0);
         let line = fit_compliance(&self.samples, seated).map_err(|err| err.to_string())?;
-        let found = Contact { position: line.surface, std_error_mm: line.surface_std_error_mm };
-        let touched = |contact: Contact| Touched {
+        let found =
+            ContactPosition { position: line.surface, std_error_mm: line.surface_std_error_mm };
+        let touched = |contact: ContactPosition| TouchPosition {
             position: contact.position,
             std_error_mm: contact.std_error_mm,
         };

@@ -21,14 +21,22 @@ pub struct Hold {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Stay at depth while the force relaxes.",
     keys: &[
-        Key::needed("for", Kind::Time, "how long, at most").zero_allowed(),
+        Key::needed("for", QuantityKind::Time, "how long, at most").zero_allowed(),
         Key::optional(
             "until",
-            Kind::Text,
+            QuantityKind::Text,
             "ends the hold once a parameter is known this well, such as `\"tau=1%\"`",
         ),
-        Key::optional("slope", Kind::ForceRate, "ends the hold once the force changes by less"),
-        Key::optional("over", Kind::Time, "time over which the slope is judged; goes with `slope`"),
+        Key::optional(
+            "slope",
+            QuantityKind::ForceRate,
+            "ends the hold once the force changes by less",
+        ),
+        Key::optional(
+            "over",
+            QuantityKind::Time,
+            "time over which the slope is judged; goes with `slope`",
+        ),
     ],
     build: Some(read),
     may_touch: false,
@@ -196,7 +204,7 @@ impl RunningStep for HoldRun {
 /// Half of the parameter's 95 % interval as a share of its value, if that is narrow enough and the
 /// parameter identified.
 fn reached(live: &LiveEstimate, rule: &HoldUntil) -> Option<f64> {
-    let parameter = live.identified(rule.parameter.name())?;
+    let parameter = live.identified_parameter(rule.parameter.name())?;
     let [low, high] = parameter.ci95?;
     let relative = 0.5 * (high - low) / parameter.value.abs();
     (relative <= rule.relative).then_some(relative)

@@ -17,10 +17,10 @@ pub struct HoldForce {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Keep the force and let the depth creep.",
     keys: &[
-        Key::needed("force", Kind::Force, "above tare"),
-        Key::needed("for", Kind::Time, "how long").zero_allowed(),
-        Key::usual("speed", Kind::Speed, "0.75 mm/s", "of the corrections"),
-        Key::needed("deepest", Kind::Length, "depth at which the step fails"),
+        Key::needed("force", QuantityKind::Force, "above tare"),
+        Key::needed("for", QuantityKind::Time, "how long").zero_allowed(),
+        Key::usual("speed", QuantityKind::Speed, "0.75 mm/s", "of the corrections"),
+        Key::needed("deepest", QuantityKind::Length, "depth at which the step fails"),
     ],
     build: Some(|args| {
         Ok(HoldForce {

@@ -12,10 +12,10 @@ pub struct Home {
 }
 
 pub(super) const KEYS: &[Key] = &[
-    Key::usual("speed", Kind::Speed, "9 mm/s", "of the search"),
+    Key::usual("speed", QuantityKind::Speed, "9 mm/s", "of the search"),
     Key::usual(
         "touch_speed",
-        Kind::Speed,
+        QuantityKind::Speed,
         "0.3 mm/s",
         "of the second touch, which defines position zero",
     ),

@@ -14,8 +14,8 @@ pub struct Jog {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Move by a distance, positive towards the tissue. Allowed before homing.",
     keys: &[
-        Key::needed("distance", Kind::Length, "signed").any(),
-        Key::needed("speed", Kind::Speed, "of the move"),
+        Key::needed("distance", QuantityKind::Length, "signed").any(),
+        Key::needed("speed", QuantityKind::Speed, "of the move"),
     ],
     build: Some(|args| {
         Ok(Jog { distance_mm: args.number("distance")?, speed: args.speed("speed")? }.into())

@@ -21,12 +21,12 @@ pub struct LoadTo {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Indent at constant speed until a force is reached.",
     keys: &[
-        Key::needed("to", Kind::Force, "force above tare"),
-        Key::needed("speed", Kind::Speed, "of the indentation"),
-        Key::needed("deepest", Kind::Length, "depth at which the step fails"),
+        Key::needed("to", QuantityKind::Force, "force above tare"),
+        Key::needed("speed", QuantityKind::Speed, "of the indentation"),
+        Key::needed("deepest", QuantityKind::Length, "depth at which the step fails"),
         Key::optional(
             "brake",
-            Kind::Force,
+            QuantityKind::Force,
             "force before the target at which the speed falls to a tenth, later to a hundredth",
         ),
     ],

@@ -37,7 +37,7 @@ pub use table::*;
 pub(crate) use target::{FORCE_FLOOR, StepResult};
 pub use target::{MeterSample, StepMeter, StepTarget};
 
-use crate::engine::{Answer, Context};
+use crate::engine::{Context, PromptAnswer};
 use crate::file::{Args, Key};
 use crate::preview::{DurationEstimate, Walk};
 use palpate_model::rig::{Phase, Reading, RigDescription};
@@ -51,7 +51,7 @@ mod prelude {
         StepFacts, StepKind, StepResult,
     };
     pub(super) use crate::engine::{BlockMean, Context, Record};
-    pub(super) use crate::file::{Args, Key, Kind};
+    pub(super) use crate::file::{Args, Key, QuantityKind};
     pub(super) use crate::preview::{DurationEstimate, Reach, Walk};
     pub(super) use palpate_model::rig::{Phase, Reading};
     pub(super) use palpate_model::signal::MovingMean;
@@ -220,7 +220,7 @@ pub(crate) enum StepEvent {
     LiveFit,
     /// Where a step that follows is to go; none where what leads gave no number.
     Lead(Option<Depth>),
-    Answer(Answer),
+    Answer(PromptAnswer),
 }
 
 /// What pausing means for a step in progress.

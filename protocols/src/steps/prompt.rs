@@ -2,7 +2,7 @@
 
 use super::prelude::*;
 use super::table;
-use crate::engine::{Answer, State};
+use crate::engine::{EngineState, PromptAnswer};
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 
@@ -42,24 +42,28 @@ impl OnTimeout {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Ask a person for something and wait. A simulated rig does the hand's work when the answer comes.",
     keys: &[
-        Key::needed("message", Kind::Text, "what to do, as one sentence"),
-        Key::usual("timeout", Kind::Time, "10 min", "how long the run waits"),
+        Key::needed("message", QuantityKind::Text, "what to do, as one sentence"),
+        Key::usual("timeout", QuantityKind::Time, "10 min", "how long the run waits"),
         Key::usual(
             "on_timeout",
-            Kind::Text,
+            QuantityKind::Text,
             "stop",
             "`stop` or `continue`: what follows without an answer",
         )
         .one_of(OnTimeout::WORDS),
         Key::optional(
             "cell_mass",
-            Kind::Mass,
+            QuantityKind::Mass,
             "by hand: total mass to put on the load cell, `\"0 g\"` for none",
         )
         .zero_allowed(),
-        Key::optional("mount", Kind::Count, "by hand: the number of the specimen to clip in")
-            .zero_allowed(),
-        Key::optional("unmount", Kind::Flag, "by hand: `true` takes the specimen out"),
+        Key::optional(
+            "mount",
+            QuantityKind::Count,
+            "by hand: the number of the specimen to clip in",
+        )
+        .zero_allowed(),
+        Key::optional("unmount", QuantityKind::Flag, "by hand: `true` takes the specimen out"),
     ],
     build: Some(read),
     may_touch: false,
@@ -140,7 +144,7 @@ impl RunningStep for PromptRun {
         if cx.now < self.deadline {
             return Ok(Progress::Continue);
         }
-        cx.record(Record::Answered { answer: Answer::TimedOut });
+        cx.record(Record::Answered { answer: PromptAnswer::TimedOut });
         Ok(match self.plan.on_timeout {
             OnTimeout::Continue => Progress::Done,
             OnTimeout::Stop => Progress::Stop(format!("nobody answered within {timeout:.0}")),
@@ -152,7 +156,7 @@ impl RunningStep for PromptRun {
             return None;
         };
         cx.record(Record::Answered { answer });
-        if answer != Answer::Confirmed {
+        if answer != PromptAnswer::Confirmed {
             return Some(Progress::Stop("the operator declined what the plan asked for".into()));
         }
         if matches!(self.plan.hand, Some(HandAction::Mount { .. })) {
@@ -166,7 +170,7 @@ impl RunningStep for PromptRun {
     }
 }
 
-impl State {
+impl EngineState {
     /// The prompt that waits for an answer, and until when.
     pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
         match self.active() {

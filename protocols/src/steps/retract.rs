@@ -12,9 +12,14 @@ pub struct Retract {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Leave the tissue.",
     keys: &[
-        Key::usual("speed", Kind::Speed, "6 mm/s", "of the retract"),
-        Key::usual("clearance", Kind::Length, "10 mm", "distance from the surface to stop at")
-            .zero_allowed(),
+        Key::usual("speed", QuantityKind::Speed, "6 mm/s", "of the retract"),
+        Key::usual(
+            "clearance",
+            QuantityKind::Length,
+            "10 mm",
+            "distance from the surface to stop at",
+        )
+        .zero_allowed(),
     ],
     build: Some(|args| {
         Ok(Retract { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())

@@ -13,7 +13,7 @@ pub struct SelfTest {
 
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
-    keys: &[Key::usual("for", Kind::Time, "0.5 s", "how long the signal is watched")],
+    keys: &[Key::usual("for", QuantityKind::Time, "0.5 s", "how long the signal is watched")],
     build: Some(|args| Ok(SelfTest { duration: args.seconds("for")? }.into())),
     may_touch: false,
     label: "self-test",

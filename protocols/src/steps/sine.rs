@@ -17,9 +17,13 @@ pub struct Sine {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Oscillate from the present depth to deeper and back; begins and ends at rest.",
     keys: &[
-        Key::needed("amplitude", Kind::Length, "half of the distance between the turning points"),
-        Key::needed("frequency", Kind::Frequency, "of the oscillation"),
-        Key::needed("cycles", Kind::Count, "whole cycles"),
+        Key::needed(
+            "amplitude",
+            QuantityKind::Length,
+            "half of the distance between the turning points",
+        ),
+        Key::needed("frequency", QuantityKind::Frequency, "of the oscillation"),
+        Key::needed("cycles", QuantityKind::Count, "whole cycles"),
     ],
     build: Some(|args| {
         Ok(Sine {

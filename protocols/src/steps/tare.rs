@@ -15,7 +15,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
     about: "Average the unloaded signal. The probe touches nothing.",
     keys: &[Key::usual(
         "for",
-        Kind::Time,
+        QuantityKind::Time,
         "4 s",
         "whole mains cycles: whole seconds; from 2 s on the drift is measured too",
     )],

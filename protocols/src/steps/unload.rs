@@ -12,9 +12,14 @@ pub struct Unload {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Unload to the surface at constant speed, recorded like the loading.",
     keys: &[
-        Key::needed("speed", Kind::Speed, "of the unloading"),
-        Key::usual("clearance", Kind::Length, "0.5 mm", "distance from the surface to stop at")
-            .zero_allowed(),
+        Key::needed("speed", QuantityKind::Speed, "of the unloading"),
+        Key::usual(
+            "clearance",
+            QuantityKind::Length,
+            "0.5 mm",
+            "distance from the surface to stop at",
+        )
+        .zero_allowed(),
     ],
     build: Some(|args| {
         Ok(Unload { speed: args.speed("speed")?, clearance_mm: args.number("clearance")? }.into())

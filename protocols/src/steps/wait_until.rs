@@ -36,24 +36,24 @@ pub enum WaitCondition {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Wait at rest until a digital input of the rig has a level, or its bath a temperature.",
     keys: &[
-        Key::optional("input", Kind::Count, "number of the digital input, from 1"),
+        Key::optional("input", QuantityKind::Count, "number of the digital input, from 1"),
         Key::usual(
             "level",
-            Kind::Text,
+            QuantityKind::Text,
             "high",
             "`high` or `low`: the level of the input to wait for",
         )
         .one_of(&["high", "low"]),
         Key::optional(
             "bath_from",
-            Kind::Temperature,
+            QuantityKind::Temperature,
             "lowest temperature of the bath; goes with `bath_to`",
         ),
-        Key::optional("bath_to", Kind::Temperature, "highest temperature of the bath"),
-        Key::usual("timeout", Kind::Time, "10 min", "longest wait"),
+        Key::optional("bath_to", QuantityKind::Temperature, "highest temperature of the bath"),
+        Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait"),
         Key::usual(
             "on_timeout",
-            Kind::Text,
+            QuantityKind::Text,
             "stop",
             "`stop` or `continue`: what follows if it does not come",
         )

@@ -2,8 +2,10 @@
 
 use super::prelude::*;
 use super::table;
-use crate::engine::State;
-use palpate_model::calibration::{Settle as Settled, SettleRule, Settling, SettlingNow};
+use crate::engine::EngineState;
+use palpate_model::calibration::{
+    SettleDetector, SettleProgress, SettleRule, SettleState as Settled,
+};
 
 /// Read the load cell under a known mass: one reading of a calibration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -13,11 +15,11 @@ pub struct Weigh {
     pub is_loading: bool,
     /// Which pass through the masses, from 1.
     pub repeat: u32,
-    pub settle: Settle,
+    pub settle: SettleLimits,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settle {
+pub struct SettleLimits {
     /// Length of the window that is looked at and averaged.
     pub window: Seconds,
     pub timeout: Seconds,
@@ -26,24 +28,32 @@ pub struct Settle {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Read the load cell under a known mass, once the signal has settled.",
     keys: &[
-        Key::needed("mass", Kind::Mass, "total mass, the platform included").zero_allowed(),
+        Key::needed("mass", QuantityKind::Mass, "total mass, the platform included").zero_allowed(),
         Key::usual(
             "masses_go",
-            Kind::Text,
+            QuantityKind::Text,
             "up",
             "`up` or `down`: whether weights were put on or taken off",
         )
         .one_of(&["up", "down"]),
-        Key::usual("pass", Kind::Count, "1", "which pass through the masses"),
-        Key::usual("window", Kind::Time, "2 s", "time that must be steady, and is averaged"),
-        Key::usual("timeout", Kind::Time, "30 s", "longest wait"),
+        Key::usual("pass", QuantityKind::Count, "1", "which pass through the masses"),
+        Key::usual(
+            "window",
+            QuantityKind::Time,
+            "2 s",
+            "time that must be steady, and is averaged",
+        ),
+        Key::usual("timeout", QuantityKind::Time, "30 s", "longest wait"),
     ],
     build: Some(|args| {
         Ok(Weigh {
             mass_g: args.number("mass")?,
             is_loading: args.text("masses_go")? == "up",
             repeat: args.count("pass")?,
-            settle: Settle { window: args.seconds("window")?, timeout: args.seconds("timeout")? },
+            settle: SettleLimits {
+                window: args.seconds("window")?,
+                timeout: args.seconds("timeout")?,
+            },
         }
         .into())
     }),
@@ -69,7 +79,7 @@ impl StepKind for Weigh {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WeighRun {
     plan: Weigh,
-    settling: Settling,
+    settling: SettleDetector,
     newest_tick: Option<u64>,
 }
 
@@ -87,7 +97,7 @@ impl Executable for Weigh {
         cx.forget_force_rate();
         Ok(Box::new(WeighRun {
             plan: self.clone(),
-            settling: Settling::new(rule),
+            settling: SettleDetector::new(rule),
             newest_tick: None,
         }))
     }
@@ -120,9 +130,9 @@ impl RunningStep for WeighRun {
     }
 }
 
-impl State {
+impl EngineState {
     /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
-    pub fn settling(&self) -> Option<SettlingNow> {
+    pub fn settling(&self) -> Option<SettleProgress> {
         match self.active() {
             Some(table::ActiveStep::Weigh(weighing)) => Some(weighing.settling.now()),
             _ => None,

@@ -3,7 +3,7 @@
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Seconds};
-use palpate_protocols::file::{BUILT_IN, Problem, Protocol, built_in, reference};
+use palpate_protocols::file::{BUILT_IN, Protocol, ProtocolProblem, built_in, reference};
 use palpate_protocols::plans::{BodyParameter, FindContact, HoldUntil, Plan, RampHold, Step};
 use palpate_protocols::preview::preview;
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ fn protocol(name: &str) -> Protocol {
     }
 }
 
-fn sentences(problems: &[Problem]) -> String {
+fn sentences(problems: &[ProtocolProblem]) -> String {
     let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
     lines.join("\n")
 }

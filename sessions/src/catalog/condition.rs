@@ -1,6 +1,6 @@
 //! Conditions on named values, as typed: `depth>=2mm`, `ramp.speed=3`, `about.series.id=pilot`.
 
-use super::entry::{Entry, NamedValue, Source};
+use super::entry::{CatalogEntry, NamedValue, NamedValueSource};
 use palpate_model::quantity::{base_unit, in_base_unit, split};
 use rusqlite::types::Value as Sql;
 use std::fmt;
@@ -54,7 +54,7 @@ impl Relation {
 /// A condition on a named value. A session with several values of the name meets it if one of them does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
-    source: Option<Source>,
+    source: Option<NamedValueSource>,
     relation: Relation,
     /// Several where the text is ambiguous; one suffices.
     alternatives: Vec<Comparison>,
@@ -92,11 +92,11 @@ impl FromStr for Condition {
         let sign = SIGNS.iter().find(|(sign, _)| rest.starts_with(sign));
         let (sign, relation) = *sign.ok_or_else(form)?;
         let (name, value) = (name.trim(), rest[sign.len()..].trim());
-        let of = |source: Source| {
+        let of = |source: NamedValueSource| {
             let rest = name.strip_prefix(source.name())?.strip_prefix('.')?;
             Some((source, rest))
         };
-        let (source, name) = match Source::ALL.into_iter().find_map(of) {
+        let (source, name) = match NamedValueSource::ALL.into_iter().find_map(of) {
             Some((source, rest)) => (Some(source), rest),
             None => (None, name),
         };
@@ -139,7 +139,7 @@ fn alternatives(text: &str, name: &str, value: &str) -> Result<Vec<Comparison>, 
 
 impl Condition {
     /// Evaluates the condition in memory; [`Condition::sql`] is the same for the database.
-    pub fn is_met(&self, entry: &Entry) -> bool {
+    pub fn is_met(&self, entry: &CatalogEntry) -> bool {
         let is_met_by = |one: &NamedValue, comparison: &Comparison| {
             let is_unit =
                 comparison.unit.is_none_or(|unit| one.unit.is_empty() || one.unit == unit);
@@ -218,15 +218,15 @@ impl fmt::Display for Condition {
 mod tests {
     use super::*;
 
-    fn entry(named: &[(&str, Option<f64>, &str, &str)]) -> Entry {
+    fn entry(named: &[(&str, Option<f64>, &str, &str)]) -> CatalogEntry {
         let named = named.iter().map(|(name, number, unit, text)| NamedValue {
-            source: Source::Plan,
+            source: NamedValueSource::Plan,
             name: (*name).to_owned(),
             number: *number,
             unit: (*unit).to_owned(),
             text: (*text).to_owned(),
         });
-        Entry { named: named.collect(), ..Entry::default() }
+        CatalogEntry { named: named.collect(), ..CatalogEntry::default() }
     }
 
     #[test]

@@ -2,10 +2,10 @@
 
 use super::heads::KnownHeads;
 use super::walk::LibrarySession;
-use crate::analyses::{Analysed, Analyses};
+use crate::analyses::{Analyses, AnalysisContent};
 use crate::chain::ChainHead;
-use crate::edits::{Edits, Review, Verdict};
-use crate::log::Summary;
+use crate::edits::{DataQuality, Edits, Review};
+use crate::log::SessionSummary;
 use crate::manifest::Manifest;
 use chrono::{DateTime, Utc};
 use palpate_model::quantity::{base_unit, in_base_unit, split};
@@ -14,7 +14,7 @@ use serde_json::Value;
 use std::collections::BTreeSet;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct CatalogEntry {
     /// Path of the folder below the library, separated by `/`.
     pub folder: String,
     /// Empty, like everything below except `trouble`, if the session cannot be read.
@@ -44,11 +44,11 @@ pub struct Entry {
     pub duration_s: f64,
     pub bytes: u64,
     /// Whether it was recorded here, imported, or recovered.
-    pub origin: Origin,
+    pub origin: SessionOrigin,
     /// `None` if the recording was interrupted or is in progress.
     pub ending: Option<String>,
     pub reason: String,
-    pub verdict: Option<Verdict>,
+    pub verdict: Option<DataQuality>,
     pub verdict_reason: String,
     /// The last review, compared with the edits and analyses; `palpate info`, which reads the whole log, compares that
     /// too.
@@ -85,7 +85,7 @@ pub struct CatalogAnalysis {
 /// Where a session comes from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Origin {
+pub enum SessionOrigin {
     #[default]
     Recorded,
     /// Made from another program's file.
@@ -98,7 +98,7 @@ palpate_model::named! {
     /// Origin of a named value.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
     #[serde(rename_all = "lowercase")]
-    pub enum Source {
+    pub enum NamedValueSource {
         Plan = "plan",
         /// The facts about specimen, probe and series.
         About = "about",
@@ -108,7 +108,7 @@ palpate_model::named! {
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedValue {
-    pub source: Source,
+    pub source: NamedValueSource,
     /// A parameter such as `depth`, a key of a step such as `ramp.depth`, or a key of the facts.
     pub name: String,
     /// In `unit`; `None` for text.
@@ -119,17 +119,22 @@ pub struct NamedValue {
 }
 
 impl NamedValue {
-    fn new(source: Source, name: &str, number: (Option<f64>, &str), text: String) -> Self {
+    fn new(
+        source: NamedValueSource,
+        name: &str,
+        number: (Option<f64>, &str),
+        text: String,
+    ) -> Self {
         let (number, unit) = (number.0, number.1.to_owned());
         Self { source, name: name.to_owned(), number, unit, text }
     }
 }
 
-impl Entry {
+impl CatalogEntry {
     /// Reads a session. `trouble` says why one cannot be read, or which known lines are missing.
     pub(super) fn read(session: &LibrarySession, known: &KnownHeads) -> Self {
         let mut entry = Self { folder: session.name.clone(), ..Self::default() };
-        match Summary::read(&session.path) {
+        match SessionSummary::read(&session.path) {
             Ok(summary) => entry.take_summary(&summary),
             Err(err) => return Self { trouble: Some(err.to_string()), ..entry },
         }
@@ -153,7 +158,7 @@ impl Entry {
         entry
     }
 
-    fn take_summary(&mut self, summary: &Summary) {
+    fn take_summary(&mut self, summary: &SessionSummary) {
         self.take_manifest(&summary.manifest);
         self.samples = summary.samples;
         self.duration_s = summary.last.seconds().0;
@@ -176,9 +181,9 @@ impl Entry {
             self.rig_identity.clone_from(&rig.identity);
         }
         self.origin = match (&manifest.recovered, &manifest.imported) {
-            (Some(_), _) => Origin::Recovered,
-            (None, Some(_)) => Origin::Imported,
-            (None, None) => Origin::Recorded,
+            (Some(_), _) => SessionOrigin::Recovered,
+            (None, Some(_)) => SessionOrigin::Imported,
+            (None, None) => SessionOrigin::Recorded,
         };
         self.words.clone_from(&manifest.acknowledgements);
         if let Some(imported) = &manifest.imported {
@@ -200,7 +205,7 @@ impl Entry {
         if let Some(values) = plan["source"]["values"].as_object() {
             named.extend(values.iter().map(|(name, value)| {
                 let text = text(value);
-                NamedValue::new(Source::Plan, name, number_of(&text), text)
+                NamedValue::new(NamedValueSource::Plan, name, number_of(&text), text)
             }));
         }
         for step in plan["steps"].as_array().into_iter().flatten() {
@@ -209,7 +214,7 @@ impl Entry {
         }
         for (name, text) in manifest.about.lines() {
             let number = manifest.about.get(name).and_then(Value::as_f64);
-            named.push(NamedValue::new(Source::About, name, (number, ""), text));
+            named.push(NamedValue::new(NamedValueSource::About, name, (number, ""), text));
         }
         // Repeated steps have the same values.
         let mut seen = BTreeSet::new();
@@ -232,7 +237,7 @@ impl Entry {
     }
 
     fn take_analyses(&mut self, analyses: &Analyses) {
-        for one in analyses.counting() {
+        for one in analyses.active() {
             self.words.extend([one.by.clone(), one.reason.clone()]);
             self.analyses.push(CatalogAnalysis {
                 name: one.name.clone(),
@@ -240,7 +245,7 @@ impl Entry {
                 at: one.at,
                 by: one.by.clone(),
             });
-            if let Analysed::Fit { results, .. } = &one.what {
+            if let AnalysisContent::Fit { results, .. } = &one.what {
                 let parameters = results["parameters"].as_array();
                 self.named.extend(parameters.into_iter().flatten().filter_map(fitted_value));
             }
@@ -280,7 +285,7 @@ fn fitted_value(parameter: &Value) -> Option<NamedValue> {
     let number = parameter["value"].as_f64()?;
     let unit = parameter["unit"].as_str().unwrap_or_default();
     let name = parameter["name"].as_str()?;
-    Some(NamedValue::new(Source::Fit, name, (Some(number), unit), number.to_string()))
+    Some(NamedValue::new(NamedValueSource::Fit, name, (Some(number), unit), number.to_string()))
 }
 
 /// The number in a text such as `20 mm`, converted to its base unit.
@@ -303,7 +308,7 @@ fn collect_leaves(name: &str, value: &Value, named: &mut Vec<NamedValue>) {
         }
         Value::Number(_) | Value::String(_) | Value::Bool(_) => {
             let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-            named.push(NamedValue::new(Source::Plan, name, (value.as_f64(), ""), text));
+            named.push(NamedValue::new(NamedValueSource::Plan, name, (value.as_f64(), ""), text));
         }
         Value::Array(items) => items.iter().for_each(|item| collect_leaves(name, item, named)),
         Value::Null => {}

@@ -8,7 +8,7 @@
 //! since, a deleted programme folder, and any change together with a deletion or rewrite of the catalog. In a library
 //! without write permission nothing is recorded.
 
-use super::entry::{Entry, SessionHeads};
+use super::entry::{CatalogEntry, SessionHeads};
 use super::schema::{bad_text, collect_rows};
 use super::update::entry_of;
 use super::walk::stamp;
@@ -158,11 +158,11 @@ pub(super) fn record_head(db: &Connection, one: &RecordedHead) -> rusqlite::Resu
     .map(|_| ())
 }
 
-pub(super) fn record_session_heads(db: &Connection, entry: &Entry) -> rusqlite::Result<()> {
+pub(super) fn record_session_heads(db: &Connection, entry: &CatalogEntry) -> rusqlite::Result<()> {
     of_entry(entry).iter().try_for_each(|one| record_head(db, one))
 }
 
-fn of_entry(entry: &Entry) -> Vec<RecordedHead> {
+fn of_entry(entry: &CatalogEntry) -> Vec<RecordedHead> {
     let SessionHeads { edits, analyses } = entry.heads;
     let heads = session_files(&entry.folder).into_iter().zip([edits, analyses]);
     let has_lines = |(_, head): &(String, ChainHead)| head.lines > 0;
@@ -179,7 +179,7 @@ pub(super) fn heads_of_other_version(db: &Connection) -> Vec<RecordedHead> {
     let sql = "SELECT entry, checksum FROM session";
     let entries = || collect_rows(db, sql, [], |row| Ok(entry_of(row).ok()));
     let of_entries =
-        |entries: Vec<Option<Entry>>| entries.iter().flatten().flat_map(of_entry).collect();
+        |entries: Vec<Option<CatalogEntry>>| entries.iter().flatten().flat_map(of_entry).collect();
     read(db).or_else(|_| entries().map(of_entries)).unwrap_or_default()
 }
 

@@ -2,19 +2,19 @@
 //! calibrations.
 
 use super::entry::CatalogAnalysis;
-use super::search::{Order, Query};
+use super::search::{CatalogOrder, CatalogQuery};
 use super::{Catalog, CatalogError};
 use crate::checks::read_checks_since;
-use crate::edits::{Change, Edit, Edits};
+use crate::document_store::{Document, DocumentStore, taken_at};
+use crate::edits::{Edit, EditChange, Edits};
 use crate::manifest::format_utc;
-use crate::shelf::{Document, Shelf, taken_at};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Subject {
+pub enum HistorySubject {
     Specimen,
     Rig,
     /// A load cell, by its serial number.
@@ -22,7 +22,7 @@ pub enum Subject {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Event {
+pub struct HistoryEvent {
     /// UTC, RFC 3339 to the millisecond; empty if unknown.
     pub at: String,
     /// `session`, `verdict`, `contact`, `tags`, `note`, `review`, `fit`, `recalibration`, `mask`,
@@ -39,43 +39,47 @@ impl Catalog {
     /// Events as of the last [`Catalog::update`], oldest first, and one sentence for each unreadable file.
     pub fn history(
         &self,
-        subject: Subject,
+        subject: HistorySubject,
         name: &str,
-    ) -> Result<(Vec<Event>, Vec<String>), CatalogError> {
+    ) -> Result<(Vec<HistoryEvent>, Vec<String>), CatalogError> {
         let criterion = Some(name.to_owned());
-        let mut query = Query { order: Order::Started, ..Query::default() };
+        let mut query = CatalogQuery { order: CatalogOrder::Started, ..CatalogQuery::default() };
         match subject {
-            Subject::Specimen => query.specimen = criterion,
-            Subject::Rig => query.rig = criterion,
-            Subject::Cell => query.cell = criterion,
+            HistorySubject::Specimen => query.specimen = criterion,
+            HistorySubject::Rig => query.rig = criterion,
+            HistorySubject::Cell => query.cell = criterion,
         }
         let (mut events, mut remarks) = (Vec::new(), Vec::new());
         for entry in self.find(&query)?.entries {
             let ending = entry.ending.as_deref().unwrap_or("no end");
             let sentence = format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s);
             let (at, folder) = (entry.started_at.clone(), &entry.folder);
-            events.push(Event::new(at, "session", folder, &entry.operator, sentence));
+            events.push(HistoryEvent::new(at, "session", folder, &entry.operator, sentence));
             // The entry's `trouble` reports unreadable edits.
             if let Ok(edits) = Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
-                events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)));
+                events.extend(
+                    edits.all.iter().map(|one| HistoryEvent::from_edit(&entry.folder, one)),
+                );
             }
             remarks.extend(entry.trouble);
-            events.extend(entry.analyses.iter().map(|one| Event::made(&entry.folder, one)));
+            events.extend(
+                entry.analyses.iter().map(|one| HistoryEvent::from_analysis(&entry.folder, one)),
+            );
         }
-        let calibrations = Shelf::<Calibration>::open(&self.library);
+        let calibrations = DocumentStore::<Calibration>::open(&self.library);
         add_documents(&calibrations, &mut events, &mut remarks, |one| {
             let is_its = match subject {
-                Subject::Specimen => false,
-                Subject::Rig => one.rig == name,
-                Subject::Cell => one.cell == name,
+                HistorySubject::Specimen => false,
+                HistorySubject::Rig => one.rig == name,
+                HistorySubject::Cell => one.cell == name,
             };
             is_its.then(|| one.operator.clone())
         });
-        let compliances = Shelf::<RigCompliance>::open(&self.library);
+        let compliances = DocumentStore::<RigCompliance>::open(&self.library);
         add_documents(&compliances, &mut events, &mut remarks, |one| {
-            (subject == Subject::Rig && one.rig == name).then(|| one.operator.clone())
+            (subject == HistorySubject::Rig && one.rig == name).then(|| one.operator.clone())
         });
-        if subject == Subject::Rig {
+        if subject == HistorySubject::Rig {
             let heads = self.heads()?;
             match read_checks_since(&self.library, name, |file| heads.of(file, name)) {
                 Ok(checks) => events.extend(checks.iter().map(|one| {
@@ -83,7 +87,7 @@ impl Catalog {
                         true => "daily check passed".to_owned(),
                         false => format!("daily check failed: {}", one.failures()),
                     };
-                    Event::new(format_utc(one.at), "check", "", &one.by, sentence)
+                    HistoryEvent::new(format_utc(one.at), "check", "", &one.by, sentence)
                 })),
                 Err(err) => remarks.push(err.to_string()),
             }
@@ -96,13 +100,13 @@ impl Catalog {
 
 /// Adds the documents for which `author` returns a name.
 fn add_documents<D: Document>(
-    shelf: &Shelf<D>,
-    events: &mut Vec<Event>,
+    shelf: &DocumentStore<D>,
+    events: &mut Vec<HistoryEvent>,
     remarks: &mut Vec<String>,
     author: impl Fn(&D) -> Option<String>,
 ) {
     remarks.extend(shelf.unreadable.iter().map(ToString::to_string));
-    for stored in &shelf.kept {
+    for stored in &shelf.documents {
         let Some(by) = author(&stored.document) else {
             continue;
         };
@@ -110,30 +114,30 @@ fn add_documents<D: Document>(
         let superseded = stored.document.supersedes();
         let superseded = superseded.map_or(String::new(), |old| format!(" supersedes {old}"));
         let at = at.map_or(String::new(), |at| format_utc(at.to_utc()));
-        events.push(Event::new(at, D::KIND, "", &by, format!("{}{superseded}", stored.id)));
+        events.push(HistoryEvent::new(at, D::KIND, "", &by, format!("{}{superseded}", stored.id)));
     }
 }
 
-impl Event {
+impl HistoryEvent {
     fn new(at: String, what: &str, folder: &str, by: &str, sentence: String) -> Self {
         Self { at, what: what.into(), folder: folder.into(), by: by.into(), sentence }
     }
 
     #[must_use]
-    pub fn said(folder: &str, edit: &Edit) -> Self {
+    pub fn from_edit(folder: &str, edit: &Edit) -> Self {
         let (what, words) = match &edit.change {
-            Change::Verdict { verdict } => ("verdict", verdict.to_string()),
-            Change::Contact { position_mm, .. } => {
+            EditChange::Verdict { verdict } => ("verdict", verdict.to_string()),
+            EditChange::Contact { position_mm, .. } => {
                 ("contact", format!("at {:.3} mm", position_mm.0))
             }
-            Change::Tags { add, remove } => {
+            EditChange::Tags { add, remove } => {
                 let signs = |sign: &str, tags: &[String]| -> Vec<String> {
                     tags.iter().map(|tag| format!("{sign}{tag}")).collect()
                 };
                 ("tags", [signs("+", add), signs("-", remove)].concat().join(" "))
             }
-            Change::Review { decision, .. } => ("review", decision.name().to_owned()),
-            Change::Note => ("note", String::new()),
+            EditChange::Review { decision, .. } => ("review", decision.name().to_owned()),
+            EditChange::Note => ("note", String::new()),
         };
         let sentence = match (words.as_str(), edit.reason.as_str()) {
             (_, "") => words,
@@ -144,7 +148,7 @@ impl Event {
     }
 
     #[must_use]
-    pub fn made(folder: &str, one: &CatalogAnalysis) -> Self {
+    pub fn from_analysis(folder: &str, one: &CatalogAnalysis) -> Self {
         Self::new(format_utc(one.at), &one.what, folder, &one.by, one.name.clone())
     }
 }

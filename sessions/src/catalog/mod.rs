@@ -4,7 +4,7 @@
 //! files (`heads.rs`) are lost with it. A file of another version is replaced; a damaged one, or one of another program,
 //! is renamed and replaced.
 //!
-//! Start reading at [`Entry`], then [`Catalog::update`] and [`Catalog::find`].
+//! Start reading at [`CatalogEntry`], then [`Catalog::update`] and [`Catalog::find`].
 
 mod condition;
 mod entry;
@@ -17,11 +17,15 @@ mod update;
 mod walk;
 
 pub use condition::{Condition, ConditionError};
-pub use entry::{CatalogAnalysis, Entry, NamedValue, Origin, SessionHeads, Source};
-pub use history::{Event, Subject};
-pub use search::{Choices, Found, Order, Query, ReviewIs, VerdictIs};
-pub use typed::{DayError, beginning, ending, words_and_conditions};
-pub use update::{Changes, Doubt};
+pub use entry::{
+    CatalogAnalysis, CatalogEntry, NamedValue, NamedValueSource, SessionHeads, SessionOrigin,
+};
+pub use history::{HistoryEvent, HistorySubject};
+pub use search::{
+    CatalogChoices, CatalogOrder, CatalogPage, CatalogQuery, QualityFilter, ReviewFilter,
+};
+pub use typed::{DayError, parse_end, parse_query_line, parse_start};
+pub use update::{CatalogChanges, CatalogMismatch};
 
 use crate::chain::with_ending;
 use crate::lock::{LockFailure, LockTimeout, holder_of, lock_waiting};

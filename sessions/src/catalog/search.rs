@@ -1,11 +1,11 @@
 //! Search of the catalog: the query, its order, and the page that it finds.
 
 use super::condition::Condition;
-use super::entry::Entry;
+use super::entry::CatalogEntry;
 use super::schema::collect_rows;
 use super::update::entry_of;
 use super::{Catalog, CatalogError};
-use crate::edits::{Decision, Review, Verdict};
+use crate::edits::{DataQuality, Review, ReviewDecision};
 use chrono::{DateTime, Utc};
 use rusqlite::types::Value as Sql;
 use rusqlite::{OptionalExtension, params_from_iter};
@@ -13,10 +13,10 @@ use std::str::FromStr;
 
 /// Sessions that meet every given criterion.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Query {
+pub struct CatalogQuery {
     /// Every word must begin a word of the session.
     pub words: String,
-    /// Compared exactly, as are the next four.
+    /// FileComparison exactly, as are the next four.
     pub specimen: Option<String>,
     pub operator: Option<String>,
     /// The protocol's name.
@@ -30,11 +30,11 @@ pub struct Query {
     /// Start of the session, exclusive.
     pub before: Option<DateTime<Utc>>,
     pub conditions: Vec<Condition>,
-    pub verdict: Option<VerdictIs>,
-    pub review: Option<ReviewIs>,
+    pub verdict: Option<QualityFilter>,
+    pub review: Option<ReviewFilter>,
     /// The session must have all of them.
     pub tags: Vec<String>,
-    pub order: Order,
+    pub order: CatalogOrder,
     pub is_reversed: bool,
     /// Number of sessions before the page.
     pub skip: usize,
@@ -44,12 +44,12 @@ pub struct Query {
 
 /// Criterion on the data quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VerdictIs {
-    Given(Verdict),
+pub enum QualityFilter {
+    Given(DataQuality),
     None,
 }
 
-impl FromStr for VerdictIs {
+impl FromStr for QualityFilter {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -62,19 +62,19 @@ impl FromStr for VerdictIs {
 
 /// Criterion on the review.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReviewIs {
+pub enum ReviewFilter {
     /// The review is up to date and made this decision.
-    Given(Decision),
+    Given(ReviewDecision),
     /// What the reviewer saw has changed since.
     Outdated,
     None,
 }
 
-impl ReviewIs {
+impl ReviewFilter {
     const ALL: [Self; 5] = [
-        Self::Given(Decision::Accepted),
-        Self::Given(Decision::Rejected),
-        Self::Given(Decision::Repeat),
+        Self::Given(ReviewDecision::Accepted),
+        Self::Given(ReviewDecision::Rejected),
+        Self::Given(ReviewDecision::Repeat),
         Self::Outdated,
         Self::None,
     ];
@@ -91,16 +91,16 @@ impl ReviewIs {
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
-            Self::Given(Decision::Accepted) => "accepted",
-            Self::Given(Decision::Rejected) => "rejected",
-            Self::Given(Decision::Repeat) => "repeat",
+            Self::Given(ReviewDecision::Accepted) => "accepted",
+            Self::Given(ReviewDecision::Rejected) => "rejected",
+            Self::Given(ReviewDecision::Repeat) => "repeat",
             Self::Outdated => "outdated",
             Self::None => "none",
         }
     }
 }
 
-impl FromStr for ReviewIs {
+impl FromStr for ReviewFilter {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -113,7 +113,7 @@ impl FromStr for ReviewIs {
 
 /// Sort key; sessions with the same key are sorted by folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Order {
+pub enum CatalogOrder {
     /// Latest first.
     #[default]
     Started,
@@ -128,7 +128,7 @@ pub enum Order {
     Review,
 }
 
-impl Order {
+impl CatalogOrder {
     fn sql(self, is_reversed: bool) -> String {
         let (column, is_descending) = match self {
             Self::Started => ("started_ms", true),
@@ -146,15 +146,15 @@ impl Order {
 
 /// One page of the sessions that meet a query.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct CatalogPage {
     /// Sessions on all pages.
     pub count: usize,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<CatalogEntry>,
 }
 
 /// Values that a form offers for the criteria of a query.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Choices {
+pub struct CatalogChoices {
     pub specimens: Vec<String>,
     pub operators: Vec<String>,
     pub protocols: Vec<String>,
@@ -166,7 +166,7 @@ pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
-impl Query {
+impl CatalogQuery {
     /// Selects `column` of the sessions that meet the query, in its order; and the values of the statement.
     fn sql(&self, column: &str) -> (String, Vec<Sql>) {
         let (mut parts, mut values) = (vec!["TRUE".to_owned()], Vec::new());
@@ -194,8 +194,8 @@ impl Query {
         }
         if let Some(verdict) = self.verdict {
             let word = match verdict {
-                VerdictIs::Given(verdict) => verdict.name(),
-                VerdictIs::None => "",
+                QualityFilter::Given(verdict) => verdict.name(),
+                QualityFilter::None => "",
             };
             add("verdict = ?".to_owned(), word.to_owned().into());
         }
@@ -222,8 +222,8 @@ impl Query {
 
 impl Catalog {
     /// Finds sessions as of the last [`Catalog::update`].
-    pub fn find(&self, query: &Query) -> Result<Found, CatalogError> {
-        let find = || -> rusqlite::Result<Found> {
+    pub fn find(&self, query: &CatalogQuery) -> Result<CatalogPage, CatalogError> {
+        let find = || -> rusqlite::Result<CatalogPage> {
             // One transaction, so that no other process changes the catalog between the two statements.
             let state = self.db.unchecked_transaction()?;
             let (sql, values) = query.sql("id");
@@ -233,13 +233,13 @@ impl Catalog {
             let mut statement = state.prepare_cached(sql)?;
             let page = ids.iter().skip(query.skip).take(query.limit.unwrap_or(usize::MAX));
             let entries = page.map(|id| statement.query_row([id], entry_of));
-            Ok(Found { count: ids.len(), entries: entries.collect::<rusqlite::Result<_>>()? })
+            Ok(CatalogPage { count: ids.len(), entries: entries.collect::<rusqlite::Result<_>>()? })
         };
         find().map_err(self.failed())
     }
 
     /// The folders of all sessions that meet the query, in its order, whatever its page: a list needs them to scroll.
-    pub fn folders(&self, query: &Query) -> Result<Vec<String>, CatalogError> {
+    pub fn folders(&self, query: &CatalogQuery) -> Result<Vec<String>, CatalogError> {
         let (sql, values) = query.sql("folder");
         self.names(&sql, &values)
     }
@@ -250,8 +250,8 @@ impl Catalog {
     }
 
     /// The entries of these folders; unknown folders are left out.
-    pub fn entries(&self, folders: &[String]) -> Result<Vec<Entry>, CatalogError> {
-        let read = || -> rusqlite::Result<Vec<Entry>> {
+    pub fn entries(&self, folders: &[String]) -> Result<Vec<CatalogEntry>, CatalogError> {
+        let read = || -> rusqlite::Result<Vec<CatalogEntry>> {
             let state = self.db.unchecked_transaction()?;
             let sql = "SELECT entry, checksum FROM session WHERE folder = ?";
             let mut statement = state.prepare_cached(sql)?;
@@ -265,14 +265,14 @@ impl Catalog {
     }
 
     /// Each list is in alphabetical order.
-    pub fn choices(&self) -> Result<Choices, CatalogError> {
+    pub fn choices(&self) -> Result<CatalogChoices, CatalogError> {
         let of = |table: &str, column: &str| {
             let sql = format!(
                 "SELECT DISTINCT {column} FROM {table} WHERE {column} <> '' ORDER BY {column}"
             );
             self.names(&sql, &[])
         };
-        Ok(Choices {
+        Ok(CatalogChoices {
             specimens: of("session", "specimen")?,
             operators: of("session", "operator")?,
             protocols: of("session", "protocol")?,
@@ -281,7 +281,10 @@ impl Catalog {
     }
 
     /// One sentence for each condition that no session can meet, because none has the value, or none in such a unit.
-    pub fn doubts(&self, conditions: &[Condition]) -> Result<Vec<String>, CatalogError> {
+    pub fn condition_warnings(
+        &self,
+        conditions: &[Condition],
+    ) -> Result<Vec<String>, CatalogError> {
         let mut doubts = Vec::new();
         for condition in conditions {
             let name = condition.name();

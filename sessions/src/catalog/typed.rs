@@ -22,12 +22,12 @@ fn parse_day_or_time(text: &str) -> Result<(DateTime<Utc>, bool), DayError> {
 }
 
 /// Start of a period: the beginning of a day in UTC, or a time.
-pub fn beginning(text: &str) -> Result<DateTime<Utc>, DayError> {
+pub fn parse_start(text: &str) -> Result<DateTime<Utc>, DayError> {
     parse_day_or_time(text).map(|(at, _)| at)
 }
 
 /// End of a period, exclusive: the beginning of the next day in UTC, or a time.
-pub fn ending(text: &str) -> Result<DateTime<Utc>, DayError> {
+pub fn parse_end(text: &str) -> Result<DateTime<Utc>, DayError> {
     let (at, is_day) = parse_day_or_time(text)?;
     let next = at.checked_add_days(Days::new(u64::from(is_day)));
     next.ok_or(DayError::Late)
@@ -37,7 +37,7 @@ pub fn ending(text: &str) -> Result<DateTime<Utc>, DayError> {
 ///
 /// A piece with a sign of comparison is a condition. Spaces may surround the sign and precede the unit. Quotes keep
 /// spaces within a piece.
-pub fn words_and_conditions(line: &str) -> Result<(String, Vec<Condition>), ConditionError> {
+pub fn parse_query_line(line: &str) -> Result<(String, Vec<Condition>), ConditionError> {
     let mut pieces: Vec<String> = Vec::new();
     for piece in split_unquoted(line) {
         let is_unit = base_unit(&piece).is_some();
@@ -88,14 +88,14 @@ mod tests {
     fn last_day_is_included_and_a_time_is_exact() {
         let text = |at: Result<DateTime<Utc>, DayError>| at.map(|at| at.to_rfc3339());
         let day = |text: &str| Ok(format!("{text}T00:00:00+00:00"));
-        assert_eq!(text(beginning("2026-03-05")), day("2026-03-05"));
-        assert_eq!(text(ending("2026-02-28")), day("2026-03-01"));
+        assert_eq!(text(parse_start("2026-03-05")), day("2026-03-05"));
+        assert_eq!(text(parse_end("2026-02-28")), day("2026-03-01"));
         let time = "2026-03-05T14:15:00+01:00";
-        assert_eq!(text(ending(time)), Ok("2026-03-05T13:15:00+00:00".into()));
+        assert_eq!(text(parse_end(time)), Ok("2026-03-05T13:15:00+00:00".into()));
         for none in ["yesterday", "2026-02-30", "", "5.3.2026"] {
-            assert_eq!(beginning(none), Err(DayError::Form), "{none}");
+            assert_eq!(parse_start(none), Err(DayError::Form), "{none}");
         }
-        assert_eq!(ending("+262142-12-31"), Err(DayError::Late));
+        assert_eq!(parse_end("+262142-12-31"), Err(DayError::Late));
     }
 
     #[test]
@@ -113,11 +113,11 @@ mod tests {
         ] {
             let wanted: Vec<Condition> =
                 conditions.iter().map(|one| one.parse().unwrap()).collect();
-            let read = words_and_conditions(line).unwrap();
+            let read = parse_query_line(line).unwrap();
             assert_eq!(read, (words.to_owned(), wanted), "{line}");
         }
         for line in ["pig >=", "depth=", "= 3", "depth_mm>2cm"] {
-            assert!(words_and_conditions(line).is_err(), "{line}");
+            assert!(parse_query_line(line).is_err(), "{line}");
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Update of the catalog: changed sessions are read again, deleted ones are removed.
 
-use super::entry::Entry;
+use super::entry::CatalogEntry;
 use super::heads::{record_head, record_session_heads};
 use super::schema::{bad_text, collect_rows};
-use super::search::ReviewIs;
+use super::search::ReviewFilter;
 use super::walk::{LibrarySession, walk};
 use super::{Catalog, CatalogError};
 use crate::text::checksum;
@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 const BATCH: usize = 100;
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Changes {
+pub struct CatalogChanges {
     pub sessions: usize,
     /// New and changed sessions.
     pub read: usize,
@@ -27,7 +27,7 @@ pub struct Changes {
 
 /// A session, or a file of checks or a journal, that differs from its catalog entry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Doubt {
+pub struct CatalogMismatch {
     /// Path of the folder or file below the library.
     pub folder: String,
     pub sentence: String,
@@ -38,7 +38,10 @@ pub type CatalogProgress<'a> = &'a mut dyn FnMut(usize, usize);
 
 impl Catalog {
     /// Reads new and changed sessions and removes deleted ones. Several processes may do so at a time.
-    pub fn update(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
+    pub fn update(
+        &mut self,
+        progress: CatalogProgress<'_>,
+    ) -> Result<CatalogChanges, CatalogError> {
         self.update_while(&mut |done, of| {
             progress(done, of);
             ControlFlow::Continue(())
@@ -49,7 +52,7 @@ impl Catalog {
     pub fn update_while(
         &mut self,
         progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
-    ) -> Result<Changes, CatalogError> {
+    ) -> Result<CatalogChanges, CatalogError> {
         let (sessions, remarks) = walk(&self.library);
         let mut known = self.fingerprints()?;
         let heads = self.heads()?;
@@ -59,7 +62,7 @@ impl Catalog {
         for session in &sessions {
             known.remove(&session.name);
         }
-        let mut changes = Changes { sessions: sessions.len(), read: 0, removed: 0, remarks };
+        let mut changes = CatalogChanges { sessions: sessions.len(), read: 0, removed: 0, remarks };
         let mut done = 0;
         let mut flow = progress(done, new.len());
         for batch in new.chunks(BATCH) {
@@ -71,7 +74,7 @@ impl Catalog {
                 if flow.is_break() {
                     break;
                 }
-                entries.push((*session, Entry::read(session, &heads)));
+                entries.push((*session, CatalogEntry::read(session, &heads)));
                 done += 1;
                 flow = progress(done, new.len());
             }
@@ -96,7 +99,10 @@ impl Catalog {
     }
 
     /// Reads everything again. The recorded heads of edits, analyses, checks and journals stay.
-    pub fn rebuild(&mut self, progress: CatalogProgress<'_>) -> Result<Changes, CatalogError> {
+    pub fn rebuild(
+        &mut self,
+        progress: CatalogProgress<'_>,
+    ) -> Result<CatalogChanges, CatalogError> {
         self.write(|db| {
             db.execute_batch(
                 "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;
@@ -107,33 +113,41 @@ impl Catalog {
     }
 
     /// Compares every session with its entry, without changing the catalog.
-    pub fn check(&self, progress: CatalogProgress<'_>) -> Result<Vec<Doubt>, CatalogError> {
+    pub fn check(
+        &self,
+        progress: CatalogProgress<'_>,
+    ) -> Result<Vec<CatalogMismatch>, CatalogError> {
         let (sessions, _) = walk(&self.library);
         let heads = self.heads()?;
-        let mut known: BTreeMap<String, Entry> =
+        let mut known: BTreeMap<String, CatalogEntry> =
             self.all()?.into_iter().map(|entry| (entry.folder.clone(), entry)).collect();
         let mut doubts = Vec::new();
         for (done, session) in sessions.iter().enumerate() {
             progress(done, sessions.len());
             let sentence = match known.remove(&session.name) {
                 None => "the session is not in the catalog",
-                Some(entry) if entry != Entry::read(session, &heads) => {
+                Some(entry) if entry != CatalogEntry::read(session, &heads) => {
                     "the session has changed since the catalog read it"
                 }
                 Some(_) => continue,
             };
-            doubts.push(Doubt { folder: session.name.clone(), sentence: sentence.to_owned() });
+            doubts.push(CatalogMismatch {
+                folder: session.name.clone(),
+                sentence: sentence.to_owned(),
+            });
         }
-        doubts.extend(known.into_keys().map(|folder| Doubt {
+        doubts.extend(known.into_keys().map(|folder| CatalogMismatch {
             folder,
             sentence: "the session was deleted but is still in the catalog".to_owned(),
         }));
         let (_, wrong) = self.confirm(&heads, false);
-        doubts.extend(wrong.into_iter().map(|(folder, sentence)| Doubt { folder, sentence }));
+        doubts.extend(
+            wrong.into_iter().map(|(folder, sentence)| CatalogMismatch { folder, sentence }),
+        );
         Ok(doubts)
     }
 
-    pub fn all(&self) -> Result<Vec<Entry>, CatalogError> {
+    pub fn all(&self) -> Result<Vec<CatalogEntry>, CatalogError> {
         let sql = "SELECT entry, checksum FROM session ORDER BY folder";
         collect_rows(&self.db, sql, [], entry_of).map_err(self.failed())
     }
@@ -159,7 +173,7 @@ impl Catalog {
 }
 
 /// Parses an entry from its JSON and the JSON's checksum.
-pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Entry> {
+pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<CatalogEntry> {
     let text: String = row.get(0)?;
     if checksum(&text) != row.get::<_, String>(1)? {
         return Err(bad_text("an entry has a wrong checksum"));
@@ -167,7 +181,7 @@ pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Entry> {
     serde_json::from_str(&text).map_err(bad_text)
 }
 
-fn put(db: &Connection, session: &LibrarySession, entry: &Entry) -> rusqlite::Result<()> {
+fn put(db: &Connection, session: &LibrarySession, entry: &CatalogEntry) -> rusqlite::Result<()> {
     forget(db, &entry.folder)?;
     let text = serde_json::to_string(entry)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
@@ -181,7 +195,7 @@ fn put(db: &Connection, session: &LibrarySession, entry: &Entry) -> rusqlite::Re
     };
     let review = match entry.review.as_ref() {
         None if is_unread => "?",
-        review => ReviewIs::of(review).word(),
+        review => ReviewFilter::of(review).word(),
     };
     db.prepare_cached(
         "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry, checksum)

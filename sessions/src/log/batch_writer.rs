@@ -1,10 +1,10 @@
 //! The writer thread: writes batches to the disk and continues in a new segment when that fails.
 
 use super::error::LogError;
-use super::notices::{Notice, WriterStatus};
+use super::notices::{LogNotice, WriterStatus};
 use super::sink::Sink;
 use super::thread::Batch;
-use super::writer::{LogWriter, Parts};
+use super::writer::{LogBatch, LogWriter};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -99,7 +99,7 @@ impl<S: Sink, C: Fn() -> Instant> BatchWriter<'_, S, C> {
     fn write(&mut self, mut batch: Batch) -> Result<bool, LogError> {
         let end = batch.end.take();
         let (span, through, raw_bytes) = (batch.span, batch.through, batch.raw_bytes);
-        let outcome = self.log.append_parts(&batch.parts());
+        let outcome = self.log.append_batch(&batch.parts());
         self.since_sync.push(batch);
         let outcome = outcome.or_else(|err| self.go_on_elsewhere(&err));
         self.status.remove_queued(span, raw_bytes);
@@ -138,7 +138,7 @@ impl<S: Sink, C: Fn() -> Instant> BatchWriter<'_, S, C> {
 
     /// An alteration by another program cannot be repaired; closing the session reports it.
     fn report_altered(&mut self, err: LogError) {
-        self.status.push_notice(Notice::Altered(err.clone()));
+        self.status.push_notice(LogNotice::Altered(err.clone()));
         self.altered.get_or_insert(err);
     }
 
@@ -150,7 +150,7 @@ impl<S: Sink, C: Fn() -> Instant> BatchWriter<'_, S, C> {
             LogError::Altered { alteration, .. } => alteration.to_string(),
             _ => return Err(err.clone()),
         };
-        let since_sync: Vec<Parts<'_>> = self.since_sync.iter().map(Batch::parts).collect();
+        let since_sync: Vec<LogBatch<'_>> = self.since_sync.iter().map(Batch::parts).collect();
         let began = (self.clock)();
         let (path, is_elsewhere) = loop {
             if self.moves >= MOVES_MAX {
@@ -167,7 +167,7 @@ impl<S: Sink, C: Fn() -> Instant> BatchWriter<'_, S, C> {
             self.report_altered(err.clone());
             return Ok(());
         }
-        self.status.push_notice(Notice::Moved {
+        self.status.push_notice(LogNotice::Moved {
             reason,
             path,
             is_last: is_elsewhere || self.moves == MOVES_MAX,
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use crate::log::thread::BATCH;
     use crate::manifest::Manifest;
-    use crate::record::Row;
+    use crate::record::SampleRow;
     use palpate_model::Nanos;
     use std::io;
     use std::sync::atomic::AtomicU64;
@@ -251,7 +251,7 @@ mod tests {
     }
 
     fn batch(number: u64) -> Batch {
-        let row = Row {
+        let row = SampleRow {
             tick: number,
             host: Nanos(BATCH.0 * number),
             age: None,

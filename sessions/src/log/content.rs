@@ -2,11 +2,11 @@
 
 use super::frames::Fields;
 use super::segment::PROFILE;
-use crate::block::Block;
-use crate::health::{Health, HealthSummary};
+use crate::block::SampleBlock;
+use crate::health::{HealthMessage, HealthSummary};
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::raw::RawBlock;
-use crate::record::{EndRecord, Entry, EntryKind, EntryMessage};
+use crate::record::{EndRecord, EntryKind, EntryMessage, LogEntry};
 use crate::schema::Channel;
 use mcap::records::op;
 use palpate_model::Nanos;
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 
 /// A verified part of a session, in the order of recording.
 #[derive(Clone, Copy, Debug)]
-pub enum Part<'a> {
-    Samples(&'a Block),
+pub enum LogPart<'a> {
+    Samples(&'a SampleBlock),
     /// Bytes exchanged with a device.
     Raw(&'a RawBlock<'a>),
-    Health(&'a Health),
+    Health(&'a HealthMessage),
 }
 
 /// Why this program cannot read an undamaged log.
@@ -40,8 +40,8 @@ pub(crate) struct SegmentState {
 /// Everything read so far, over all segments.
 pub(crate) struct Content<'v> {
     /// Receives every verified part.
-    visit: &'v mut dyn FnMut(Part<'_>),
-    block: Block,
+    visit: &'v mut dyn FnMut(LogPart<'_>),
+    block: SampleBlock,
     /// Whether `block` has a raw half without its derived half.
     has_raw: bool,
     pub samples: u64,
@@ -61,7 +61,7 @@ pub(crate) struct Content<'v> {
     pub is_later_part: bool,
     pub manifest: Option<Manifest>,
     pub refusal: Option<Refusal>,
-    pub entries: Vec<Entry>,
+    pub entries: Vec<LogEntry>,
     pub end: Option<EndRecord>,
     /// Whether gaps are counted instead of refused.
     allows_gaps: bool,
@@ -75,14 +75,14 @@ pub(crate) struct Content<'v> {
 
 impl<'v> Content<'v> {
     /// A file that is read alone may be a later segment.
-    pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(Part<'_>)) -> Self {
+    pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(LogPart<'_>)) -> Self {
         let mut sequences = [Some(0); Channel::ALL.len()];
         if is_alone {
             sequences[Channel::Manifest as usize] = None;
         }
         Self {
             visit,
-            block: Block::default(),
+            block: SampleBlock::default(),
             has_raw: false,
             samples: 0,
             last_sample: Nanos::ZERO,
@@ -300,7 +300,7 @@ impl<'v> Content<'v> {
         self.block.take_derived(data)?;
         self.samples += self.block.len() as u64;
         self.last_sample = self.block.last_time().unwrap_or(self.last_sample);
-        (self.visit)(Part::Samples(&self.block));
+        (self.visit)(LogPart::Samples(&self.block));
         Ok(())
     }
 
@@ -318,15 +318,15 @@ impl<'v> Content<'v> {
             ));
         }
         self.raw_bytes = self.raw_bytes.saturating_add(block.len() as u64);
-        (self.visit)(Part::Raw(&block));
+        (self.visit)(LogPart::Raw(&block));
         Ok(())
     }
 
     fn take_health(&mut self, data: &[u8]) -> Result<(), String> {
-        let health: Health = serde_json::from_slice(data)
+        let health: HealthMessage = serde_json::from_slice(data)
             .map_err(|err| format!("a message of health is unreadable: {err}"))?;
         self.health.take(&health);
-        (self.visit)(Part::Health(&health));
+        (self.visit)(LogPart::Health(&health));
         Ok(())
     }
 
@@ -338,7 +338,7 @@ impl<'v> Content<'v> {
         {
             return Err(format!("entry {} comes after entry {}", message.order, last.order));
         }
-        self.entries.push(Entry {
+        self.entries.push(LogEntry {
             kind,
             order: message.order,
             after_sample: message.after_sample,

@@ -1,12 +1,12 @@
 //! JSON messages of a log; a message that would not read back unchanged is refused.
 
 use super::error::{LogError, encode_error};
-use crate::record::{Entry, EntryMessage};
+use crate::record::{EntryMessage, LogEntry};
 
 /// Deepest nesting of an entry; the parser's limit is 128.
 const JSON_DEPTH_MAX: usize = 100;
 
-pub(super) fn entry_json(entry: &Entry) -> Result<Vec<u8>, LogError> {
+pub(super) fn entry_json(entry: &LogEntry) -> Result<Vec<u8>, LogError> {
     if !is_shallow(&entry.body, JSON_DEPTH_MAX) {
         return Err(LogError::Encode {
             what: "entry",

@@ -16,11 +16,11 @@ pub mod thread;
 pub(crate) mod walk;
 pub mod writer;
 
-pub use content::Part;
+pub use content::LogPart;
 pub use error::LogError;
-pub use notices::{LogNotices, Notice};
-pub use reader::{Beside, Outline, ReadError, Session};
+pub use notices::{LogNotice, LogNotices};
+pub use reader::{AuxiliaryData, ReadError, Session, SessionOutline};
 pub use sink::{Alteration, FileSink, FolderSegments, SegmentSource, Sink};
-pub use summary::Summary;
-pub use thread::{Pace, SessionWriter};
-pub use writer::{BATCHES_PER_SEGMENT, LogWriter, Parts};
+pub use summary::SessionSummary;
+pub use thread::{RecordingPace, SessionWriter};
+pub use writer::{BATCHES_PER_SEGMENT, LogBatch, LogWriter};

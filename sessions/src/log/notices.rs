@@ -15,7 +15,7 @@ const QUEUE_RAW: u64 = 32 << 20;
 
 /// An incident while a log is written, for the screen.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Notice {
+pub enum LogNotice {
     /// A write or a sync failed; the recording continues without loss in another file.
     Moved {
         reason: String,
@@ -32,14 +32,14 @@ pub enum Notice {
     TooSlow,
 }
 
-impl Notice {
+impl LogNotice {
     /// Whether the run should end while everything can still be saved.
-    pub fn ends_the_run(&self) -> bool {
+    pub fn is_reason_to_end(&self) -> bool {
         matches!(self, Self::Moved { is_last: true, .. } | Self::Altered(_) | Self::TooSlow)
     }
 }
 
-impl std::fmt::Display for Notice {
+impl std::fmt::Display for LogNotice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Moved { reason, path, .. } => write!(
@@ -74,7 +74,7 @@ pub(super) struct WriterStatus {
     pub sync_ns: AtomicU64,
     /// Free space after the last synchronisation plus 1, in bytes; 0 if unknown.
     pub free_bytes: AtomicU64,
-    notices: Mutex<Vec<Notice>>,
+    notices: Mutex<Vec<LogNotice>>,
 }
 
 impl WriterStatus {
@@ -85,7 +85,7 @@ impl WriterStatus {
         self.has_failed.store(true, Ordering::Release);
     }
 
-    pub fn push_notice(&self, notice: Notice) {
+    pub fn push_notice(&self, notice: LogNotice) {
         let mut notices = self.notices.lock().unwrap_or_else(PoisonError::into_inner);
         notices.push(notice);
     }
@@ -117,7 +117,7 @@ impl WriterStatus {
         time.max(raw)
     }
 
-    pub fn take_notices(&self) -> Vec<Notice> {
+    pub fn take_notices(&self) -> Vec<LogNotice> {
         let mut notices = self.notices.lock().unwrap_or_else(PoisonError::into_inner);
         std::mem::take(&mut *notices)
     }
@@ -140,7 +140,7 @@ impl LogNotices {
     }
 
     /// Notices since the last call.
-    pub fn take(&self) -> Vec<Notice> {
+    pub fn take(&self) -> Vec<LogNotice> {
         self.0.take_notices()
     }
 }

@@ -8,15 +8,15 @@
 
 pub use super::error::ReadError;
 
-use super::content::{Content, Part, Refusal, SegmentState};
+use super::content::{Content, LogPart, Refusal, SegmentState};
 use super::files::{absent_spare, check_files, describe_absent, find_files};
 use super::frames::ChunkReader;
 use super::log_file::LogFile;
 use super::walk::walk;
-use crate::block::Block;
+use crate::block::SampleBlock;
 use crate::health::HealthSummary;
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry, Row};
+use crate::record::{EndRecord, LogEntry, SampleRow};
 use palpate_model::Nanos;
 use std::path::{Path, PathBuf};
 
@@ -26,19 +26,19 @@ pub struct Session {
     /// The log, or its first segment.
     pub path: PathBuf,
     pub manifest: Manifest,
-    pub rows: Vec<Row>,
+    pub rows: Vec<SampleRow>,
     /// Every entry, by `order`.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<LogEntry>,
     /// `None` if the recording was interrupted.
     pub end: Option<EndRecord>,
     /// Remarks for users of the data, one sentence each.
     pub notes: Vec<String>,
-    pub beside: Beside,
+    pub auxiliary: AuxiliaryData,
 }
 
-/// Summary of a log's data other than samples and entries.
+/// SessionSummary of a log's data other than samples and entries.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Beside {
+pub struct AuxiliaryData {
     /// Number of bytes exchanged with devices; [`Session::scan_parts`] visits them.
     pub raw_bytes: u64,
     pub health: HealthSummary,
@@ -46,18 +46,18 @@ pub struct Beside {
 
 /// A recorded session without its samples.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
+pub struct SessionOutline {
     /// The log, or its first segment.
     pub path: PathBuf,
     pub manifest: Manifest,
     pub samples: u64,
     /// Every entry, by `order`.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<LogEntry>,
     /// `None` if the recording was interrupted.
     pub end: Option<EndRecord>,
     /// Remarks for users of the data, one sentence each.
     pub notes: Vec<String>,
-    pub beside: Beside,
+    pub auxiliary: AuxiliaryData,
 }
 
 impl Session {
@@ -66,7 +66,7 @@ impl Session {
     /// A log without an end opens with its complete chunks; a damaged log is refused.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let mut rows = Vec::new();
-        let mut visit = |block: &Block| rows.extend(block.rows());
+        let mut visit = |block: &SampleBlock| rows.extend(block.rows());
         let outline = Self::scan(path, &mut visit)?;
         Ok(Self {
             path: outline.path,
@@ -75,7 +75,7 @@ impl Session {
             entries: outline.entries,
             end: outline.end,
             notes: outline.notes,
-            beside: outline.beside,
+            auxiliary: outline.auxiliary,
         })
     }
 
@@ -103,16 +103,22 @@ impl Session {
 
     /// Visits the samples block by block, with at most one block in memory. The visited data is valid only if this returns
     /// without an error.
-    pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
+    pub fn scan(
+        path: &Path,
+        visit: &mut dyn FnMut(&SampleBlock),
+    ) -> Result<SessionOutline, ReadError> {
         Self::scan_parts(path, &mut |part| {
-            if let Part::Samples(block) = part {
+            if let LogPart::Samples(block) = part {
                 visit(block);
             }
         })
     }
 
     /// Like [`scan`](Self::scan), with raw bytes and health, in the order of recording.
-    pub fn scan_parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Outline, ReadError> {
+    pub fn scan_parts(
+        path: &Path,
+        visit: &mut dyn FnMut(LogPart<'_>),
+    ) -> Result<SessionOutline, ReadError> {
         Reader::new(path, visit)?.read()
     }
 
@@ -167,7 +173,7 @@ struct Reader<'v> {
 }
 
 impl<'v> Reader<'v> {
-    fn new(path: &Path, visit: &'v mut dyn FnMut(Part<'_>)) -> Result<Self, ReadError> {
+    fn new(path: &Path, visit: &'v mut dyn FnMut(LogPart<'_>)) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let is_folder = path.is_dir();
         let first = &files[0];
@@ -188,7 +194,7 @@ impl<'v> Reader<'v> {
         })
     }
 
-    fn read(mut self) -> Result<Outline, ReadError> {
+    fn read(mut self) -> Result<SessionOutline, ReadError> {
         let files = std::mem::take(&mut self.files);
         let mut damage = None;
         for (number, file) in files.iter().enumerate() {
@@ -219,7 +225,11 @@ impl<'v> Reader<'v> {
         self.outline(path, end)
     }
 
-    fn outline(mut self, path: PathBuf, end: Option<EndRecord>) -> Result<Outline, ReadError> {
+    fn outline(
+        mut self,
+        path: PathBuf,
+        end: Option<EndRecord>,
+    ) -> Result<SessionOutline, ReadError> {
         let Some(manifest) = self.content.manifest.take() else {
             return Err(ReadError::Damaged { path, offset: 0, reason: NOT_BEGUN.into() });
         };
@@ -257,14 +267,17 @@ impl<'v> Reader<'v> {
         if self.content.is_later_part {
             notes.push(LATER_PART.into());
         }
-        Ok(Outline {
+        Ok(SessionOutline {
             path,
             manifest,
             samples: self.content.samples,
             entries,
             end,
             notes,
-            beside: Beside { raw_bytes: self.content.raw_bytes, health: self.content.health },
+            auxiliary: AuxiliaryData {
+                raw_bytes: self.content.raw_bytes,
+                health: self.content.health,
+            },
         })
     }
 

@@ -1,6 +1,6 @@
-//! Summary of a session from its first and last chunk, in constant time for any length.
+//! SessionSummary of a session from its first and last chunk, in constant time for any length.
 
-use super::content::{Content, Part};
+use super::content::{Content, LogPart};
 use super::files::find_files;
 use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
 use super::log_file::LogFile;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Everything in the summary is verified; damage between the first and the last chunk goes unnoticed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Summary {
+pub struct SessionSummary {
     /// The log, or its first segment.
     pub path: PathBuf,
     pub manifest: Manifest,
@@ -27,7 +27,7 @@ pub struct Summary {
     pub bytes: u64,
 }
 
-impl Summary {
+impl SessionSummary {
     /// `path` is a session folder or a file of it.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
         let files = find_files(path)?;
@@ -75,8 +75,8 @@ fn read_first_and_last_chunk(
     let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
     check_beginning(path, &source, is_ours)?;
     let (mut samples, mut last) = (0, Nanos::ZERO);
-    let mut visit = |part: Part<'_>| {
-        if let Part::Samples(block) = part {
+    let mut visit = |part: LogPart<'_>| {
+        if let LogPart::Samples(block) = part {
             samples = block.first_sample() + block.len() as u64;
             last = block.last_time().unwrap_or(last);
         }

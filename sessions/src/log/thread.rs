@@ -6,13 +6,13 @@
 
 use super::batch_writer::{monotonic_now, write_batches};
 use super::error::LogError;
-use super::notices::{LogNotices, Notice, QUEUE_SECONDS, WriterStatus};
+use super::notices::{LogNotice, LogNotices, QUEUE_SECONDS, WriterStatus};
 use super::sink::{FolderSegments, SegmentSource, Sink};
-use super::writer::{BATCHES_PER_SEGMENT, LogWriter, Parts, check_order};
+use super::writer::{BATCHES_PER_SEGMENT, LogBatch, LogWriter, check_order};
 use crate::folder::SessionFolder;
-use crate::health::{Health, MachineState};
+use crate::health::{HealthMessage, MachineState};
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry, EntryKind, Row};
+use crate::record::{EndRecord, EntryKind, LogEntry, SampleRow};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 use std::path::Path;
@@ -31,7 +31,7 @@ const BATCH_RAW_MAX: usize = 1 << 20;
 
 /// Relation of session time to wall time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pace {
+pub enum RecordingPace {
     /// As fast as the computation: the caller waits for the disk.
     Virtual,
     /// In step with the wall clock: the caller never waits.
@@ -40,12 +40,12 @@ pub enum Pace {
 
 #[derive(Default)]
 pub(super) struct Batch {
-    pub rows: Vec<Row>,
-    pub entries: Vec<Entry>,
+    pub rows: Vec<SampleRow>,
+    pub entries: Vec<LogEntry>,
     pub raw: Vec<RawBytes>,
     /// Bytes in `raw`.
     pub raw_bytes: usize,
-    pub health: Vec<Health>,
+    pub health: Vec<HealthMessage>,
     pub through: Nanos,
     /// Session time that it covers, without a pause before it.
     pub span: Nanos,
@@ -55,8 +55,8 @@ pub(super) struct Batch {
 }
 
 impl Batch {
-    pub fn parts(&self) -> Parts<'_> {
-        Parts { rows: &self.rows, entries: &self.entries, raw: &self.raw, health: &self.health }
+    pub fn parts(&self) -> LogBatch<'_> {
+        LogBatch { rows: &self.rows, entries: &self.entries, raw: &self.raw, health: &self.health }
     }
 }
 
@@ -69,13 +69,13 @@ pub struct SessionWriter {
     /// Start of the batch's 100 ms: the end of the batch before, or the first item.
     batch_start: Option<Nanos>,
     last_order: Option<u64>,
-    pace: Pace,
+    pace: RecordingPace,
     path: String,
     sender: Option<SyncSender<Batch>>,
     status: Arc<WriterStatus>,
     thread: Option<JoinHandle<()>>,
     /// The most severe notice of a slow disk so far.
-    reported_slow: Option<Notice>,
+    reported_slow: Option<LogNotice>,
     // Keeps the folder locked until the log is closed.
     _folder: Option<SessionFolder>,
 }
@@ -88,7 +88,7 @@ impl SessionWriter {
         folder: SessionFolder,
         spare: Option<&Path>,
         manifest: &Manifest,
-        pace: Pace,
+        pace: RecordingPace,
     ) -> Result<Self, LogError> {
         let source = match spare {
             None => FolderSegments::new(folder.path()),
@@ -107,7 +107,7 @@ impl SessionWriter {
         source: G,
         batches_per_segment: u32,
         manifest: &Manifest,
-        pace: Pace,
+        pace: RecordingPace,
     ) -> Result<Self, LogError> {
         let path = source.path(0);
         let log = LogWriter::begin_in_segments(Box::new(source), batches_per_segment, manifest)?;
@@ -119,7 +119,7 @@ impl SessionWriter {
         sink: S,
         path: &str,
         manifest: &Manifest,
-        pace: Pace,
+        pace: RecordingPace,
     ) -> Result<Self, LogError> {
         let log = LogWriter::begin(sink, path, manifest)?;
         Self::start_log(log, path, pace)
@@ -128,12 +128,12 @@ impl SessionWriter {
     fn start_log<S: Sink + 'static>(
         log: LogWriter<S>,
         path: &str,
-        pace: Pace,
+        pace: RecordingPace,
     ) -> Result<Self, LogError> {
         // A queue of length 0 makes the sender wait until the thread takes the batch.
         let (sender, receiver) = sync_channel(match pace {
-            Pace::Virtual => 0,
-            Pace::Real => QUEUE_BATCHES,
+            RecordingPace::Virtual => 0,
+            RecordingPace::Real => QUEUE_BATCHES,
         });
         let status = Arc::new(WriterStatus::default());
         let thread_status = Arc::clone(&status);
@@ -159,7 +159,7 @@ impl SessionWriter {
     }
 
     /// Takes well under 1 µs unless a batch is full.
-    pub fn push_row(&mut self, row: Row) -> Result<(), LogError> {
+    pub fn push_row(&mut self, row: SampleRow) -> Result<(), LogError> {
         self.status.check()?;
         if let Some(what) = row.non_finite() {
             return Err(LogError::NotFinite { what: format!("{what} of a sample") });
@@ -170,7 +170,7 @@ impl SessionWriter {
     }
 
     /// The entry's order must exceed that of the entry before.
-    pub fn push_entry(&mut self, entry: Entry) -> Result<(), LogError> {
+    pub fn push_entry(&mut self, entry: LogEntry) -> Result<(), LogError> {
         self.status.check()?;
         check_order(entry.order, self.last_order)?;
         self.make_room(entry.now)?;
@@ -191,7 +191,7 @@ impl SessionWriter {
         Ok(())
     }
 
-    pub fn push_health(&mut self, health: Health) -> Result<(), LogError> {
+    pub fn push_health(&mut self, health: HealthMessage) -> Result<(), LogError> {
         self.status.check()?;
         self.make_room(health.now)?;
         self.batch.health.push(health);
@@ -211,20 +211,20 @@ impl SessionWriter {
     }
 
     /// Access to notices that remains after the writer is closed.
-    pub fn news(&self) -> LogNotices {
+    pub fn notices(&self) -> LogNotices {
         LogNotices::of(&self.status)
     }
 
     /// Notices since the last call.
-    pub fn take_notices(&mut self) -> Vec<Notice> {
+    pub fn take_notices(&mut self) -> Vec<LogNotice> {
         let mut notices = self.status.take_notices();
         let share = self.status.queue_share();
         let slow = match self.pace {
-            Pace::Real if share >= 0.9 => Some(Notice::TooSlow),
-            Pace::Real if share >= 0.5 => Some(Notice::Slow),
+            RecordingPace::Real if share >= 0.9 => Some(LogNotice::TooSlow),
+            RecordingPace::Real if share >= 0.5 => Some(LogNotice::Slow),
             _ => None,
         };
-        let is_new = slow != self.reported_slow && self.reported_slow != Some(Notice::TooSlow);
+        let is_new = slow != self.reported_slow && self.reported_slow != Some(LogNotice::TooSlow);
         if slow.is_some() && is_new {
             self.reported_slow.clone_from(&slow);
             notices.extend(slow);
@@ -257,7 +257,7 @@ impl SessionWriter {
             let mut batch = std::mem::take(&mut self.batch);
             batch.through = batch.through.max(end.ended_at);
             batch.end = Some(end);
-            self.send(batch, Pace::Virtual)
+            self.send(batch, RecordingPace::Virtual)
         });
         self.join();
         outcome.and_then(|()| self.status.check())
@@ -266,7 +266,8 @@ impl SessionWriter {
     fn is_due(&self, now: Nanos) -> bool {
         let is_old = |start| now.since(start).0 >= BATCH.0;
         // At real pace an event is sent as soon as session time moves on.
-        let is_event = self.batch.has_event && self.pace == Pace::Real && now > self.batch.through;
+        let is_event =
+            self.batch.has_event && self.pace == RecordingPace::Real && now > self.batch.through;
         self.batch_start.is_some_and(is_old) || is_event || self.is_full()
     }
 
@@ -299,15 +300,17 @@ impl SessionWriter {
     }
 
     /// Sends a batch to the thread; waits for it at virtual pace only.
-    fn send(&mut self, batch: Batch, pace: Pace) -> Result<(), LogError> {
+    fn send(&mut self, batch: Batch, pace: RecordingPace) -> Result<(), LogError> {
         let Some(sender) = &self.sender else {
             return Err(LogError::Closed);
         };
         let is_over = self.status.add_queued(batch.span, batch.raw_bytes);
         let outcome = match pace {
-            Pace::Virtual => sender.send(batch).map_err(|err| TrySendError::Disconnected(err.0)),
-            Pace::Real if is_over => Err(TrySendError::Full(batch)),
-            Pace::Real => sender.try_send(batch),
+            RecordingPace::Virtual => {
+                sender.send(batch).map_err(|err| TrySendError::Disconnected(err.0))
+            }
+            RecordingPace::Real if is_over => Err(TrySendError::Full(batch)),
+            RecordingPace::Real => sender.try_send(batch),
         };
         match outcome {
             Ok(()) => Ok(()),
@@ -341,7 +344,7 @@ impl Drop for SessionWriter {
         if self.thread.is_some() && has_rest && self.status.check().is_ok() {
             let batch = std::mem::take(&mut self.batch);
             // A failure cannot be returned here; it shows as a missing end record.
-            let _ = self.send(batch, Pace::Virtual);
+            let _ = self.send(batch, RecordingPace::Virtual);
         }
         self.join();
     }

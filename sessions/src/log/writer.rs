@@ -12,10 +12,10 @@ use super::json::{entry_json, readable_json};
 use super::segment::Segment;
 use super::sink::{SegmentSource, Sink, WrittenFile};
 use crate::block::{block_slices, blocks_from_rows};
-use crate::health::Health;
+use crate::health::HealthMessage;
 use crate::manifest::Manifest;
 use crate::raw::raw_blocks;
-use crate::record::{EndRecord, Entry, Row, View};
+use crate::record::{EndRecord, LogEntry, SampleRow, View};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use palpate_model::Nanos;
@@ -32,16 +32,16 @@ pub(crate) const MESSAGE_BYTES_MAX: usize = 16 << 20;
 const VIEW_EVERY: Nanos = Nanos::from_millis(20);
 
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Parts<'a> {
-    pub rows: &'a [Row],
+pub struct LogBatch<'a> {
+    pub rows: &'a [SampleRow],
     /// Entries, by strictly increasing `order`.
-    pub entries: &'a [Entry],
+    pub entries: &'a [LogEntry],
     /// Bytes exchanged with devices, at session times.
     pub raw: &'a [RawBytes],
-    pub health: &'a [Health],
+    pub health: &'a [HealthMessage],
 }
 
-impl Parts<'_> {
+impl LogBatch<'_> {
     pub fn is_empty(&self) -> bool {
         let has_more = !self.raw.is_empty() || !self.health.is_empty();
         self.rows.is_empty() && self.entries.is_empty() && !has_more
@@ -175,12 +175,12 @@ impl<S: Sink> LogWriter<S> {
     }
 
     /// Adds rows and entries, in strictly increasing `order`, and passes everything so far to the sink.
-    pub fn append(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
-        self.append_parts(&Parts { rows, entries, ..Parts::default() })
+    pub fn append(&mut self, rows: &[SampleRow], entries: &[LogEntry]) -> Result<(), LogError> {
+        self.append_batch(&LogBatch { rows, entries, ..LogBatch::default() })
     }
 
     /// Like [`append`](Self::append), for all kinds of data.
-    pub fn append_parts(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
+    pub fn append_batch(&mut self, parts: &LogBatch<'_>) -> Result<(), LogError> {
         self.check_alive()?;
         self.check_input(parts)?;
         if !parts.is_empty() {
@@ -190,7 +190,7 @@ impl<S: Sink> LogWriter<S> {
         self.flush()
     }
 
-    fn put_batch(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
+    fn put_batch(&mut self, parts: &LogBatch<'_>) -> Result<(), LogError> {
         self.batches += u32::from(!parts.is_empty());
         // Exchanged bytes precede the samples made from them.
         for block in raw_blocks(self.at.raw_bytes, parts.raw) {
@@ -237,7 +237,7 @@ impl<S: Sink> LogWriter<S> {
     ///
     /// Once this returns, all of it survives a power cut. Returns the new segment's path, and whether it is in the spare
     /// folder.
-    pub fn rewrite(&mut self, since_sync: &[Parts<'_>]) -> Result<(String, bool), LogError> {
+    pub fn rewrite(&mut self, since_sync: &[LogBatch<'_>]) -> Result<(String, bool), LogError> {
         let Some(cause) = self.failure.take() else {
             return Err(LogError::Closed);
         };
@@ -253,7 +253,7 @@ impl<S: Sink> LogWriter<S> {
     fn try_rewrite(
         &mut self,
         cause: &LogError,
-        since_sync: &[Parts<'_>],
+        since_sync: &[LogBatch<'_>],
         is_elsewhere: bool,
     ) -> Result<String, LogError> {
         let Some(rotation) = &mut self.rotation else {
@@ -288,7 +288,7 @@ impl<S: Sink> LogWriter<S> {
     }
 
     /// Adds a thinned copy of rows.
-    fn put_view(&mut self, rows: &[Row]) -> Result<(), LogError> {
+    fn put_view(&mut self, rows: &[SampleRow]) -> Result<(), LogError> {
         for row in rows {
             if row.host < self.at.next_view {
                 continue;
@@ -348,8 +348,8 @@ impl<S: Sink> LogWriter<S> {
     }
 
     /// Refuses data that a reader would refuse.
-    fn check_input(&self, parts: &Parts<'_>) -> Result<(), LogError> {
-        if let Some(what) = parts.rows.iter().find_map(Row::non_finite) {
+    fn check_input(&self, parts: &LogBatch<'_>) -> Result<(), LogError> {
+        if let Some(what) = parts.rows.iter().find_map(SampleRow::non_finite) {
             return Err(LogError::NotFinite { what: format!("{what} of a sample") });
         }
         let mut previous = self.at.last_order;

@@ -4,12 +4,12 @@
 //! because contacts are counted, and a mask if the first samples are missing, because its times count from them.
 
 use super::{RecoverError, Salvage};
-use crate::analyses::{ANALYSES_FILE, Analysed, Analyses, Analysis};
+use crate::analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisContent};
 use crate::chain::{self, ChainError};
 use crate::contacts::contacts;
-use crate::edits::{Change, EDITS_FILE, Edit, Edits};
+use crate::edits::{EDITS_FILE, Edit, EditChange, Edits};
 use crate::folder::file_beside;
-use crate::import_origin::{Imported, ORIGINAL_FOLDER};
+use crate::import_origin::{ImportOrigin, ORIGINAL_FOLDER};
 use crate::manifest::Manifest;
 use crate::text::crc32_of_file;
 use serde::Serialize;
@@ -53,7 +53,7 @@ impl CompanionFiles {
         let found = contacts(&salvage.entries).len();
         for edit in edits.all {
             match &edit.change {
-                Change::Contact { number, .. }
+                EditChange::Contact { number, .. }
                     if !salvage.has_every_decision || *number as usize > found =>
                 {
                     self.left_out.push(format!(
@@ -77,15 +77,19 @@ impl CompanionFiles {
         let has_first_sample = salvage.missing.gaps.iter().all(|gap| gap.after_sample > 0);
         for one in &analyses.all {
             let reason = match one.what {
-                Analysed::Mask { .. } if !has_first_sample => {
+                AnalysisContent::Mask { .. } if !has_first_sample => {
                     "its times count from the first sample, which is missing"
                 }
-                Analysed::Recalibration { .. } if !salvage.has_every_decision => {
+                AnalysisContent::Recalibration { .. } if !salvage.has_every_decision => {
                     "tares are decisions, and decisions are missing"
                 }
-                Analysed::Fit { .. } => "it is a fit of other samples; fit this session again",
+                AnalysisContent::Fit { .. } => {
+                    "it is a fit of other samples; fit this session again"
+                }
                 // The withdrawn analysis is not in the copy.
-                Analysed::Withdrawal if self.analyses.iter().all(|it| it.name != one.name) => {
+                AnalysisContent::Withdrawal
+                    if self.analyses.iter().all(|it| it.name != one.name) =>
+                {
                     continue;
                 }
                 _ => {
@@ -144,7 +148,7 @@ pub(super) fn find_damaged(path: &Path, manifest: &Manifest) -> Vec<String> {
 
 /// Reads the original only if it is a file of the recorded size below the folder, so that a damaged name, a device or a link
 /// causes no harm.
-fn check_original(folder: &Path, from: &Imported) -> Option<String> {
+fn check_original(folder: &Path, from: &ImportOrigin) -> Option<String> {
     const REMEDY: &str =
         "put back the imported file, or continue without it: the samples are in the log";
     let name = Path::new(&from.file);
@@ -182,7 +186,7 @@ mod tests {
         std::fs::write(original.join("table.csv"), b"t_s").unwrap();
         // Outside the folder, with the right size and checksum.
         std::fs::write(folder.path().join("secret"), b"t_s").unwrap();
-        let of = |file: &str| Imported {
+        let of = |file: &str| ImportOrigin {
             file: file.into(),
             bytes: 3,
             checksum: format!("{:08x}", crc32fast::hash(b"t_s")),

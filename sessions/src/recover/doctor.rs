@@ -2,9 +2,9 @@
 
 use super::companions::find_damaged;
 use super::write::{is_in_use, recover};
-use super::{Missing, recovered_folder, salvage};
+use super::{MissingData, recovered_folder, salvage};
 use crate::log::files::{absent_spare, describe_absent};
-use crate::log::{ReadError, Session, Summary};
+use crate::log::{ReadError, Session, SessionSummary};
 use chrono::{DateTime, Utc};
 use serde::Serialize;
 use std::io;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case", tag = "health")]
-pub enum Health {
+pub enum SessionHealth {
     /// Complete, with correct checksums.
     Healthy,
     BeingRecorded,
@@ -21,7 +21,7 @@ pub enum Health {
     /// Without an end, and a disk that may hold it is missing.
     Incomplete,
     Damaged {
-        missing: Missing,
+        missing: MissingData,
     },
     Lost,
     /// A newer version of the program wrote it.
@@ -31,10 +31,10 @@ pub enum Health {
 
 /// Result of an examination.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Patient {
+pub struct SessionExamination {
     pub path: PathBuf,
     #[serde(flatten)]
-    pub health: Health,
+    pub health: SessionHealth,
     pub samples: u64,
     /// Session time of the last usable sample, in s.
     pub until_s: f64,
@@ -42,46 +42,48 @@ pub struct Patient {
     pub findings: Vec<String>,
     /// Damaged files beside the log, one sentence each.
     #[serde(rename = "wrong_beside")]
-    pub wrong_beside: Vec<String>,
+    pub damaged_companions: Vec<String>,
     /// Folder of the recovered copy, if there is one.
     pub recovered: Option<PathBuf>,
 }
 
 /// Reads every byte of a session.
 #[must_use]
-pub fn examine(path: &Path) -> Patient {
+pub fn examine_session(path: &Path) -> SessionExamination {
     let mut until = 0.0;
     let opened = Session::scan(path, &mut |block| {
         until = block.last_time().map_or(until, |time| time.seconds().0);
     });
-    let result = |health, samples, until_s, findings| Patient {
+    let result = |health, samples, until_s, findings| SessionExamination {
         path: path.into(),
         health,
         samples,
         until_s,
         findings,
-        wrong_beside: Vec::new(),
+        damaged_companions: Vec::new(),
         recovered: Some(recovered_folder(path)).filter(|folder| folder.is_dir()),
     };
     match opened {
         Ok(outline) => {
             let health = if outline.end.is_some() {
-                Health::Healthy
+                SessionHealth::Healthy
             } else if is_in_use(path) {
-                Health::BeingRecorded
+                SessionHealth::BeingRecorded
             } else if absent_spare(path).is_some() {
-                Health::Incomplete
+                SessionHealth::Incomplete
             } else {
-                Health::Interrupted
+                SessionHealth::Interrupted
             };
-            Patient {
-                wrong_beside: find_damaged(path, &outline.manifest),
+            SessionExamination {
+                damaged_companions: find_damaged(path, &outline.manifest),
                 ..result(health, outline.samples, until, outline.notes)
             }
         }
-        Err(err @ ReadError::Newer { .. }) => result(Health::Newer, 0, 0.0, vec![err.to_string()]),
+        Err(err @ ReadError::Newer { .. }) => {
+            result(SessionHealth::Newer, 0, 0.0, vec![err.to_string()])
+        }
         Err(err @ (ReadError::NotASession { .. } | ReadError::Missing { .. })) => {
-            result(Health::Foreign, 0, 0.0, vec![err.to_string()])
+            result(SessionHealth::Foreign, 0, 0.0, vec![err.to_string()])
         }
         Err(err) => {
             let mut until = 0.0;
@@ -95,9 +97,9 @@ pub fn examine(path: &Path) -> Patient {
                     let spare = absent_spare(path).filter(|_| lacks_files);
                     findings.extend(spare.map(|spare| describe_absent(&spare)));
                     let missing = salvage.missing;
-                    result(Health::Damaged { missing }, salvage.samples, until, findings)
+                    result(SessionHealth::Damaged { missing }, salvage.samples, until, findings)
                 }
-                Err(_) => result(Health::Lost, 0, 0.0, vec![err.to_string()]),
+                Err(_) => result(SessionHealth::Lost, 0, 0.0, vec![err.to_string()]),
             }
         }
     }
@@ -106,7 +108,7 @@ pub fn examine(path: &Path) -> Patient {
 /// Recovers the interrupted sessions of a library; returns lines with the results and errors.
 #[must_use]
 pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>) -> Vec<String> {
-    let found = match examine_library(library) {
+    let found = match find_unfinished_sessions(library) {
         Ok(found) => found,
         Err(err) => {
             let folder = library.display();
@@ -121,7 +123,7 @@ pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>
 }
 
 /// The interrupted sessions of a library without a recovered copy, newest first. Reads only their ends.
-pub fn examine_library(library: &Path) -> io::Result<Vec<PathBuf>> {
+pub fn find_unfinished_sessions(library: &Path) -> io::Result<Vec<PathBuf>> {
     let sessions = library.join("sessions");
     if !sessions.is_dir() {
         return Ok(Vec::new());
@@ -134,7 +136,7 @@ pub fn examine_library(library: &Path) -> io::Result<Vec<PathBuf>> {
             continue;
         }
         // An unreadable session cannot be recovered; an examination reports it.
-        if Summary::read(&path).is_ok_and(|summary| summary.end.is_none()) {
+        if SessionSummary::read(&path).is_ok_and(|summary| summary.end.is_none()) {
             found.push(path);
         }
     }

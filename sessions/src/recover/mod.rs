@@ -8,10 +8,13 @@ mod doctor;
 mod salvage;
 mod write;
 
-pub use doctor::{Health, Patient, examine, examine_library, recover_library};
+pub use doctor::{
+    SessionExamination, SessionHealth, examine_session, find_unfinished_sessions, recover_library,
+};
 pub use salvage::{Salvage, salvage};
 pub use write::{
-    RecoverError, Recovery, RecoveryOrigin, is_in_use, recover, recovered_folder, recovered_id,
+    RecoverError, RecoveredSession, RecoveryOrigin, is_in_use, recover, recovered_folder,
+    recovered_id,
 };
 
 use crate::record::is_zero;
@@ -38,7 +41,7 @@ pub struct DamageSite {
 
 /// Missing data of a session, to the sample.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Missing {
+pub struct MissingData {
     pub gaps: Vec<SampleGap>,
     /// Number of missing inputs, decisions and fits.
     pub entries: u64,
@@ -53,7 +56,7 @@ pub struct Missing {
     pub left_out: Vec<String>,
 }
 
-impl Missing {
+impl MissingData {
     /// Whether data other than the end is missing.
     pub fn is_lossy(&self) -> bool {
         let has_gaps = !self.gaps.is_empty() || self.entries > 0 || self.raw_bytes > 0;

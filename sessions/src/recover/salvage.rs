@@ -1,8 +1,8 @@
 //! Reads everything undamaged from a session's files.
 
-use super::{DamageSite, Missing, SampleGap};
-use crate::block::Block;
-use crate::log::content::{Content, Part, SegmentState};
+use super::{DamageSite, MissingData, SampleGap};
+use crate::block::SampleBlock;
+use crate::log::content::{Content, LogPart, SegmentState};
 use crate::log::files::{check_files, find_files};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
 use crate::log::log_file::LogFile;
@@ -10,7 +10,7 @@ use crate::log::reader::{NO_BEGINNING, NOT_BEGUN, check_beginning, damaged, name
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry};
+use crate::record::{EndRecord, LogEntry};
 use mcap::records::op;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,20 +21,20 @@ pub struct Salvage {
     pub manifest: Manifest,
     pub samples: u64,
     /// Readable entries, by `order`. Their `after_sample` counts the recorded samples.
-    pub entries: Vec<Entry>,
+    pub entries: Vec<LogEntry>,
     /// Whether the entries include every decision up to the last sample.
     pub has_every_decision: bool,
     /// Whether a segment between others is missing.
     pub lacks_segments: bool,
     pub raw_bytes: u64,
     pub end: Option<EndRecord>,
-    pub missing: Missing,
+    pub missing: MissingData,
 }
 
 /// Visits every undamaged block of samples in order.
-pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
+pub fn salvage(path: &Path, visit: &mut dyn FnMut(&SampleBlock)) -> Result<Salvage, ReadError> {
     let mut salvage = salvage_parts(path, &mut |part| {
-        if let Part::Samples(block) = part {
+        if let LogPart::Samples(block) = part {
             visit(block);
         }
     })?;
@@ -50,15 +50,15 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
 /// Like [`salvage`], for all kinds of data, without a check of the index.
 pub(super) fn salvage_parts(
     path: &Path,
-    visit: &mut dyn FnMut(Part<'_>),
+    visit: &mut dyn FnMut(LogPart<'_>),
 ) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     check_files(path, &files)?;
     let failed = |source| ReadError::Io { path: path.into(), source };
     let mut tally = Tally::default();
-    let mut note = |part: Part<'_>| {
+    let mut note = |part: LogPart<'_>| {
         visit(part);
-        if let Part::Samples(block) = part {
+        if let LogPart::Samples(block) = part {
             tally.count(block);
         }
     };
@@ -101,7 +101,7 @@ pub(super) fn salvage_parts(
     if is_later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
     }
-    let missing = Missing {
+    let missing = MissingData {
         gaps,
         entries: missing_entries,
         raw_bytes: missing_raw_bytes,
@@ -137,7 +137,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn count(&mut self, block: &Block) {
+    fn count(&mut self, block: &SampleBlock) {
         let first = block.rows().next();
         let from_s = first.map_or(self.last_s, |row| row.host.seconds().0);
         self.add_gap_before(block.first_sample(), Some(from_s));
@@ -291,7 +291,7 @@ fn segment_kind(file: &Path, chunks: &mut ChunkReader) -> io::Result<SegmentKind
         return Ok(SegmentKind::Next);
     }
     let source = LogFile::open(file)?;
-    let mut ignore = |_: Part<'_>| {};
+    let mut ignore = |_: LogPart<'_>| {};
     let mut content = Content::new(true, &mut ignore);
     content.allow_gaps();
     let mut bytes = Vec::new();

@@ -2,14 +2,14 @@
 
 use super::companions::CompanionFiles;
 use super::salvage::salvage_parts;
-use super::{Missing, Salvage, salvage};
+use super::{MissingData, Salvage, salvage};
 use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
 use crate::lock::{self, LockFailure, LockTimeout};
 use crate::log::files::{absent_spare, describe_absent};
-use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
+use crate::log::{FileSink, LogBatch, LogError, LogPart, LogWriter, ReadError};
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry, Row};
+use crate::record::{EndRecord, LogEntry, SampleRow};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ pub struct RecoveryOrigin {
     pub from: String,
     pub at: DateTime<Utc>,
     pub software_version: String,
-    pub missing: Missing,
+    pub missing: MissingData,
 }
 
 #[derive(Debug, Error)]
@@ -52,13 +52,13 @@ pub enum RecoverError {
 }
 
 #[derive(Clone, Debug)]
-pub struct Recovery {
+pub struct RecoveredSession {
     pub folder: PathBuf,
     pub session_id: String,
     pub salvage: Salvage,
 }
 
-impl Recovery {
+impl RecoveredSession {
     /// A line with the result, then one for each kind of missing data; `from` is the original.
     pub fn sentences(&self, from: &Path) -> Vec<String> {
         let raw = match self.salvage.raw_bytes {
@@ -119,14 +119,14 @@ pub fn recover(
     path: &Path,
     software_version: &str,
     at: DateTime<Utc>,
-) -> Result<Recovery, RecoverError> {
+) -> Result<RecoveredSession, RecoverError> {
     let _lock = lock_recovery(path)?;
     if is_in_use(path) {
         return Err(RecoverError::InUse { path: path.into() });
     }
     let folder = recovered_folder(path);
     // A copy without an end is the remainder of an attempt that crashed.
-    if crate::log::Summary::read(&folder).is_ok_and(|summary| summary.end.is_some()) {
+    if crate::log::SessionSummary::read(&folder).is_ok_and(|summary| summary.end.is_some()) {
         return Err(RecoverError::Before { path: path.into(), folder });
     }
     let mut salvage = salvage(path, &mut |_| {})?;
@@ -166,7 +166,7 @@ pub fn recover(
     std::fs::rename(&unfinished, &folder)
         .and_then(|()| sync_folder_of(&folder))
         .map_err(|source| FolderError::Io { path: folder.clone(), source })?;
-    Ok(Recovery { folder, session_id, salvage })
+    Ok(RecoveredSession { folder, session_id, salvage })
 }
 
 /// Excludes other recoveries of the session; waits a little for another one. The lock is on the folder itself, so it needs no
@@ -198,30 +198,30 @@ fn copy(path: &Path, salvage: &Salvage, log: &mut LogWriter<FileSink>) -> Result
     let mut pending = salvage.entries.iter().peekable();
     let mut outcome = Ok(());
     let (mut written, mut last) = (0u64, Nanos::ZERO);
-    let mut visit = |part: Part<'_>| {
+    let mut visit = |part: LogPart<'_>| {
         if outcome.is_err() {
             return;
         }
         let block = match part {
-            Part::Samples(block) => block,
-            Part::Raw(block) => {
+            LogPart::Samples(block) => block,
+            LogPart::Raw(block) => {
                 let raw = &block.to_pieces();
-                outcome = log.append_parts(&Parts { raw, ..Parts::default() });
+                outcome = log.append_batch(&LogBatch { raw, ..LogBatch::default() });
                 return;
             }
-            Part::Health(health) => {
+            LogPart::Health(health) => {
                 let health = std::slice::from_ref(health);
-                outcome = log.append_parts(&Parts { health, ..Parts::default() });
+                outcome = log.append_batch(&LogBatch { health, ..LogBatch::default() });
                 return;
             }
         };
-        let rows: Vec<Row> = block.rows().collect();
+        let rows: Vec<SampleRow> = block.rows().collect();
         let end = block.first_sample() + rows.len() as u64;
         let mut entries = Vec::new();
         while let Some(entry) = pending.next_if(|entry| entry.after_sample < end) {
             // The entry keeps its position between the remaining samples.
             let seen = entry.after_sample.saturating_sub(block.first_sample());
-            entries.push(Entry { after_sample: written + seen, ..entry.clone() });
+            entries.push(LogEntry { after_sample: written + seen, ..entry.clone() });
         }
         written += rows.len() as u64;
         last = block.last_time().unwrap_or(last);
@@ -229,8 +229,8 @@ fn copy(path: &Path, salvage: &Salvage, log: &mut LogWriter<FileSink>) -> Result
     };
     salvage_parts(path, &mut visit)?;
     outcome?;
-    let rest: Vec<Entry> =
-        pending.map(|entry| Entry { after_sample: written, ..entry.clone() }).collect();
+    let rest: Vec<LogEntry> =
+        pending.map(|entry| LogEntry { after_sample: written, ..entry.clone() }).collect();
     log.append(&[], &rest)?;
     let ended_at = rest.last().map_or(last, |entry| entry.now.max(last));
     let end = salvage.end.clone().unwrap_or(EndRecord {

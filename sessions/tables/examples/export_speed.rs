@@ -4,15 +4,19 @@
 //! prints one JSON object, times in s; the tables stay in FOLDER.
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
-use palpate_sessions::{Block, Session};
-use palpate_tables::export::{Beside, Feed, Format, Selection, Table};
+use palpate_sessions::{SampleBlock, Session};
+use palpate_tables::export::{ExtraColumns, RowFeed, SampleSelection, TableExport, TableFormat};
 use std::path::Path;
 use std::time::Instant;
 
 #[expect(clippy::disallowed_methods, reason = "this program measures time")]
-fn timed(table: &Table, path: &Path, feed: Feed) -> Result<f64, Box<dyn std::error::Error>> {
+fn timed(
+    table: &TableExport,
+    path: &Path,
+    feed: RowFeed,
+) -> Result<f64, Box<dyn std::error::Error>> {
     let start = Instant::now();
-    table.write(Format::Parquet, path, feed)?;
+    table.write(TableFormat::Parquet, path, feed)?;
     Ok(start.elapsed().as_secs_f64())
 }
 
@@ -23,15 +27,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (session, folder) = (Path::new(&session), Path::new(&folder));
     let whole = Session::open(session)?;
-    let table = Table {
+    let table = TableExport {
         manifest: &whole.manifest,
         notes: &whole.notes,
-        beside: &Beside::default(),
-        selection: &Selection::default(),
+        extra: &ExtraColumns::default(),
+        selection: &SampleSelection::default(),
     };
     let from_log = timed(&table, &folder.join("from_log.parquet"), &mut |take| {
         let mut rows = Vec::new();
-        let mut each = |block: &Block| {
+        let mut each = |block: &SampleBlock| {
             rows.clear();
             rows.extend(block.rows());
             take(&rows);

@@ -2,10 +2,10 @@
 
 use crate::support::{end, entries, manifest, rows};
 use palpate_model::Nanos;
-use palpate_sessions::recover::{Health, examine};
+use palpate_sessions::recover::{SessionHealth, examine_session};
 use palpate_sessions::{
-    Alteration, FileSink, FolderSegments, LOG_FILE, LogError, LogWriter, Notice, Pace, Row,
-    Session, SessionFolder, SessionWriter, segment_file,
+    Alteration, FileSink, FolderSegments, LOG_FILE, LogError, LogNotice, LogWriter, RecordingPace,
+    SampleRow, Session, SessionFolder, SessionWriter, segment_file,
 };
 use palpate_test_support::wait::until;
 use std::path::Path;
@@ -51,7 +51,7 @@ fn alteration_by_another_program_is_reported_when_the_log_is_closed() {
 }
 
 /// Pushes rows, an event after the last of them.
-fn push(writer: &mut SessionWriter, rows: &[Row], order: u64) {
+fn push(writer: &mut SessionWriter, rows: &[SampleRow], order: u64) {
     for row in rows {
         writer.push_row(*row).unwrap();
     }
@@ -70,7 +70,8 @@ fn altered_log_is_reported_at_once_and_the_recording_continues() {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("session");
         let folder = SessionFolder::create(&path).unwrap();
-        let mut writer = SessionWriter::start(folder, None, &manifest(), Pace::Real).unwrap();
+        let mut writer =
+            SessionWriter::start(folder, None, &manifest(), RecordingPace::Real).unwrap();
         push(&mut writer, first, 1);
         let is_saved = || {
             let is_synced = writer.disk_state().sync_s.is_some();
@@ -85,20 +86,20 @@ fn altered_log_is_reported_at_once_and_the_recording_continues() {
         };
         let notices = until(first_notices, || "a notice".into());
         assert!(
-            matches!(&notices[..], [Notice::Altered(LogError::Altered { .. })]),
+            matches!(&notices[..], [LogNotice::Altered(LogError::Altered { .. })]),
             "{command}: {notices:?}"
         );
-        assert!(notices[0].ends_the_run());
+        assert!(notices[0].is_reason_to_end());
         let closed = writer.close(end(rows[5999].host));
         assert!(matches!(closed, Err(LogError::Altered { .. })), "{command}: {closed:?}");
         // Later data is complete, and missing data is reported.
-        let patient = examine(&path);
+        let patient = examine_session(&path);
         if command == REPLACE {
             // The copy has everything on the disk by then: nothing is missing, and the alteration is reported all the same.
-            assert_eq!((&patient.health, patient.samples), (&Health::Healthy, 6000));
+            assert_eq!((&patient.health, patient.samples), (&SessionHealth::Healthy, 6000));
             continue;
         }
-        let Health::Damaged { missing } = &patient.health else {
+        let SessionHealth::Damaged { missing } = &patient.health else {
             panic!("{command}: {patient:?}");
         };
         assert!(!missing.is_end_lost, "{command}: {missing:?}");
@@ -118,7 +119,8 @@ fn finished_segment_is_checked_too() {
         let source = FolderSegments::new(folder.path());
         let batches = if is_open { 1000 } else { 5 };
         let mut writer =
-            SessionWriter::start_in_segments(source, batches, &manifest(), Pace::Virtual).unwrap();
+            SessionWriter::start_in_segments(source, batches, &manifest(), RecordingPace::Virtual)
+                .unwrap();
         first.iter().for_each(|row| writer.push_row(*row).unwrap());
         let second = folder.path().join(segment_file(1));
         assert_eq!(second.exists(), !is_open);

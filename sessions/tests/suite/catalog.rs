@@ -3,12 +3,13 @@
 
 use crate::support::{MemorySink, Random, end, manifest, rows};
 use chrono::{Duration, TimeZone, Utc};
-use palpate_model::about::Labels;
-use palpate_sessions::analyses::{Analysed, Analysis, add_analysis};
+use palpate_model::metadata::SessionLabels;
+use palpate_sessions::analyses::{Analysis, AnalysisContent, add_analysis};
 use palpate_sessions::catalog::{
-    CATALOG_FILE, Catalog, Condition, Entry, Order, Query, ReviewIs, VerdictIs,
+    CATALOG_FILE, Catalog, CatalogEntry, CatalogOrder, CatalogQuery, Condition, QualityFilter,
+    ReviewFilter,
 };
-use palpate_sessions::edits::{Change, Decision, Edit, Verdict, add_edit};
+use palpate_sessions::edits::{DataQuality, Edit, EditChange, ReviewDecision, add_edit};
 use palpate_sessions::{LOG_FILE, LogWriter, Manifest};
 use std::fs;
 use std::path::Path;
@@ -36,10 +37,10 @@ fn plan(random: &mut Random) -> serde_json::Value {
 fn random_manifest(random: &mut Random) -> Manifest {
     let started_at = Utc.with_ymd_and_hms(2026, 3, 1, 12, 0, 0).unwrap()
         + Duration::hours(random.below(240) as i64);
-    let mut labels = Labels::default();
+    let mut labels = SessionLabels::default();
     let thickness = format!("specimen.thickness_mm={}", 1 + random.below(9));
-    labels.tell_pair(&thickness).unwrap();
-    labels.tell_pair("series.id=pilot 7").unwrap();
+    labels.set_pair(&thickness).unwrap();
+    labels.set_pair("series.id=pilot 7").unwrap();
     Manifest {
         session_id: format!("20260301T120000Z-{:08x}", random.next() as u32),
         started_at,
@@ -65,7 +66,7 @@ fn write_session(folder: &Path, manifest: &Manifest, count: usize, is_ended: boo
     fs::write(folder.join(LOG_FILE), sink.bytes()).unwrap();
 }
 
-fn edit(reason: &str, change: Change) -> Edit {
+fn edit(reason: &str, change: EditChange) -> Edit {
     Edit {
         at: Utc.with_ymd_and_hms(2026, 4, 1, 9, 0, 0).unwrap(),
         by: "Grace".into(),
@@ -74,8 +75,8 @@ fn edit(reason: &str, change: Change) -> Edit {
     }
 }
 
-fn judge(folder: &Path, id: &str, verdict: Verdict, reason: &str) {
-    add_edit(folder, id, &edit(reason, Change::Verdict { verdict })).unwrap();
+fn judge(folder: &Path, id: &str, verdict: DataQuality, reason: &str) {
+    add_edit(folder, id, &edit(reason, EditChange::Verdict { verdict })).unwrap();
 }
 
 fn fit_of(name: &str, tau: f64) -> Analysis {
@@ -87,7 +88,7 @@ fn fit_of(name: &str, tau: f64) -> Analysis {
         software_version: "0.1.0".into(),
         engine_version: 1,
         inputs: Vec::new(),
-        what: Analysed::Fit {
+        what: AnalysisContent::Fit {
             based_on: None,
             settings: serde_json::Value::Null,
             results: serde_json::json!({"parameters": [
@@ -99,7 +100,7 @@ fn fit_of(name: &str, tau: f64) -> Analysis {
 
 /// Some of a session's tags, analyses and reviews, at random.
 fn talk(folder: &Path, id: &str, random: &mut Random) {
-    let tags = |word: &str| Change::Tags {
+    let tags = |word: &str| EditChange::Tags {
         add: vec![word.into(), "all".into()],
         remove: vec!["none".into()],
     };
@@ -113,16 +114,17 @@ fn talk(folder: &Path, id: &str, random: &mut Random) {
     if random.below(2) == 0 {
         analyse("first fit", tau);
     }
-    let decision = [Decision::Accepted, Decision::Rejected, Decision::Repeat][random.below(3)];
+    let decision = [ReviewDecision::Accepted, ReviewDecision::Rejected, ReviewDecision::Repeat]
+        [random.below(3)];
     if random.below(2) == 0 {
         let seen = palpate_sessions::Analyses::read(folder, id).unwrap().input();
         let seen = seen.into_iter().collect();
-        let change = Change::Review { decision, seen };
+        let change = EditChange::Review { decision, seen };
         add_edit(folder, id, &edit("seen by two", change)).unwrap();
     }
     match random.below(4) {
         0 => analyse("second fit", tau + 0.5),
-        1 => judge(folder, id, Verdict::Suspect, "second thoughts"),
+        1 => judge(folder, id, DataQuality::Suspect, "second thoughts"),
         _ => {}
     }
 }
@@ -137,7 +139,7 @@ fn library(count: usize, seed: u64) -> tempfile::TempDir {
         let folder = library.path().join(place).join(format!("s{number:03}"));
         let samples = 150 + 100 * random.below(4);
         write_session(&folder, &manifest, samples, random.below(5) > 0);
-        let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+        let verdicts = [DataQuality::Valid, DataQuality::Suspect, DataQuality::Rejected];
         if let Some(verdict) = verdicts.get(random.below(4)) {
             let reason = ["hair on the probe", "Überlast (naïve)"][random.below(2)];
             judge(&folder, &manifest.session_id, *verdict, reason);
@@ -167,7 +169,7 @@ fn plain_words(text: &str) -> Vec<String> {
 }
 
 /// Everything of an entry that is words.
-fn words_of(entry: &Entry) -> Vec<String> {
+fn words_of(entry: &CatalogEntry) -> Vec<String> {
     let named = entry.named.iter().filter(|one| one.number.is_none());
     let mut text = [
         &entry.folder,
@@ -196,7 +198,7 @@ fn words_of(entry: &Entry) -> Vec<String> {
 }
 
 /// The plain scan.
-fn is_meant(query: &Query, entry: &Entry) -> bool {
+fn is_meant(query: &CatalogQuery, entry: &CatalogEntry) -> bool {
     let is = |wanted: &Option<String>, own: &String| wanted.as_ref().is_none_or(|one| one == own);
     let start = chrono::DateTime::parse_from_rfc3339(&entry.started_at).ok();
     let words = words_of(entry);
@@ -207,10 +209,10 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
         && is(&query.rig, &entry.rig)
         && query.tags.iter().all(|tag| entry.tags.contains(tag))
         && query.review.is_none_or(|wanted| match (wanted, &entry.review) {
-            (ReviewIs::None, review) => review.is_none() && entry.trouble.is_none(),
+            (ReviewFilter::None, review) => review.is_none() && entry.trouble.is_none(),
             (_, None) => false,
-            (ReviewIs::Outdated, Some(review)) => !review.changed.is_empty(),
-            (ReviewIs::Given(decision), Some(review)) => {
+            (ReviewFilter::Outdated, Some(review)) => !review.changed.is_empty(),
+            (ReviewFilter::Given(decision), Some(review)) => {
                 review.changed.is_empty() && review.decision == decision
             }
         })
@@ -218,14 +220,14 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
         && query.before.is_none_or(|before| start.is_some_and(|at| at < before))
         && query.conditions.iter().all(|one| one.is_met(entry))
         && query.verdict.is_none_or(|wanted| match wanted {
-            VerdictIs::Given(verdict) => entry.verdict == Some(verdict),
-            VerdictIs::None => entry.verdict.is_none() && entry.trouble.is_none(),
+            QualityFilter::Given(verdict) => entry.verdict == Some(verdict),
+            QualityFilter::None => entry.verdict.is_none() && entry.trouble.is_none(),
         })
         && plain_words(&query.words).iter().all(has_word)
 }
 
-fn random_query(random: &mut Random) -> Query {
-    let mut query = Query::default();
+fn random_query(random: &mut Random) -> CatalogQuery {
+    let mut query = CatalogQuery::default();
     let day = |random: &mut Random| {
         Utc.with_ymd_and_hms(2026, 3, 1 + random.below(12) as u32, 0, 0, 0).unwrap()
     };
@@ -282,11 +284,11 @@ fn random_query(random: &mut Random) -> Query {
             _ => query.words = words[random.below(words.len())].into(),
         }
     }
-    let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+    let verdicts = [DataQuality::Valid, DataQuality::Suspect, DataQuality::Rejected];
     query.review = match random.below(12) {
-        0 => Some(ReviewIs::None),
-        1 => Some(ReviewIs::Outdated),
-        2 => Some(ReviewIs::Given(Decision::Accepted)),
+        0 => Some(ReviewFilter::None),
+        1 => Some(ReviewFilter::Outdated),
+        2 => Some(ReviewFilter::Given(ReviewDecision::Accepted)),
         _ => None,
     };
     query.tags = match random.below(12) {
@@ -296,8 +298,8 @@ fn random_query(random: &mut Random) -> Query {
         _ => Vec::new(),
     };
     query.verdict = match random.below(8) {
-        0 => Some(VerdictIs::None),
-        1 => Some(VerdictIs::Given(verdicts[random.below(3)])),
+        0 => Some(QualityFilter::None),
+        1 => Some(QualityFilter::Given(verdicts[random.below(3)])),
         _ => None,
     };
     query
@@ -330,41 +332,42 @@ fn every_search_finds_what_a_plain_scan_finds() {
 fn pages_and_orders_make_up_the_whole() {
     let library = library(30, 9);
     let catalog = updated(library.path());
-    let key = |order: Order, entry: &Entry| match order {
-        Order::Started => entry.started_at.clone(),
-        Order::Specimen => entry.specimen.clone(),
-        Order::Operator => entry.operator.clone(),
-        Order::Protocol => entry.protocol.clone(),
-        Order::Duration => format!("{:020.9}", entry.duration_s),
-        Order::Verdict => entry.verdict.map_or("", Verdict::name).to_owned(),
+    let key = |order: CatalogOrder, entry: &CatalogEntry| match order {
+        CatalogOrder::Started => entry.started_at.clone(),
+        CatalogOrder::Specimen => entry.specimen.clone(),
+        CatalogOrder::Operator => entry.operator.clone(),
+        CatalogOrder::Protocol => entry.protocol.clone(),
+        CatalogOrder::Duration => format!("{:020.9}", entry.duration_s),
+        CatalogOrder::Verdict => entry.verdict.map_or("", DataQuality::name).to_owned(),
         // What cannot be read has no review that anybody knows of.
-        Order::Review if entry.trouble.is_some() => "?".to_owned(),
-        Order::Review => ReviewIs::of(entry.review.as_ref()).word().to_owned(),
+        CatalogOrder::Review if entry.trouble.is_some() => "?".to_owned(),
+        CatalogOrder::Review => ReviewFilter::of(entry.review.as_ref()).word().to_owned(),
     };
     for order in [
-        Order::Started,
-        Order::Specimen,
-        Order::Operator,
-        Order::Protocol,
-        Order::Duration,
-        Order::Verdict,
-        Order::Review,
+        CatalogOrder::Started,
+        CatalogOrder::Specimen,
+        CatalogOrder::Operator,
+        CatalogOrder::Protocol,
+        CatalogOrder::Duration,
+        CatalogOrder::Verdict,
+        CatalogOrder::Review,
     ] {
         let mut pages = Vec::new();
         for page in 0..5 {
-            let query = Query { order, skip: 7 * page, limit: Some(7), ..Query::default() };
+            let query =
+                CatalogQuery { order, skip: 7 * page, limit: Some(7), ..CatalogQuery::default() };
             let found = catalog.find(&query).unwrap();
             assert_eq!(found.count, 31);
             pages.extend(found.entries);
         }
         assert_eq!(pages.len(), 31);
-        let is_falling = matches!(order, Order::Started | Order::Duration);
+        let is_falling = matches!(order, CatalogOrder::Started | CatalogOrder::Duration);
         for pair in pages.windows(2) {
             let keys = (key(order, &pair[0]), key(order, &pair[1]));
             let is_sorted = if is_falling { keys.0 >= keys.1 } else { keys.0 <= keys.1 };
             assert!(is_sorted, "{order:?}: {keys:?}");
         }
-        let query = Query { order, is_reversed: true, ..Query::default() };
+        let query = CatalogQuery { order, is_reversed: true, ..CatalogQuery::default() };
         pages.reverse();
         assert_eq!(catalog.find(&query).unwrap().entries, pages);
         let folders: Vec<String> = pages.iter().map(|entry| entry.folder.clone()).collect();
@@ -398,7 +401,7 @@ fn updated_catalog_equals_a_rebuilt_one() {
                 fs::rename(&folder, to).unwrap();
             }
             4 if one.trouble.is_none() => {
-                judge(&folder, &one.session_id, Verdict::Suspect, "looked at again");
+                judge(&folder, &one.session_id, DataQuality::Suspect, "looked at again");
             }
             // Cut off somewhere: an interrupted session, or no session any more.
             _ => {
@@ -414,7 +417,7 @@ fn updated_catalog_equals_a_rebuilt_one() {
     }
     assert!(read > 20, "{read}");
     let grown = catalog.all().unwrap();
-    let words = Query { words: "ada".into(), ..Query::default() };
+    let words = CatalogQuery { words: "ada".into(), ..CatalogQuery::default() };
     let found = catalog.find(&words).unwrap();
     drop(catalog);
     // Deleted, nothing is lost.
@@ -470,7 +473,7 @@ fn several_at_a_time_end_with_the_same_catalog() {
                 } else {
                     catalog.update(&mut |_, _| {}).unwrap();
                 }
-                catalog.find(&Query::default()).unwrap();
+                catalog.find(&CatalogQuery::default()).unwrap();
             });
         }
     });
@@ -478,7 +481,7 @@ fn several_at_a_time_end_with_the_same_catalog() {
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap().len(), 41);
     assert_eq!(catalog.check(&mut |_, _| {}).unwrap(), []);
-    let query = Query { words: "hair".into(), ..Query::default() };
+    let query = CatalogQuery { words: "hair".into(), ..CatalogQuery::default() };
     let found = catalog.find(&query).unwrap();
     let meant = catalog.all().unwrap().iter().filter(|one| is_meant(&query, one)).count();
     assert_eq!(found.count, meant);
@@ -525,9 +528,9 @@ fn what_is_typed_is_never_taken_for_syntax() {
     }
     for text in texts {
         for query in [
-            Query { words: text.clone(), ..Query::default() },
-            Query { specimen: Some(text.clone()), ..Query::default() },
-            Query { operator: Some(text.clone()), ..Query::default() },
+            CatalogQuery { words: text.clone(), ..CatalogQuery::default() },
+            CatalogQuery { specimen: Some(text.clone()), ..CatalogQuery::default() },
+            CatalogQuery { operator: Some(text.clone()), ..CatalogQuery::default() },
         ] {
             let found = catalog.find(&query);
             assert!(found.is_ok(), "{text:?}: {found:?}");
@@ -565,7 +568,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
             let _ = fs::remove_file(at.join(format!("{CATALOG_FILE}{ending}")));
         }
         fs::write(&file, &bytes).unwrap();
-        let words = Query { words: "ada".into(), ..Query::default() };
+        let words = CatalogQuery { words: "ada".into(), ..CatalogQuery::default() };
         let done = Catalog::with(at, |catalog| {
             set_aside += catalog.remarks.len();
             catalog.update(&mut |_, _| {})?;

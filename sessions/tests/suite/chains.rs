@@ -3,12 +3,12 @@
 use crate::support::{end, log_bytes, manifest, rows};
 use chrono::{TimeZone, Utc};
 use palpate_model::Nanos;
-use palpate_sessions::analyses::{Analysed, Analysis, add_analysis};
-use palpate_sessions::catalog::{Catalog, Subject};
+use palpate_sessions::analyses::{Analysis, AnalysisContent, add_analysis};
+use palpate_sessions::catalog::{Catalog, HistorySubject};
 use palpate_sessions::checks::{DailyCheck, add_check};
-use palpate_sessions::edits::{Change, Edit, EditError, Edits, Verdict, add_edit};
+use palpate_sessions::edits::{DataQuality, Edit, EditChange, EditError, Edits, add_edit};
 use palpate_sessions::journal::Journal;
-use palpate_sessions::recover::examine;
+use palpate_sessions::recover::examine_session;
 use palpate_sessions::{ANALYSES_FILE, ChainError, EDITS_FILE, LOG_FILE};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,12 @@ fn library() -> (tempfile::TempDir, PathBuf) {
     fs::create_dir_all(&session).unwrap();
     let log = log_bytes(&rows(100, 1), &[], Some(end(Nanos(0))));
     fs::write(session.join(LOG_FILE), log).unwrap();
-    for verdict in [Verdict::Valid, Verdict::Rejected] {
+    for verdict in [DataQuality::Valid, DataQuality::Rejected] {
         let edit = Edit {
             at: Utc.with_ymd_and_hms(2026, 4, 1, 9, 0, 0).unwrap(),
             by: "Ada".into(),
             reason: "hair on the probe".into(),
-            change: Change::Verdict { verdict },
+            change: EditChange::Verdict { verdict },
         };
         add_edit(&session, &manifest().session_id, &edit).unwrap();
     }
@@ -37,7 +37,7 @@ fn library() -> (tempfile::TempDir, PathBuf) {
         software_version: "0.1.0".into(),
         engine_version: 1,
         inputs: Vec::new(),
-        what: Analysed::Mask { left_out_s: vec![[1.0, 2.0]] },
+        what: AnalysisContent::Mask { left_out_s: vec![[1.0, 2.0]] },
     };
     add_analysis(&session, &manifest().session_id, &mask).unwrap();
     (library, session)
@@ -57,7 +57,7 @@ fn cut_last_line(path: &Path) {
 }
 
 /// Kinds of events in the history of a subject, and its remarks.
-fn history(library: &Path, subject: Subject, name: &str) -> (Vec<String>, Vec<String>) {
+fn history(library: &Path, subject: HistorySubject, name: &str) -> (Vec<String>, Vec<String>) {
     let history = Catalog::with(library, |catalog| {
         catalog.update(&mut |_, _| {})?;
         catalog.history(subject, name)
@@ -72,7 +72,7 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
     let at = library.path();
     let specimen = manifest().specimen;
     let all = ["session", "verdict", "verdict", "mask"].map(String::from);
-    let of_specimen = || history(at, Subject::Specimen, &specimen);
+    let of_specimen = || history(at, HistorySubject::Specimen, &specimen);
     assert_eq!(of_specimen(), (all.to_vec(), vec![]));
     for damage in [flip, cut_last_line] {
         let analyses = session.join(ANALYSES_FILE);
@@ -102,13 +102,13 @@ fn history_names_every_damaged_file_and_shows_the_rest() {
         parts: Vec::new(),
     };
     add_check(at, &check).unwrap();
-    let (events, remarks) = history(at, Subject::Rig, "sim");
+    let (events, remarks) = history(at, HistorySubject::Rig, "sim");
     assert!(events.contains(&"check".into()) && remarks.is_empty(), "{events:?}");
     let file = at.join("checks/sim.jsonl");
     let original = fs::read(&file).unwrap();
     for damage in [flip, cut_last_line, |path: &Path| fs::remove_file(path).unwrap()] {
         damage(&file);
-        let (events, remarks) = history(at, Subject::Rig, "sim");
+        let (events, remarks) = history(at, HistorySubject::Rig, "sim");
         assert_eq!(events, all);
         assert!(remarks.len() == 1 && remarks[0].contains("sim.jsonl"), "{remarks:?}");
         fs::write(&file, &original).unwrap();
@@ -137,12 +137,12 @@ fn a_verdict_that_was_cut_off_is_missed_by_every_reader() {
         Edits::read(&session, &id),
         Err(EditError::Chain(ChainError::Shortened { found: 1, written: 2, .. }))
     ));
-    let wrong = examine(&session).wrong_beside;
+    let wrong = examine_session(&session).damaged_companions;
     assert!(wrong.len() == 1 && is_reported(&wrong[0]), "{wrong:?}");
     assert!(trouble().is_some_and(|text| is_reported(&text)));
     // The catalog notices even if the head is deleted too.
     fs::remove_file(session.join("edits.jsonl.head")).unwrap();
-    assert!(examine(&session).wrong_beside.is_empty());
+    assert!(examine_session(&session).damaged_companions.is_empty());
     for _ in 0..2 {
         assert!(trouble().is_some_and(|text| is_reported(&text)));
         // Changed again, it is read again.

@@ -4,10 +4,10 @@
 use crate::support::{end, log_bytes, manifest, rows};
 use chrono::{TimeZone, Utc};
 use palpate_model::{Nanos, Position};
-use palpate_sessions::analyses::{Analysed, Analyses, Analysis, add_analysis};
-use palpate_sessions::edits::{Change, Edit, Edits, Verdict, add_edit};
+use palpate_sessions::analyses::{Analyses, Analysis, AnalysisContent, add_analysis};
+use palpate_sessions::edits::{DataQuality, Edit, EditChange, Edits, add_edit};
 use palpate_sessions::recover::{recover, recovered_folder};
-use palpate_sessions::{Entry, EntryKind, LOG_FILE, ORIGINAL_FOLDER, Row, Session};
+use palpate_sessions::{EntryKind, LOG_FILE, LogEntry, ORIGINAL_FOLDER, SampleRow, Session};
 use std::fs;
 use std::path::Path;
 
@@ -18,15 +18,18 @@ fn at() -> chrono::DateTime<Utc> {
 fn edits() -> Vec<Edit> {
     let edit =
         |reason: &str, change| Edit { at: at(), by: "Ada".into(), reason: reason.into(), change };
-    let contact =
-        |number| Change::Contact { number, position_mm: Position(41.05), was_mm: Position(41.0) };
-    let verdict = Verdict::Rejected;
+    let contact = |number| EditChange::Contact {
+        number,
+        position_mm: Position(41.05),
+        was_mm: Position(41.0),
+    };
+    let verdict = DataQuality::Rejected;
     let add = vec!["pilot".to_owned()];
     let remove = Vec::new();
     vec![
         edit("by eye", contact(1)),
-        edit("hair on the probe", Change::Verdict { verdict }),
-        edit("", Change::Tags { add, remove }),
+        edit("hair on the probe", EditChange::Verdict { verdict }),
+        edit("", EditChange::Tags { add, remove }),
         edit("by eye", contact(2)),
     ]
 }
@@ -42,21 +45,23 @@ fn analyses() -> Vec<Analysis> {
         inputs: Vec::new(),
         what,
     };
-    let mask = || Analysed::Mask { left_out_s: vec![[1.0, 1.5]] };
-    let fit = Analysed::Fit { based_on: None, settings: "kelvin".into(), results: 1.5.into() };
-    let calibration = Analysed::Recalibration { calibration: "lab".into(), results: 0.5.into() };
+    let mask = || AnalysisContent::Mask { left_out_s: vec![[1.0, 1.5]] };
+    let fit =
+        AnalysisContent::Fit { based_on: None, settings: "kelvin".into(), results: 1.5.into() };
+    let calibration =
+        AnalysisContent::Recalibration { calibration: "lab".into(), results: 0.5.into() };
     vec![
         analysis("stretch", mask()),
         analysis("mistake", mask()),
-        analysis("mistake", Analysed::Withdrawal),
+        analysis("mistake", AnalysisContent::Withdrawal),
         analysis("kelvin", fit),
         analysis("lab", calibration),
     ]
 }
 
 /// Two contacts in a session of three seconds.
-fn contacts(rows: &[Row]) -> Vec<Entry> {
-    let contact = |order, after_sample: u64| Entry {
+fn contacts(rows: &[SampleRow]) -> Vec<LogEntry> {
+    let contact = |order, after_sample: u64| LogEntry {
         kind: EntryKind::Decision,
         order,
         after_sample,
@@ -114,14 +119,14 @@ fn companions_with_the_same_meaning_are_copied_and_others_reported() {
         let remaining = Edits::read(&recovery.folder, id).unwrap().all;
         // Without an end the number of decisions is unknown.
         let is_sure = has_contacts && !missing.is_end_lost;
-        let is_kept = |edit: &Edit| is_sure || !matches!(edit.change, Change::Contact { .. });
+        let is_kept = |edit: &Edit| is_sure || !matches!(edit.change, EditChange::Contact { .. });
         let expected: Vec<Edit> = edits().into_iter().filter(is_kept).collect();
         assert_eq!(remaining, expected, "{place}: {missing:?}");
         let remaining = Analyses::read(&recovery.folder, id).unwrap().all;
         let is_kept = |one: &Analysis| match one.what {
-            Analysed::Mask { .. } | Analysed::Withdrawal => has_first,
-            Analysed::Recalibration { .. } => is_sure,
-            Analysed::Fit { .. } => false,
+            AnalysisContent::Mask { .. } | AnalysisContent::Withdrawal => has_first,
+            AnalysisContent::Recalibration { .. } => is_sure,
+            AnalysisContent::Fit { .. } => false,
         };
         let expected: Vec<Analysis> = analyses().into_iter().filter(is_kept).collect();
         assert_eq!(remaining, expected, "{place}: {missing:?}");

@@ -4,13 +4,13 @@ use crate::support::{
 };
 use palpate_model::Nanos;
 use palpate_sessions::recover::{recover, salvage};
-use palpate_sessions::{Block, Entry, LogWriter, Parts, ReadError, Row, Session};
+use palpate_sessions::{LogBatch, LogEntry, LogWriter, ReadError, SampleBlock, SampleRow, Session};
 use std::path::Path;
 
 /// What a session held, and its file.
 pub struct Original {
-    pub rows: Vec<Row>,
-    pub entries: Vec<Entry>,
+    pub rows: Vec<SampleRow>,
+    pub entries: Vec<LogEntry>,
     pub bytes: Vec<u8>,
 }
 
@@ -45,7 +45,7 @@ impl Original {
     /// Recovered data is as recorded, and missing data is reported to the sample.
     pub fn check_salvage(&self, path: &Path, context: &str) -> Option<usize> {
         let mut blocks = Vec::new();
-        let mut visit = |block: &Block| {
+        let mut visit = |block: &SampleBlock| {
             blocks.push((block.first_sample() as usize, block.rows().collect::<Vec<_>>()));
         };
         let salvage = salvage(path, &mut visit).ok()?;
@@ -66,8 +66,8 @@ impl Original {
             (next, remaining) = (first + rows.len(), remaining + rows.len());
         }
         assert_eq!(salvage.samples as usize, remaining, "{context}");
-        let is_kept = |entry: &&Entry| salvage.entries.contains(entry);
-        let entries: Vec<&Entry> = self.entries.iter().filter(is_kept).collect();
+        let is_kept = |entry: &&LogEntry| salvage.entries.contains(entry);
+        let entries: Vec<&LogEntry> = self.entries.iter().filter(is_kept).collect();
         assert!(entries.iter().copied().eq(&salvage.entries), "{context}: wrong entries");
         if remaining < self.rows.len() || entries.len() < self.entries.len() {
             assert!(!salvage.missing.sentences().is_empty(), "{context}: short without a word");
@@ -222,11 +222,11 @@ fn raw_bytes_that_are_lost_are_counted() {
     let mut places = Vec::new();
     for batch in rows.chunks(100) {
         places.push(sink.bytes().len());
-        let parts = Parts { rows: batch, raw: &raw_of(batch), ..Parts::default() };
-        log.append_parts(&parts).unwrap();
+        let parts = LogBatch { rows: batch, raw: &raw_of(batch), ..LogBatch::default() };
+        log.append_batch(&parts).unwrap();
     }
     log.finish(end(Nanos::from_millis(1000))).unwrap();
-    let bytes_of = |rows: &[Row]| -> u64 {
+    let bytes_of = |rows: &[SampleRow]| -> u64 {
         let raw = raw_of(rows);
         raw.iter().map(|piece| piece.bytes.len() as u64).sum()
     };
@@ -245,9 +245,9 @@ fn raw_bytes_that_are_lost_are_counted() {
         let sentences = salvage.missing.sentences().join("; ");
         assert!(sentences.contains(&format!("{missing} raw bytes")), "{sentences}");
         let copy = recover(&session, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
-        let remaining: Vec<Row> = [&rows[..removed.start], &rows[removed.end..]].concat();
+        let remaining: Vec<SampleRow> = [&rows[..removed.start], &rows[removed.end..]].concat();
         check_raw(&read_raw(&copy.folder).unwrap(), &remaining, remaining.len(), "a copy");
         let copied = Session::open(&copy.folder).unwrap();
-        assert_eq!(copied.beside.raw_bytes, salvage.raw_bytes);
+        assert_eq!(copied.auxiliary.raw_bytes, salvage.raw_bytes);
     }
 }

@@ -1,26 +1,28 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
-use palpate_sessions::{Row, Session};
-use palpate_tables::export::{Beside, Format, Selection, Table, dictionary_path};
+use palpate_sessions::{SampleRow, Session};
+use palpate_tables::export::{
+    ExtraColumns, SampleSelection, TableExport, TableFormat, dictionary_path,
+};
 use palpate_tables::{ExportError, read_table};
-use palpate_test_support::skip::{self, Need, skip};
+use palpate_test_support::skip::{self, TestNeed, skip};
 use polars_io::prelude::{ParquetReader, SerReader};
 use std::path::Path;
 use std::process::Command;
 
-const CSV: Format = Format::Csv(b',');
+const CSV: TableFormat = TableFormat::Csv(b',');
 
 fn export(
     session: &Session,
-    format: Format,
-    selection: &Selection,
+    format: TableFormat,
+    selection: &SampleSelection,
     path: &Path,
 ) -> Result<u64, ExportError> {
-    let table = Table {
+    let table = TableExport {
         manifest: &session.manifest,
         notes: &session.notes,
-        beside: &Beside::default(),
+        extra: &ExtraColumns::default(),
         selection,
     };
     table.write(format, path, &mut |visit| {
@@ -45,7 +47,7 @@ fn csv_holds_every_digit_and_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.csv");
     let session = session();
-    assert_eq!(export(&session, CSV, &Selection::default(), &path).unwrap(), 3000);
+    assert_eq!(export(&session, CSV, &SampleSelection::default(), &path).unwrap(), 3000);
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(lines.next(), Some("t_s,depth_mm,force_N,signal_V,counts,pulses,phase,cycle"));
@@ -85,8 +87,8 @@ fn parquet_holds_the_same_with_units() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.parquet");
     let session = session();
-    let all = Selection::default();
-    export(&session, Format::Parquet, &all, &path).unwrap();
+    let all = SampleSelection::default();
+    export(&session, TableFormat::Parquet, &all, &path).unwrap();
     assert_eq!(value_of_hash(&session).len(), 64);
     let mut reader = ParquetReader::new(std::fs::File::open(&path).unwrap());
     let metadata = reader.get_metadata().unwrap().clone();
@@ -140,7 +142,7 @@ fn python(script: &str, path: &Path) -> Option<serde_json::Value> {
     let output = run.unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     if let Some(package) = text.trim().strip_prefix("no ") {
-        skip(Need::Python(package), "python3 does not import it");
+        skip(TestNeed::Python(package), "python3 does not import it");
         return None;
     }
     let found = serde_json::from_str(&text);
@@ -217,10 +219,10 @@ fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
     for (name, format) in
-        [("one.csv", CSV), ("one.parquet", Format::Parquet), ("one.arrow", Format::Arrow)]
+        [("one.csv", CSV), ("one.parquet", TableFormat::Parquet), ("one.arrow", TableFormat::Arrow)]
     {
         let path = folder.path().join(name);
-        let all = Selection::default();
+        let all = SampleSelection::default();
         std::fs::write(&path, "mine").unwrap();
         let refusal = export(&session, format, &all, &path).unwrap_err();
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
@@ -249,48 +251,50 @@ fn cells(path: &Path) -> Vec<Vec<String>> {
 fn a_selection_is_what_a_plain_filter_finds() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    let found = |selection: &Selection, name: &str| -> Vec<usize> {
+    let found = |selection: &SampleSelection, name: &str| -> Vec<usize> {
         let path = folder.path().join(selection.file_name(name, "csv"));
         let written = export(&session, CSV, selection, &path).unwrap();
         let cells = cells(&path);
         assert_eq!(cells.len() as u64, written);
         cells.iter().map(|row| row[0].parse().unwrap()).collect()
     };
-    let filtered = |takes: &dyn Fn(usize, &Row) -> bool| -> Vec<usize> {
+    let filtered = |takes: &dyn Fn(usize, &SampleRow) -> bool| -> Vec<usize> {
         let rows = session.rows.iter().enumerate();
         rows.filter(|(i, row)| takes(*i, row)).map(|(i, _)| i).collect()
     };
-    let numbers =
-        Selection { columns: vec!["sample".into(), "force_N".into()], ..Selection::default() };
+    let numbers = SampleSelection {
+        columns: vec!["sample".into(), "force_N".into()],
+        ..SampleSelection::default()
+    };
     let phases = [session.rows[10].phase, session.rows[2000].phase];
-    let by_phase = Selection { phases: phases.into(), ..numbers.clone() };
+    let by_phase = SampleSelection { phases: phases.into(), ..numbers.clone() };
     let expected = filtered(&|_, row| phases.contains(&row.phase));
     assert!(!expected.is_empty() && expected.len() < 3000);
     assert_eq!(found(&by_phase, "phase"), expected);
 
     let cycle = session.rows[1500].cycle;
-    let by_cycle = Selection { cycles: vec![cycle], ..numbers.clone() };
+    let by_cycle = SampleSelection { cycles: vec![cycle], ..numbers.clone() };
     let expected = filtered(&|_, row| row.cycle == cycle);
     assert!(!expected.is_empty() && expected.len() < 3000);
     assert_eq!(found(&by_cycle, "cycle"), expected);
 
     let (from, to) = (time_of(&session, 700), time_of(&session, 2100));
-    let by_time = Selection { from_s: Some(from), to_s: Some(to), ..numbers.clone() };
+    let by_time = SampleSelection { from_s: Some(from), to_s: Some(to), ..numbers.clone() };
     let within = |i: usize| (from..=to).contains(&time_of(&session, i));
     assert_eq!(found(&by_time, "time"), filtered(&|i, _| within(i)));
 
     // Thinned after the selection, and the name and the first column say so.
-    let thinned = Selection { every: Some(7), ..by_time };
+    let thinned = SampleSelection { every: Some(7), ..by_time };
     let expected: Vec<usize> = filtered(&|i, _| within(i)).into_iter().step_by(7).collect();
     assert_eq!(found(&thinned, "thin"), expected);
     let text = std::fs::read_to_string(folder.path().join("thin.every7.csv")).unwrap();
     assert!(text.starts_with("sample_every_7,sample,force_N\n"), "{text:.60}");
 
-    let nothing = Selection { from_s: Some(1e9), ..numbers };
+    let nothing = SampleSelection { from_s: Some(1e9), ..numbers };
     assert_eq!(found(&nothing, "nothing"), [0usize; 0]);
     let text = std::fs::read_to_string(folder.path().join("nothing.csv")).unwrap();
     assert_eq!(text, "sample,force_N\n");
-    let unknown = Selection { columns: vec!["force".into()], ..Selection::default() };
+    let unknown = SampleSelection { columns: vec!["force".into()], ..SampleSelection::default() };
     let path = folder.path().join("unknown.csv");
     let refusal = export(&session, CSV, &unknown, &path).unwrap_err();
     assert!(refusal.to_string().contains("force_N"), "{refusal}");
@@ -314,13 +318,13 @@ fn text_that_looks_like_a_formula_is_harmless_and_numbers_stay_numbers() {
         ("liver 3", "liver 3"),
     ] {
         session.manifest.specimen = hostile.into();
-        let selection = Selection {
+        let selection = SampleSelection {
             columns: vec!["specimen".into(), "force_N".into()],
             from_s: Some(time_of(&session, 1)),
-            ..Selection::default()
+            ..SampleSelection::default()
         };
         let path = folder.path().join("one.csv");
-        export(&session, Format::Csv(b';'), &selection, &path).unwrap();
+        export(&session, TableFormat::Csv(b';'), &selection, &path).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text, format!("specimen;force_N\n{expected};-1.5\n"));
         std::fs::remove_file(dictionary_path(&path)).unwrap();
@@ -334,13 +338,13 @@ fn dictionary_describes_every_column_of_the_table() {
     let mut session = session();
     session.notes.push("a | b\nc".into());
     for (name, selection) in [
-        ("all.csv", Selection::default()),
+        ("all.csv", SampleSelection::default()),
         (
             "some.csv",
-            Selection {
+            SampleSelection {
                 columns: vec!["status".into(), "t_s".into()],
                 every: Some(100),
-                ..Selection::default()
+                ..SampleSelection::default()
             },
         ),
     ] {
@@ -380,13 +384,13 @@ print(json.dumps([t.num_rows, t.column_names, json.loads(m[b'palpate.columns'])[
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.arrow");
     let session = session();
-    export(&session, Format::Arrow, &Selection::default(), &path).unwrap();
+    export(&session, TableFormat::Arrow, &SampleSelection::default(), &path).unwrap();
     let Some(found) = python(SCRIPT, &path) else {
         return;
     };
     fn each<T: serde::Serialize>(
         session: &Session,
-        of: impl Fn(usize, &Row) -> T,
+        of: impl Fn(usize, &SampleRow) -> T,
     ) -> serde_json::Value {
         let rows = session.rows.iter().enumerate();
         let all: Vec<T> = rows.map(|(i, row)| of(i, row)).collect();

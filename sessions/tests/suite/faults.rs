@@ -1,9 +1,11 @@
 use crate::support::{MemorySink, end, manifest, open_bytes, rows, same_bits};
 use palpate_model::Nanos;
-use palpate_sessions::{LogError, LogWriter, Pace, Row, SessionFolder, SessionWriter};
+use palpate_sessions::{
+    LogError, LogWriter, RecordingPace, SampleRow, SessionFolder, SessionWriter,
+};
 
 /// Writes ten batches, syncing after each. Returns how many batches were reported as saved.
-fn write_until_failure(sink: MemorySink, rows: &[Row]) -> (usize, Result<(), LogError>) {
+fn write_until_failure(sink: MemorySink, rows: &[SampleRow]) -> (usize, Result<(), LogError>) {
     let mut log = match LogWriter::begin(sink, "/data/000.mcap", &manifest()) {
         Ok(log) => log,
         Err(err) => return (0, Err(err)),
@@ -70,7 +72,7 @@ fn whatever_operation_fails_all_that_was_reported_saved_is_there() {
 
 #[test]
 fn the_thread_reports_its_failure_on_the_next_push_and_on_close() {
-    for pace in [Pace::Virtual, Pace::Real] {
+    for pace in [RecordingPace::Virtual, RecordingPace::Real] {
         let sink = MemorySink::default();
         sink.0.lock().unwrap().fail_at = Some(5);
         let mut writer =
@@ -102,7 +104,7 @@ fn a_folder_that_cannot_be_written_refuses_the_start() {
     let folder = SessionFolder::create(parent.path()).unwrap();
     // A log that appears in the locked folder is not overwritten.
     std::fs::write(parent.path().join("000.mcap"), "precious").unwrap();
-    let refusal = SessionWriter::start(folder, None, &manifest(), Pace::Virtual);
+    let refusal = SessionWriter::start(folder, None, &manifest(), RecordingPace::Virtual);
     let text = refusal.err().unwrap().to_string();
     assert!(text.contains("File exists"), "{text}");
     let bytes = std::fs::read(parent.path().join("000.mcap")).unwrap();

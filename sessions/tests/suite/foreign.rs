@@ -3,23 +3,23 @@
 //! The numbers are known by construction; the layouts are those cited in `docs/guide/import.md`.
 
 use chrono::{TimeZone, Utc};
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::Phase;
 use palpate_sessions::{FolderError, ORIGINAL_FOLDER, Session};
 use palpate_tables::import::{
-    Foreign, ForeignPart, ForeignSample, KeepError, Kept, Told, folder_name, keep, open_foreign,
-    parse_foreign,
+    ForeignFile, ForeignPart, ForeignSample, ImportOptions, ImportTarget, StoreImportError,
+    folder_name, open_foreign, parse_foreign, store_import,
 };
 use palpate_test_support::skip;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-fn detect_all() -> Told {
-    Told::default()
+fn detect_all() -> ImportOptions {
+    ImportOptions::default()
 }
 
 /// Options as on the command line.
-fn parse_options(options: &[(&str, &str)]) -> Told {
+fn parse_options(options: &[(&str, &str)]) -> ImportOptions {
     let mut result = detect_all();
     for (option, value) in options {
         let text = *value;
@@ -40,12 +40,12 @@ fn parse_options(options: &[(&str, &str)]) -> Told {
     result
 }
 
-fn read(text: &str, options: &Told) -> Foreign {
+fn read(text: &str, options: &ImportOptions) -> ForeignFile {
     parse_foreign("file.txt", text.as_bytes().to_vec(), options)
         .unwrap_or_else(|reason| panic!("{reason}\n{text}"))
 }
 
-fn refused(text: &str, options: &Told) -> String {
+fn refused(text: &str, options: &ImportOptions) -> String {
     match parse_foreign("file.txt", text.as_bytes().to_vec(), options) {
         Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
         Err(reason) => reason,
@@ -136,7 +136,7 @@ fn options_override_detection() {
     assert_eq!(read_bare(&numbered), expected);
 }
 
-fn read_one(text: &str, options: &Told) -> ForeignPart {
+fn read_one(text: &str, options: &ImportOptions) -> ForeignPart {
     read(text, options).parts.remove(0)
 }
 
@@ -330,15 +330,15 @@ fn import_makes_a_session_and_stores_the_original() {
     assert_eq!(name, "Gel-3--first--Stress-Relaxation-1-ramp-2");
     let at = folder.path().join(name);
     let make = || {
-        let target = Kept {
+        let target = ImportTarget {
             folder: &at,
             original: &original,
             session_id: "20260305T141507Z-0badcafe".into(),
             at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
             software_version: "0.1.0",
-            labels: Labels { specimen: "gel 3".into(), ..Labels::default() },
+            labels: SessionLabels { specimen: "gel 3".into(), ..SessionLabels::default() },
         };
-        keep(part, target)
+        store_import(part, target)
     };
     make().unwrap();
     assert_eq!(
@@ -360,7 +360,7 @@ fn import_makes_a_session_and_stores_the_original() {
         );
         assert_eq!(session.manifest.time_of(row.tick as i64).0.to_bits(), sample.t.to_bits());
     }
-    assert!(matches!(make(), Err(KeepError::Folder(FolderError::NotEmpty { .. }))));
+    assert!(matches!(make(), Err(StoreImportError::Folder(FolderError::NotEmpty { .. }))));
 }
 
 #[test]
@@ -371,15 +371,15 @@ fn times_that_no_session_holds_are_refused() {
         ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "picosecond"),
     ] {
         let part = read_one(text, &detect_all());
-        let target = Kept {
+        let target = ImportTarget {
             folder: &folder.path().join("no"),
             original: text.as_bytes(),
             session_id: "id".into(),
             at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
             software_version: "0.1.0",
-            labels: Labels::default(),
+            labels: SessionLabels::default(),
         };
-        let refusal = keep(&part, target).unwrap_err().to_string();
+        let refusal = store_import(&part, target).unwrap_err().to_string();
         assert!(refusal.contains(expected), "{refusal}");
         assert!(!folder.path().join("no").exists());
     }

@@ -1,15 +1,16 @@
 //! Raw data of Instron's Bluehill: the layouts are those of public files (`docs/guide/import.md`), the numbers are known
 //! by construction.
 
-use palpate_tables::import::{Foreign, Told, parse_foreign};
+use palpate_tables::import::{ForeignFile, ImportOptions, parse_foreign};
 use std::fmt::Write;
 
-fn read(text: &str, options: &Told) -> Result<Foreign, String> {
+fn read(text: &str, options: &ImportOptions) -> Result<ForeignFile, String> {
     parse_foreign("Specimen_RawData_1.csv", text.as_bytes().to_vec(), options)
 }
 
-fn detected(text: &str) -> Foreign {
-    let read = read(text, &Told::default()).unwrap_or_else(|reason| panic!("{reason}\n{text}"));
+fn detected(text: &str) -> ForeignFile {
+    let read =
+        read(text, &ImportOptions::default()).unwrap_or_else(|reason| panic!("{reason}\n{text}"));
     let layout = &read.parts[0].imported.readings[0];
     assert_eq!(
         (layout.what.as_str(), layout.found.as_str(), layout.how.as_str()),
@@ -19,7 +20,8 @@ fn detected(text: &str) -> Foreign {
 }
 
 fn refused(text: &str) -> String {
-    let options = Told { format: Some("bluehill".parse().unwrap()), ..Told::default() };
+    let options =
+        ImportOptions { format: Some("bluehill".parse().unwrap()), ..ImportOptions::default() };
     match read(text, &options) {
         Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
         Err(reason) => reason,
@@ -27,17 +29,17 @@ fn refused(text: &str) -> String {
 }
 
 /// Time in s, depth in mm and force in N of a part.
-fn numbers(read: &Foreign, part: usize) -> Vec<[f64; 3]> {
+fn numbers(read: &ForeignFile, part: usize) -> Vec<[f64; 3]> {
     let samples = &read.parts[part].samples;
     let one = |i: usize| [samples[i].t, samples[i].depth.unwrap(), samples[i].force.unwrap()];
     (0..samples.len()).map(one).collect()
 }
 
-fn names(read: &Foreign) -> Vec<&str> {
+fn names(read: &ForeignFile) -> Vec<&str> {
     read.parts.iter().map(|part| part.imported.part.as_str()).collect()
 }
 
-fn fact<'a>(read: &'a Foreign, part: usize, key: &str) -> Option<&'a str> {
+fn fact<'a>(read: &'a ForeignFile, part: usize, key: &str) -> Option<&'a str> {
     let facts = &read.parts[part].imported.facts;
     let found = facts.iter().find(|(one, _)| one == key);
     found.map(|(_, value)| value.as_str())
@@ -98,7 +100,7 @@ fn specimens_of_one_file_are_parts_of_their_own() {
     assert_eq!(numbers(&read, 1), expected(7));
     assert_eq!(numbers(&read, 2), expected(2));
     assert_eq!(numbers(&read, 4), [[0.0, 1.0, 2.0], [1.0, 2.0, 3.0]]);
-    let options = Told { parts: vec!["b".into()], ..Told::default() };
+    let options = ImportOptions { parts: vec!["b".into()], ..ImportOptions::default() };
     assert_eq!(names(&self::read(&text, &options).unwrap()), ["b"]);
 }
 
@@ -128,13 +130,15 @@ fn results_are_facts_and_units_may_stand_behind_names() {
 #[test]
 fn extension_and_its_compressive_twin_are_a_question() {
     let twins = "Time,Extension,Compressive extension,Compressive load\n(s),(mm),(mm),(N)\n0,0,0,1\n1,-1,1,2\n";
-    let reason = read(twins, &Told::default()).unwrap_err();
+    let reason = read(twins, &ImportOptions::default()).unwrap_err();
     assert!(
         reason.contains("columns 'Extension' and 'Compressive extension' could both be the depth"),
         "{reason}"
     );
-    let options =
-        Told { columns: vec!["depth=Compressive extension".parse().unwrap()], ..Told::default() };
+    let options = ImportOptions {
+        columns: vec!["depth=Compressive extension".parse().unwrap()],
+        ..ImportOptions::default()
+    };
     let read = read(twins, &options).unwrap();
     assert_eq!(numbers(&read, 0), [[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]]);
 }
@@ -172,7 +176,7 @@ fn damaged_files_are_refused_with_the_line() {
         assert!(reason.contains(expected), "{reason}\n{text}");
         // A file with a fact of Bluehill's is never read as a plain table.
         if text.contains(" : ") && !expected.contains("units") && !expected.contains("names") {
-            assert_eq!(read(&text, &Told::default()).unwrap_err(), reason);
+            assert_eq!(read(&text, &ImportOptions::default()).unwrap_err(), reason);
         }
     }
 }
@@ -183,7 +187,7 @@ fn a_file_cut_off_anywhere_is_refused_or_has_what_is_left() {
     let whole = detected(&text);
     let all: Vec<_> = (0..2).flat_map(|part| numbers(&whole, part)).collect();
     for length in 0..text.len() {
-        let Ok(part) = read(&text[..length], &Told::default()) else {
+        let Ok(part) = read(&text[..length], &ImportOptions::default()) else {
             continue;
         };
         let parts = part.parts.len();
@@ -197,6 +201,6 @@ fn a_file_cut_off_anywhere_is_refused_or_has_what_is_left() {
 #[test]
 fn tables_with_units_in_brackets_stay_tables() {
     let text = "my own remark\nTime,Extension,Load\n(s),(mm),(N)\n0,1,2\n1,2,3\n";
-    let read = read(text, &Told::default()).unwrap();
+    let read = read(text, &ImportOptions::default()).unwrap();
     assert_eq!(read.parts[0].imported.format, "table");
 }

@@ -3,7 +3,7 @@
 use crate::hostile::limit_memory;
 use crate::support::{put, quick_folder};
 use crate::worker::{command, reported_numbers};
-use palpate_tables::import::{Told, parse_foreign};
+use palpate_tables::import::{ImportOptions, parse_foreign};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -40,7 +40,7 @@ fn xlsx_with(name: &str, content: &mut dyn FnMut(&mut dyn Write)) -> Vec<u8> {
 }
 
 fn reason_of(bytes: Vec<u8>) -> String {
-    parse_foreign("bomb", bytes, &Told::default()).unwrap_err()
+    parse_foreign("bomb", bytes, &ImportOptions::default()).unwrap_err()
 }
 
 #[test]
@@ -151,7 +151,7 @@ pub fn read_workbook(folder: &Path) {
     let path = folder.join("book.xlsx");
     limit_memory(64 << 20);
     let bytes = fs::read(&path).unwrap();
-    let read = parse_foreign("book.xlsx", bytes, &Told::default()).unwrap();
+    let read = parse_foreign("book.xlsx", bytes, &ImportOptions::default()).unwrap();
     eprintln!("rows {}", read.parts[0].samples.len());
 }
 

@@ -111,7 +111,7 @@ fn check_recording(work: &Work, folder: &Path, outcome: &KillOutcome, context: &
         let copy = recover(folder, "1", chrono::DateTime::UNIX_EPOCH);
         let copy = Session::open(&copy.expect(context).folder).expect(context);
         assert!(same_bits(&copy.rows, &session.rows), "{context}");
-        assert_eq!(copy.beside, session.beside, "{context}");
+        assert_eq!(copy.auxiliary, session.auxiliary, "{context}");
     }
     let taken = outcome.taken.max(count as u64);
     (count as u64 - outcome.saved, taken - count as u64)

@@ -1,12 +1,12 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_sessions::atomic;
-use palpate_sessions::edits::Verdict;
-use palpate_sessions::{Entry, EntryKind, Outline, Session};
+use palpate_sessions::edits::DataQuality;
+use palpate_sessions::{EntryKind, LogEntry, Session, SessionOutline};
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
-    Added, FitFile, FitState, LakeError, Told, add, is_lake, keep_fit, read_session, sessions,
-    state_of_fit,
+    FitFile, FitState, LakeAddition, LakeError, LakeQuality, add_session, find_fit, is_lake,
+    list_sessions, read_session, store_fit,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,14 +19,14 @@ fn session() -> Session {
     rows[8].pulses = None;
     rows[9].force = Some(-0.0);
     let entries = [
-        Entry {
+        LogEntry {
             kind: EntryKind::Input,
             order: 0,
             after_sample: 3,
             now: Nanos(17),
             body: serde_json::json!({"start": 0.1 + 0.2, "why": "µ \"q\"\n"}),
         },
-        Entry {
+        LogEntry {
             kind: EntryKind::Decision,
             order: 1,
             after_sample: 4,
@@ -37,17 +37,17 @@ fn session() -> Session {
     open_bytes(&log_bytes(&rows, &entries, Some(end(Nanos(5_000_000_000))))).unwrap()
 }
 
-fn put(lake: &Path, session: &Session, quality: Told) -> Result<Added, ExportError> {
-    let outline = Outline {
+fn put(lake: &Path, session: &Session, quality: LakeQuality) -> Result<LakeAddition, ExportError> {
+    let outline = SessionOutline {
         path: session.path.clone(),
         manifest: session.manifest.clone(),
         samples: session.rows.len() as u64,
         entries: session.entries.clone(),
         end: session.end.clone(),
         notes: session.notes.clone(),
-        beside: session.beside.clone(),
+        auxiliary: session.auxiliary.clone(),
     };
-    add(lake, &outline, quality, &mut |visit| {
+    add_session(lake, &outline, quality, &mut |visit| {
         visit(&session.rows);
         Ok(())
     })
@@ -65,9 +65,9 @@ fn a_session_comes_out_of_a_lake_as_it_went_in() {
     let lake = folder.path();
     let session = session();
     assert!(!is_lake(lake));
-    assert!(matches!(sessions(lake), Err(LakeError::NoLake { .. })));
-    let verdict = Some((Verdict::Rejected, "slipped"));
-    let added = put(lake, &session, Told { verdict }).unwrap();
+    assert!(matches!(list_sessions(lake), Err(LakeError::NoLake { .. })));
+    let verdict = Some((DataQuality::Rejected, "slipped"));
+    let added = put(lake, &session, LakeQuality { quality: verdict }).unwrap();
     assert!(!added.was_there);
     let id = &session.manifest.session_id;
     let expected = [
@@ -81,7 +81,7 @@ fn a_session_comes_out_of_a_lake_as_it_went_in() {
     assert_eq!(files(lake), expected);
     assert_eq!(added.samples, expected[2]);
 
-    let listed = sessions(lake).unwrap();
+    let listed = list_sessions(lake).unwrap();
     assert_eq!(listed.len(), 1);
     assert_eq!(listed[0].id, *id);
     let (mut back, rejection) = read_session(lake, &listed[0]).unwrap();
@@ -97,18 +97,18 @@ fn files_of_a_lake_never_change() {
     let folder = tempfile::tempdir().unwrap();
     let lake = folder.path();
     let session = session();
-    put(lake, &session, Told::default()).unwrap();
+    put(lake, &session, LakeQuality::default()).unwrap();
     let before: Vec<Vec<u8>> = files(lake).iter().map(|path| fs::read(path).unwrap()).collect();
     // What a killed writer left.
     let samples = &files(lake)[2];
     let name = samples.file_name().unwrap().to_string_lossy();
     let abandoned = samples.with_file_name(format!(".{name}.abcdef.palpate.tmp"));
     fs::write(&abandoned, vec![7; 1 << 20]).unwrap();
-    assert!(put(lake, &session, Told::default()).unwrap().was_there);
-    assert_eq!(atomic::sweep(lake, usize::MAX), [abandoned]);
+    assert!(put(lake, &session, LakeQuality::default()).unwrap().was_there);
+    assert_eq!(atomic::remove_leftovers(lake, usize::MAX), [abandoned]);
     let mut other = session.clone();
     other.rows[100].force = Some(1.0);
-    let refusal = put(lake, &other, Told::default()).unwrap_err();
+    let refusal = put(lake, &other, LakeQuality::default()).unwrap_err();
     assert!(matches!(refusal, ExportError::Different { .. }), "{refusal}");
     let after: Vec<Vec<u8>> = files(lake).iter().map(|path| fs::read(path).unwrap()).collect();
     assert!(before == after, "something changed or was left behind");
@@ -120,11 +120,11 @@ fn a_name_or_a_rig_never_leads_out_of_the_lake() {
     let lake = folder.path().join("lake");
     let mut session = session();
     session.manifest.rig.as_mut().unwrap().name = "../../Rig 1".into();
-    put(&lake, &session, Told::default()).unwrap();
-    assert_eq!(sessions(&lake).unwrap().len(), 1);
+    put(&lake, &session, LakeQuality::default()).unwrap();
+    assert_eq!(list_sessions(&lake).unwrap().len(), 1);
     assert!(files(&lake)[0].to_string_lossy().contains("rig=..%2F..%2FRig%201/"));
     session.manifest.session_id = "../../evil".into();
-    let refusal = put(&lake, &session, Told::default()).unwrap_err();
+    let refusal = put(&lake, &session, LakeQuality::default()).unwrap_err();
     assert!(matches!(refusal, ExportError::BadName { .. }), "{refusal}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
@@ -133,8 +133,8 @@ fn a_name_or_a_rig_never_leads_out_of_the_lake() {
 fn a_damaged_lake_is_refused_in_words() {
     let folder = tempfile::tempdir().unwrap();
     let lake = folder.path();
-    put(lake, &session(), Told::default()).unwrap();
-    let one = sessions(lake).unwrap().remove(0);
+    put(lake, &session(), LakeQuality::default()).unwrap();
+    let one = list_sessions(lake).unwrap().remove(0);
     let files = files(lake);
     assert!(files.len() >= 2, "{files:?}");
     for file in files {
@@ -163,14 +163,14 @@ fn a_fit_is_kept_once_and_made_with_other_settings_refused() {
         session_id: "20260305T141507Z-0badcafe",
         settings: &settings,
     };
-    assert_eq!(state_of_fit(&file).unwrap(), FitState::Missing);
-    keep_fit(&file, &serde_json::json!({"r2": 0.5})).unwrap();
-    assert_eq!(state_of_fit(&file).unwrap(), FitState::There);
+    assert_eq!(find_fit(&file).unwrap(), FitState::Missing);
+    store_fit(&file, &serde_json::json!({"r2": 0.5})).unwrap();
+    assert_eq!(find_fit(&file).unwrap(), FitState::There);
     let path = folder.path().join("v1/fits/model=kelvin%2F3/20260305T141507Z-0badcafe.json");
     assert_eq!(files(folder.path()), [path]);
     let other = FitFile { settings: &others, ..file };
-    assert!(matches!(state_of_fit(&other), Err(ExportError::Different { .. })));
-    assert!(keep_fit(&other, &serde_json::json!({"r2": 0.5})).is_err());
+    assert!(matches!(find_fit(&other), Err(ExportError::Different { .. })));
+    assert!(store_fit(&other, &serde_json::json!({"r2": 0.5})).is_err());
     let evil = FitFile { session_id: "../evil", ..file };
-    assert!(matches!(keep_fit(&evil, &1), Err(ExportError::BadName { .. })));
+    assert!(matches!(store_fit(&evil, &1), Err(ExportError::BadName { .. })));
 }

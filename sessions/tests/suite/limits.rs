@@ -8,8 +8,8 @@ use crate::worker::{Work, command, reported_numbers};
 use palpate_model::Nanos;
 use palpate_sessions::recover::recovered_folder;
 use palpate_sessions::{
-    Catalog, FolderError, LOG_FILE, LockError, Notice, Pace, Session, SessionFolder, SessionWriter,
-    segment_file,
+    Catalog, FolderError, LOG_FILE, LockError, LogNotice, RecordingPace, Session, SessionFolder,
+    SessionWriter, segment_file,
 };
 use palpate_test_support::skip::{CAN_MOUNT, lacks_command};
 use std::fs;
@@ -24,7 +24,8 @@ pub fn record_with_spare(folder: &Path, samples: usize) {
     // On the disk of the system, whatever is full here.
     let spare = tempfile::tempdir().unwrap();
     let mut writer =
-        SessionWriter::start(held, Some(spare.path()), &manifest(), Pace::Virtual).unwrap();
+        SessionWriter::start(held, Some(spare.path()), &manifest(), RecordingPace::Virtual)
+            .unwrap();
     let mut pending = work.entries.iter().peekable();
     for (number, row) in work.rows.iter().enumerate() {
         while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
@@ -36,10 +37,10 @@ pub fn record_with_spare(folder: &Path, samples: usize) {
             std::thread::sleep(std::time::Duration::from_millis(1500));
         }
     }
-    let news = writer.news();
+    let news = writer.notices();
     writer.close(end(Nanos::from_millis(samples as u64))).unwrap();
     for notice in news.take() {
-        let Notice::Moved { reason, is_last, .. } = &notice else {
+        let LogNotice::Moved { reason, is_last, .. } = &notice else {
             panic!("{notice}");
         };
         eprintln!("moved {}\nreason {reason}", u8::from(*is_last));
@@ -55,7 +56,7 @@ pub fn record_with_spare(folder: &Path, samples: usize) {
 pub fn record_in_little_memory(folder: &Path, samples: usize) {
     let work = Work::new(samples);
     let held = SessionFolder::create(&folder.join("one")).unwrap();
-    let mut writer = SessionWriter::start(held, None, &manifest(), Pace::Virtual).unwrap();
+    let mut writer = SessionWriter::start(held, None, &manifest(), RecordingPace::Virtual).unwrap();
     limit_memory(60 << 20);
     for row in &work.rows {
         writer.push_row(*row).unwrap();

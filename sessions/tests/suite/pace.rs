@@ -1,6 +1,6 @@
 use crate::support::{MemorySink, end, entries, manifest, open_bytes, rows, same_bits};
 use palpate_model::Nanos;
-use palpate_sessions::{LogError, Notice, Pace, SessionWriter, Sink};
+use palpate_sessions::{LogError, LogNotice, RecordingPace, SessionWriter, Sink};
 use std::io;
 use std::sync::{Arc, Mutex};
 
@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex};
 fn at_virtual_pace_no_more_than_two_batches_are_at_risk() {
     let sink = MemorySink::default();
     let mut writer =
-        SessionWriter::start_on(sink.clone(), "memory", &manifest(), Pace::Virtual).unwrap();
+        SessionWriter::start_on(sink.clone(), "memory", &manifest(), RecordingPace::Virtual)
+            .unwrap();
     let rows = rows(3000, 31);
     for (i, row) in rows.iter().enumerate() {
         writer.push_row(*row).unwrap();
@@ -36,7 +37,8 @@ fn at_virtual_pace_no_more_than_two_batches_are_at_risk() {
 fn entries_without_samples_are_saved_by_ticks() {
     let sink = MemorySink::default();
     let mut writer =
-        SessionWriter::start_on(sink.clone(), "memory", &manifest(), Pace::Virtual).unwrap();
+        SessionWriter::start_on(sink.clone(), "memory", &manifest(), RecordingPace::Virtual)
+            .unwrap();
     let mut entry = entries(&rows(20, 32), 10).remove(0);
     entry.now = Nanos::from_millis(40);
     writer.push_entry(entry.clone()).unwrap();
@@ -78,7 +80,8 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     let gate = Arc::new(Mutex::new(()));
     let inner = MemorySink::default();
     let sink = StuckSink { inner: inner.clone(), gate: Arc::clone(&gate) };
-    let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
+    let mut writer =
+        SessionWriter::start_on(sink, "memory", &manifest(), RecordingPace::Real).unwrap();
     let rows = rows(40_000, 33);
     let stuck = gate.lock().unwrap();
     let mut notices = Vec::new();
@@ -97,7 +100,7 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     }
     let failed_at = failed_at.unwrap();
     // Once each, and the second while there is still room for the end of the run.
-    let [(Notice::Slow, slow_at), (Notice::TooSlow, too_slow_at)] = notices[..] else {
+    let [(LogNotice::Slow, slow_at), (LogNotice::TooSlow, too_slow_at)] = notices[..] else {
         panic!("{notices:?}");
     };
     assert!((14.0..16.5).contains(&slow_at), "{slow_at}");

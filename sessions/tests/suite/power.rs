@@ -9,7 +9,8 @@ use crate::support::{
 use palpate_model::Nanos;
 use palpate_sessions::recover::{Salvage, recover, salvage};
 use palpate_sessions::{
-    Entry, EntryKind, LogError, LogWriter, Pace, Parts, ReadError, Row, Session, SessionWriter,
+    EntryKind, LogBatch, LogEntry, LogError, LogWriter, ReadError, RecordingPace, SampleRow,
+    Session, SessionWriter,
 };
 use std::path::Path;
 
@@ -19,15 +20,15 @@ const BATCH: usize = 100;
 const BATCHES_PER_SYNC: usize = 9;
 
 pub struct Recording {
-    pub rows: Vec<Row>,
-    pub entries: Vec<Entry>,
+    pub rows: Vec<SampleRow>,
+    pub entries: Vec<LogEntry>,
     pub trace: Vec<Traced>,
 }
 
 impl Recording {
     pub fn new(samples: usize, seed: u64) -> Self {
         let rows = rows(samples, seed);
-        // Answers of the live fit, which wait for the next synchronisation, and a few events, which do not.
+        // PromptResponder of the live fit, which wait for the next synchronisation, and a few events, which do not.
         let mut entries = entries(&rows, 130);
         for (number, entry) in entries.iter_mut().enumerate() {
             if number % 13 != 5 {
@@ -51,7 +52,7 @@ impl Recording {
         let mut log = LogWriter::begin_in_segments(source, batches_per_segment, &manifest())?;
         disk.tell(0);
         let raw: Vec<_> = self.rows.chunks(BATCH).map(raw_of).collect();
-        let mut since_sync: Vec<Parts<'_>> = Vec::new();
+        let mut since_sync: Vec<LogBatch<'_>> = Vec::new();
         let mut rest = &self.entries[..];
         for (number, batch) in self.rows.chunks(BATCH).enumerate() {
             // While this one is written, the next is taken.
@@ -60,10 +61,10 @@ impl Recording {
             let (due, later) =
                 rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
             rest = later;
-            let parts = Parts { rows: batch, entries: due, raw: &raw[number], health: &[] };
+            let parts = LogBatch { rows: batch, entries: due, raw: &raw[number], health: &[] };
             since_sync.push(parts);
             let is_event = due.iter().any(|entry| entry.kind != EntryKind::Fit);
-            let mut outcome = log.append_parts(&parts);
+            let mut outcome = log.append_batch(&parts);
             if outcome.is_ok() && (is_event || since_sync.len() >= BATCHES_PER_SYNC) {
                 outcome = log.sync();
                 if outcome.is_err() {
@@ -94,7 +95,7 @@ impl Recording {
             disk.clone(),
             batches_per_segment,
             &manifest(),
-            Pace::Virtual,
+            RecordingPace::Virtual,
         )
         .expect("the beginning does not fail");
         let mut pending = self.entries.iter().peekable();
@@ -103,7 +104,7 @@ impl Recording {
             while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
                 // Were they answers of the fit, nothing would be synchronised before a second has passed.
                 let kind = EntryKind::Input;
-                let entry = Entry { kind, ..entry.clone() };
+                let entry = LogEntry { kind, ..entry.clone() };
                 writer.push_entry(entry).expect("it goes on elsewhere");
             }
             let raw = raw_of(std::slice::from_ref(row));
@@ -170,7 +171,7 @@ impl Recording {
         let mut remaining = 0;
         let salvage = salvage(folder, &mut |block| {
             let first = block.first_sample() as usize;
-            let found: Vec<Row> = block.rows().collect();
+            let found: Vec<SampleRow> = block.rows().collect();
             let there = &self.rows[first..first + found.len()];
             assert!(same_bits(&found, there), "{context}");
             if first == unbroken {
@@ -182,7 +183,7 @@ impl Recording {
         let Ok(Salvage { entries, missing, .. }) = salvage else {
             return 0;
         };
-        let is_own = |entry: &Entry| self.entries.contains(entry);
+        let is_own = |entry: &LogEntry| self.entries.contains(entry);
         assert!(entries.iter().all(is_own), "{context}: wrong entries");
         let is_short = remaining < self.rows.len() || entries.len() < self.entries.len();
         assert!(!is_short || !missing.sentences().is_empty(), "{context}");

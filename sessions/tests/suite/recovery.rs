@@ -4,9 +4,10 @@ use crate::support::{Random, end, entries, log_bytes, manifest, rows, same_bits}
 use chrono::{TimeZone, Utc};
 use palpate_model::Nanos;
 use palpate_sessions::recover::{
-    Health, RecoverError, examine, examine_library, recover, recovered_folder,
+    RecoverError, SessionHealth, examine_session, find_unfinished_sessions, recover,
+    recovered_folder,
 };
-use palpate_sessions::{LOG_FILE, Pace, ReadError, Session, SessionFolder, SessionWriter};
+use palpate_sessions::{LOG_FILE, ReadError, RecordingPace, Session, SessionFolder, SessionWriter};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -38,7 +39,7 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
     let folder = session_with(library.path(), "a", &whole[..whole.len() - 77]);
     session_with(library.path(), "b", &log_bytes(&rows, &entries, Some(end(Nanos::ZERO))));
     let before = contents(&folder);
-    assert_eq!(examine_library(library.path()).unwrap(), std::slice::from_ref(&folder));
+    assert_eq!(find_unfinished_sessions(library.path()).unwrap(), std::slice::from_ref(&folder));
 
     let recovery = recover(&folder, "1.2.3", at()).unwrap();
     assert_eq!(contents(&folder), before, "the original was touched");
@@ -60,7 +61,7 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
     original.session_id = manifest().session_id;
     assert_eq!(original, manifest());
     // Found no more, and not made twice.
-    assert_eq!(examine_library(library.path()).unwrap(), Vec::<std::path::PathBuf>::new());
+    assert_eq!(find_unfinished_sessions(library.path()).unwrap(), Vec::<std::path::PathBuf>::new());
     assert!(matches!(recover(&folder, "1.2.3", at()), Err(RecoverError::Before { .. })));
 }
 
@@ -82,8 +83,9 @@ fn entries_stay_between_the_samples_they_came_between() {
         };
         let session = Session::open(&recovery.folder).unwrap();
         // Samples are known by their time, which differs between any two.
-        let number =
-            |row: &palpate_sessions::Row| rows.iter().position(|one| one.host == row.host).unwrap();
+        let number = |row: &palpate_sessions::SampleRow| {
+            rows.iter().position(|one| one.host == row.host).unwrap()
+        };
         let numbers: Vec<usize> = session.rows.iter().map(number).collect();
         assert!(numbers.is_sorted());
         for (row, number) in session.rows.iter().zip(&numbers) {
@@ -109,22 +111,23 @@ fn the_doctor_says_what_each_file_is() {
     let costs_samples = |place: &usize| {
         let mut hurt = whole.clone();
         hurt[*place] ^= 4;
-        let patient = examine(&session_with(library.path(), "try", &hurt));
+        let patient = examine_session(&session_with(library.path(), "try", &hurt));
         patient.samples < 1500
     };
     let middle = (whole.len() / 2..whole.len()).step_by(500).find(costs_samples);
     let middle = middle.expect("a byte of samples");
     let mut hurt = whole.clone();
     hurt[middle] ^= 4;
-    let health = |name: &str, bytes: &[u8]| examine(&session_with(library.path(), name, bytes));
+    let health =
+        |name: &str, bytes: &[u8]| examine_session(&session_with(library.path(), name, bytes));
 
     let patient = health("whole", &whole);
-    assert_eq!((patient.health, patient.samples), (Health::Healthy, 1500));
+    assert_eq!((patient.health, patient.samples), (SessionHealth::Healthy, 1500));
     let patient = health("open", &open);
-    assert_eq!((patient.health, patient.samples), (Health::Interrupted, 1500));
+    assert_eq!((patient.health, patient.samples), (SessionHealth::Interrupted, 1500));
     assert!(patient.findings[0].contains("interrupted at 1.5 s"), "{:?}", patient.findings);
     let patient = health("hurt", &hurt);
-    let Health::Damaged { missing } = &patient.health else { panic!("{patient:?}") };
+    let SessionHealth::Damaged { missing } = &patient.health else { panic!("{patient:?}") };
     assert_eq!(missing.gaps[0].samples + patient.samples, 1500);
     assert!(patient.findings.iter().any(|one| one.contains("000.mcap") && one.contains("byte")));
     // Where no sample is: nothing is missing, and it is still made whole again.
@@ -138,10 +141,10 @@ fn the_doctor_says_what_each_file_is() {
     let copy = recover(&library.path().join("sessions/index"), "1", at()).unwrap();
     let copy = Session::open(&copy.folder).unwrap();
     assert!(same_bits(&copy.rows, &rows) && copy.end.is_some());
-    assert_eq!(health("foreign", b"PK\x03\x04 a spreadsheet").health, Health::Foreign);
-    assert_eq!(health("empty", b"").health, Health::Foreign);
-    assert_eq!(health("begun", &whole[..60]).health, Health::Lost);
-    assert_eq!(examine(&library.path().join("nothing")).health, Health::Foreign);
+    assert_eq!(health("foreign", b"PK\x03\x04 a spreadsheet").health, SessionHealth::Foreign);
+    assert_eq!(health("empty", b"").health, SessionHealth::Foreign);
+    assert_eq!(health("begun", &whole[..60]).health, SessionHealth::Lost);
+    assert_eq!(examine_session(&library.path().join("nothing")).health, SessionHealth::Foreign);
 
     // Where nothing is, nothing is damaged, and recovery would not help.
     let hollow = library.path().join("hollow");
@@ -155,13 +158,13 @@ fn the_doctor_says_what_each_file_is() {
     // A session in use is left alone.
     let path = library.path().join("sessions/live");
     let held = SessionFolder::create(&path).unwrap();
-    let mut writer = SessionWriter::start(held, None, &manifest(), Pace::Virtual).unwrap();
+    let mut writer = SessionWriter::start(held, None, &manifest(), RecordingPace::Virtual).unwrap();
     rows.iter().for_each(|row| writer.push_row(*row).unwrap());
-    assert_eq!(examine(&path).health, Health::BeingRecorded);
+    assert_eq!(examine_session(&path).health, SessionHealth::BeingRecorded);
     assert!(matches!(recover(&path, "1", at()), Err(RecoverError::InUse { .. })));
-    assert!(!examine_library(library.path()).unwrap().contains(&path));
+    assert!(!find_unfinished_sessions(library.path()).unwrap().contains(&path));
     writer.close(end(Nanos::from_millis(1500))).unwrap();
-    assert_eq!(examine(&path).health, Health::Healthy);
+    assert_eq!(examine_session(&path).health, SessionHealth::Healthy);
     assert!(matches!(recover(&path, "1", at()), Err(RecoverError::Whole { .. })));
 }
 

@@ -4,15 +4,15 @@ use crate::support::{
 };
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
-use palpate_sessions::health::Told;
+use palpate_sessions::health::HealthContent;
 use palpate_sessions::{
-    FolderSegments, Health, LogError, LogWriter, MachineState, Pace, Part, ReadError, Session,
-    SessionFolder, SessionWriter,
+    FolderSegments, HealthMessage, LogError, LogPart, LogWriter, MachineState, ReadError,
+    RecordingPace, Session, SessionFolder, SessionWriter,
 };
 
 #[test]
 fn a_session_comes_back_bit_for_bit_at_either_pace() {
-    for pace in [Pace::Virtual, Pace::Real] {
+    for pace in [RecordingPace::Virtual, RecordingPace::Real] {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("sessions/one");
         let folder = SessionFolder::create(&path).unwrap();
@@ -165,9 +165,9 @@ fn what_could_not_be_read_back_is_not_written() {
 /// A log with raw bytes and health: at either pace, over several segments, by folder and by file.
 #[test]
 fn raw_bytes_and_health_come_back_at_either_pace() {
-    let health = |now: Nanos, lateness_s: f64| Health {
+    let health = |now: Nanos, lateness_s: f64| HealthMessage {
         now,
-        told: Told::State(MachineState {
+        content: HealthContent::State(MachineState {
             lateness_s,
             queue_share: 0.25,
             sync_s: Some(0.004),
@@ -175,7 +175,7 @@ fn raw_bytes_and_health_come_back_at_either_pace() {
             missed_readings: 1,
         }),
     };
-    for pace in [Pace::Virtual, Pace::Real] {
+    for pace in [RecordingPace::Virtual, RecordingPace::Real] {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("one");
         let _held = SessionFolder::create(&path).unwrap();
@@ -200,21 +200,21 @@ fn raw_bytes_and_health_come_back_at_either_pace() {
         assert_eq!(session.notes, Vec::<String>::new());
         check_raw(&read_raw(&path).unwrap(), &rows, 3000, "whole");
         let bytes: usize = raw_of(&rows).iter().map(|piece| piece.bytes.len()).sum();
-        assert_eq!(session.beside.raw_bytes, bytes as u64);
+        assert_eq!(session.auxiliary.raw_bytes, bytes as u64);
         assert_eq!(session.end.unwrap().raw_bytes, bytes as u64);
         let mut found = Vec::new();
         Session::scan_parts(&path, &mut |part| {
-            if let Part::Health(one) = part {
+            if let LogPart::Health(one) = part {
                 found.push(one.clone());
             }
         })
         .unwrap();
         assert_eq!(found, recorded);
-        let worst = session.beside.health.worst.unwrap();
+        let worst = session.auxiliary.health.worst.unwrap();
         assert_eq!((worst.lateness_s, worst.missed_readings), (2999e-6, 3));
         // A later segment alone knows what it holds.
         let part = Session::open(&path.join("001.mcap")).unwrap();
-        assert!(part.beside.raw_bytes > 0 && part.beside.raw_bytes < bytes as u64);
+        assert!(part.auxiliary.raw_bytes > 0 && part.auxiliary.raw_bytes < bytes as u64);
     }
 }
 
@@ -240,7 +240,8 @@ fn raw_bytes_count_in_the_bounded_queue() {
         }
     }
     let sink = Stuck(Some(gate), 0);
-    let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
+    let mut writer =
+        SessionWriter::start_on(sink, "memory", &manifest(), RecordingPace::Real).unwrap();
     let piece = |millis| RawBytes {
         at: Nanos::from_millis(millis),
         device: "controller".into(),
@@ -259,6 +260,6 @@ fn raw_bytes_count_in_the_bounded_queue() {
     assert!(matches!(refusal, LogError::TooSlow { .. }), "{refusal}");
     assert!((30..40).contains(&taken), "{taken}");
     let notices = writer.take_notices();
-    assert!(notices.iter().any(palpate_sessions::Notice::ends_the_run));
+    assert!(notices.iter().any(palpate_sessions::LogNotice::is_reason_to_end));
     go.send(()).unwrap();
 }

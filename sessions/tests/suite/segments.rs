@@ -4,8 +4,8 @@ use crate::support::{MemorySink, end, entries, manifest, quick_folder, rows, sam
 use palpate_model::Nanos;
 use palpate_sessions::recover::{Salvage, salvage};
 use palpate_sessions::{
-    Entry, FolderSegments, LogError, LogWriter, Pace, ReadError, Row, SegmentSource, Session,
-    SessionWriter, Sink, segment_file,
+    FolderSegments, LogEntry, LogError, LogWriter, ReadError, RecordingPace, SampleRow,
+    SegmentSource, Session, SessionWriter, Sink, segment_file,
 };
 use std::fs;
 use std::io::{self, Write};
@@ -78,8 +78,8 @@ const BATCH: usize = 40;
 /// acknowledged.
 fn record(
     journal: &Journal,
-    rows: &[Row],
-    entries: &[Entry],
+    rows: &[SampleRow],
+    entries: &[LogEntry],
 ) -> (Vec<(usize, usize)>, Result<(), LogError>) {
     let mut acknowledged = Vec::new();
     let mut pending = entries.iter().peekable();
@@ -121,7 +121,13 @@ fn append(path: &Path, bytes: &[u8]) {
     file.write_all(bytes).unwrap();
 }
 
-fn check(session: &Session, rows: &[Row], entries: &[Entry], at_least: usize, context: &str) {
+fn check(
+    session: &Session,
+    rows: &[SampleRow],
+    entries: &[LogEntry],
+    at_least: usize,
+    context: &str,
+) {
     let (count, entry_count) = (session.rows.len(), session.entries.len());
     assert!(count >= at_least, "{context}: {count} of {at_least} rows");
     assert!(same_bits(&session.rows, &rows[..count]), "{context}");
@@ -138,7 +144,7 @@ fn check(session: &Session, rows: &[Row], entries: &[Entry], at_least: usize, co
 }
 
 /// Three segments in a folder, and what is in them.
-fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
+fn three_segments() -> (tempfile::TempDir, Vec<SampleRow>, Vec<LogEntry>) {
     let rows = rows(6 * BATCH, 51);
     let entries = entries(&rows, 15);
     let journal = Journal::default();
@@ -150,7 +156,7 @@ fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
     (folder, rows, entries)
 }
 
-fn salvaged(folder: &Path) -> (Salvage, Vec<Row>) {
+fn salvaged(folder: &Path) -> (Salvage, Vec<SampleRow>) {
     let mut rows = Vec::new();
     let salvage = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
     (salvage, rows)
@@ -163,7 +169,7 @@ fn cut(path: &Path, length: usize) {
 
 #[test]
 fn a_session_in_segments_comes_back_bit_for_bit() {
-    for pace in [Pace::Virtual, Pace::Real] {
+    for pace in [RecordingPace::Virtual, RecordingPace::Real] {
         let folder = quick_folder();
         let rows = rows(3000, 50);
         let entries = entries(&rows, 30);
@@ -191,7 +197,7 @@ fn a_session_in_segments_comes_back_bit_for_bit() {
         // clock entries end batches early.
         let present = |number: &u32| folder.path().join(segment_file(*number)).exists();
         let count = (0..).take_while(present).count() as u32;
-        assert!(count == 8 || pace == Pace::Real && count > 8, "{count}");
+        assert!(count == 8 || pace == RecordingPace::Real && count > 8, "{count}");
         for number in 0..count {
             let bytes = fs::read(folder.path().join(segment_file(number))).unwrap();
             let summary = mcap::read::Summary::read(&bytes).unwrap().unwrap();

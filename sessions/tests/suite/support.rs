@@ -1,12 +1,12 @@
 //! Sessions to test with, and sinks that remember or fail.
 
 use chrono::{TimeZone, Utc};
-use palpate_model::about::{About, Labels};
+use palpate_model::metadata::{SessionLabels, SessionMetadata};
 use palpate_model::rig::{AdcDescription, Limits, Phase, RawBytes, RigDescription, SignalFacts};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    EndRecord, Entry, EntryKind, LogWriter, Manifest, Part, Parts, RECORD_VERSION, ReadError, Row,
-    Session, Sink,
+    EndRecord, EntryKind, LogBatch, LogEntry, LogPart, LogWriter, Manifest, RECORD_VERSION,
+    ReadError, SampleRow, Session, Sink,
 };
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -32,9 +32,9 @@ impl Random {
     }
 }
 
-fn about() -> About {
-    let mut labels = Labels::default();
-    labels.tell_pair("specimen.temperature_c=36.6").expect("a known key");
+fn about() -> SessionMetadata {
+    let mut labels = SessionLabels::default();
+    labels.set_pair("specimen.temperature_c=36.6").expect("a known key");
     labels.about
 }
 
@@ -93,13 +93,13 @@ pub fn manifest() -> Manifest {
 }
 
 /// Plausible rows at 1 kHz: missing values at first, then noise in every digit.
-pub fn rows(count: usize, seed: u64) -> Vec<Row> {
+pub fn rows(count: usize, seed: u64) -> Vec<SampleRow> {
     let mut random = Random(seed);
     (0..count)
         .map(|i| {
             let volts = 0.5 + 0.01 * random.unit();
             let phase = Phase::ALL[(i * Phase::ALL.len()) / count.max(1)];
-            Row {
+            SampleRow {
                 tick: 1000 + i as u64,
                 host: Nanos(1_000_000 * i as u64 + random.next() % 1000),
                 age: None,
@@ -117,7 +117,7 @@ pub fn rows(count: usize, seed: u64) -> Vec<Row> {
 }
 
 /// What went over the wires for rows: a question and its answer for each, and a second device now and then.
-pub fn raw_of(rows: &[Row]) -> Vec<RawBytes> {
+pub fn raw_of(rows: &[SampleRow]) -> Vec<RawBytes> {
     let piece = |at, device: &str, is_sent, bytes: Vec<u8>| RawBytes {
         at,
         device: device.into(),
@@ -144,7 +144,7 @@ pub fn raw_of(rows: &[Row]) -> Vec<RawBytes> {
 pub fn read_raw(path: &std::path::Path) -> Result<Vec<RawBytes>, ReadError> {
     let mut found = Vec::new();
     Session::scan_parts(path, &mut |part| {
-        if let Part::Raw(block) = part {
+        if let LogPart::Raw(block) = part {
             found.extend(block.pieces().map(|piece| RawBytes {
                 at: piece.at,
                 device: block.device().into(),
@@ -158,7 +158,7 @@ pub fn read_raw(path: &std::path::Path) -> Result<Vec<RawBytes>, ReadError> {
 
 /// Raw bytes that were read are those that were recorded, from the first on, and those of `count` rows are there.
 /// Blocks are of one device each, so only the order within a device is that of the recording.
-pub fn check_raw(found: &[RawBytes], rows: &[Row], count: usize, context: &str) {
+pub fn check_raw(found: &[RawBytes], rows: &[SampleRow], count: usize, context: &str) {
     let all = raw_of(rows);
     for device in DEVICES {
         let is_right = own(&all, device).starts_with(&own(found, device));
@@ -168,7 +168,7 @@ pub fn check_raw(found: &[RawBytes], rows: &[Row], count: usize, context: &str) 
 }
 
 /// Raw bytes that were read begin with those of rows.
-pub fn check_raw_begins(found: &[RawBytes], rows: &[Row], context: &str) {
+pub fn check_raw_begins(found: &[RawBytes], rows: &[SampleRow], context: &str) {
     let due = raw_of(rows);
     for device in DEVICES {
         let is_there = own(found, device).starts_with(&own(&due, device));
@@ -184,14 +184,14 @@ fn own<'p>(pieces: &'p [RawBytes], device: &str) -> Vec<&'p RawBytes> {
 }
 
 /// One entry after every `every` rows, kinds in turn.
-pub fn entries(rows: &[Row], every: usize) -> Vec<Entry> {
+pub fn entries(rows: &[SampleRow], every: usize) -> Vec<LogEntry> {
     let kinds = [EntryKind::Input, EntryKind::Decision, EntryKind::Fit];
     rows.iter()
         .enumerate()
         .skip(every)
         .step_by(every)
         .enumerate()
-        .map(|(order, (after, row))| Entry {
+        .map(|(order, (after, row))| LogEntry {
             kind: kinds[order % kinds.len()],
             order: order as u64 * 2,
             after_sample: after as u64,
@@ -268,20 +268,24 @@ impl Sink for MemorySink {
 }
 
 /// A log as bytes: batches of 100 rows, entries with the batch they follow.
-pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+pub fn log_bytes(rows: &[SampleRow], entries: &[LogEntry], end: Option<EndRecord>) -> Vec<u8> {
     log_bytes_with(rows, entries, end, |_| Vec::new())
 }
 
 /// The same with raw bytes for each row.
-pub fn wired_log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+pub fn wired_log_bytes(
+    rows: &[SampleRow],
+    entries: &[LogEntry],
+    end: Option<EndRecord>,
+) -> Vec<u8> {
     log_bytes_with(rows, entries, end, raw_of)
 }
 
 fn log_bytes_with(
-    rows: &[Row],
-    entries: &[Entry],
+    rows: &[SampleRow],
+    entries: &[LogEntry],
     end: Option<EndRecord>,
-    raw_of: impl Fn(&[Row]) -> Vec<RawBytes>,
+    raw_of: impl Fn(&[SampleRow]) -> Vec<RawBytes>,
 ) -> Vec<u8> {
     let sink = MemorySink::default();
     let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
@@ -291,8 +295,8 @@ fn log_bytes_with(
         while let Some(entry) = entries.next_if(|entry| entry.after_sample < (i as u64 + 1) * 100) {
             due.push(entry.clone());
         }
-        let parts = Parts { rows: batch, entries: &due, raw: &raw_of(batch), health: &[] };
-        log.append_parts(&parts).unwrap();
+        let parts = LogBatch { rows: batch, entries: &due, raw: &raw_of(batch), health: &[] };
+        log.append_batch(&parts).unwrap();
     }
     if let Some(end) = end {
         log.finish(end).unwrap();
@@ -309,8 +313,8 @@ pub fn open_bytes(bytes: &[u8]) -> Result<Session, palpate_sessions::ReadError> 
 }
 
 /// Whether two sets of rows agree in every bit, the sign of zero included.
-pub fn same_bits(a: &[Row], b: &[Row]) -> bool {
-    let bits = |row: &Row| {
+pub fn same_bits(a: &[SampleRow], b: &[SampleRow]) -> bool {
+    let bits = |row: &SampleRow| {
         (row.volts.map(f64::to_bits), row.force.map(f64::to_bits), row.depth.map(f64::to_bits))
     };
     a == b && a.iter().map(bits).eq(b.iter().map(bits))

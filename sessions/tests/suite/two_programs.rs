@@ -3,7 +3,7 @@
 use crate::support::{count_from, end, log_bytes, manifest, rows};
 use crate::worker::{command, edit, reported_numbers};
 use palpate_model::Nanos;
-use palpate_sessions::atomic::{leftovers, sweep};
+use palpate_sessions::atomic::{find_leftovers, remove_leftovers};
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError};
 use palpate_sessions::folder::LockTimeout;
 use palpate_sessions::recover::{RecoverError, recover, recovered_folder};
@@ -87,15 +87,15 @@ fn drafts_of_a_killed_process_are_found_and_removed() {
     let at = folder.path();
     let mut killed = OtherProgram::start("draft killed.csv", at);
     let _going_on = OtherProgram::start("draft written.csv", at);
-    assert!(leftovers(at, 1).is_empty());
+    assert!(find_leftovers(at, 1).is_empty());
     killed.0.kill().unwrap();
     killed.0.wait().unwrap();
-    let abandoned = leftovers(at, 1);
+    let abandoned = find_leftovers(at, 1);
     assert!(
         abandoned.len() == 1 && abandoned[0].to_string_lossy().contains("killed.csv"),
         "{abandoned:?}"
     );
-    assert_eq!(sweep(at, 1), abandoned);
+    assert_eq!(remove_leftovers(at, 1), abandoned);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1);
 }
 

@@ -9,8 +9,8 @@ use palpate_sessions::atomic::Draft;
 use palpate_sessions::journal::Journal;
 use palpate_sessions::recover::{RecoverError, recover};
 use palpate_sessions::{
-    Change, Edit, Entry, FolderSegments, LogWriter, Pace, Parts, Row, SessionFolder, SessionWriter,
-    add_edit,
+    Edit, EditChange, FolderSegments, LogBatch, LogEntry, LogWriter, RecordingPace, SampleRow,
+    SessionFolder, SessionWriter, add_edit,
 };
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -21,8 +21,8 @@ const TASK: &str = "PALPATE_WORKER";
 
 /// What a recording process records.
 pub struct Work {
-    pub rows: Vec<Row>,
-    pub entries: Vec<Entry>,
+    pub rows: Vec<SampleRow>,
+    pub entries: Vec<LogEntry>,
 }
 
 impl Work {
@@ -104,8 +104,8 @@ fn write_log(folder: &Path, samples: usize) {
         let (due, later) = rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
         rest = later;
         eprintln!("taken {stop}");
-        let parts = Parts { rows: batch, entries: due, raw: &raw_of(batch), health: &[] };
-        log.append_parts(&parts).unwrap();
+        let parts = LogBatch { rows: batch, entries: due, raw: &raw_of(batch), health: &[] };
+        log.append_batch(&parts).unwrap();
         eprintln!("saved {stop}");
         if number % 9 == 8 {
             log.sync().unwrap();
@@ -120,7 +120,7 @@ fn write_session(folder: &Path, samples: usize) {
     let _held = SessionFolder::create(folder).unwrap();
     let source = FolderSegments::new(folder);
     let mut writer =
-        SessionWriter::start_in_segments(source, 40, &manifest(), Pace::Virtual).unwrap();
+        SessionWriter::start_in_segments(source, 40, &manifest(), RecordingPace::Virtual).unwrap();
     let mut pending = work.entries.iter().peekable();
     for (number, row) in work.rows.iter().enumerate() {
         while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
@@ -186,7 +186,7 @@ pub fn edit(number: usize) -> Edit {
         at: DateTime::UNIX_EPOCH,
         by: "Ada".into(),
         reason: format!("number {number}"),
-        change: Change::Tags { add: vec![format!("tag-{number}")], remove: Vec::new() },
+        change: EditChange::Tags { add: vec![format!("tag-{number}")], remove: Vec::new() },
     }
 }
 

@@ -2,10 +2,12 @@
 
 use crate::support::{Random, end, entries, manifest, quick_folder, rows, same_bits};
 use palpate_model::Nanos;
-use palpate_sessions::recover::{Health, RecoverError, examine, recover, recovered_folder};
+use palpate_sessions::recover::{
+    RecoverError, SessionHealth, examine_session, recover, recovered_folder,
+};
 use palpate_sessions::{
-    Entry, FileSink, FolderSegments, LogError, Notice, Pace, ReadError, Row, SPARE_FILE,
-    SegmentSource, Session, SessionWriter, Sink, Summary, segment_file,
+    FileSink, FolderSegments, LogEntry, LogError, LogNotice, ReadError, RecordingPace, SPARE_FILE,
+    SampleRow, SegmentSource, Session, SessionSummary, SessionWriter, Sink, segment_file,
 };
 use std::fs;
 use std::io;
@@ -123,11 +125,15 @@ impl SegmentSource for Failing {
 fn record(
     source: Failing,
     batches_per_segment: u32,
-    rows: &[Row],
-    entries: &[Entry],
-) -> Result<Vec<Notice>, (Vec<Notice>, LogError)> {
-    let start =
-        SessionWriter::start_in_segments(source, batches_per_segment, &manifest(), Pace::Real);
+    rows: &[SampleRow],
+    entries: &[LogEntry],
+) -> Result<Vec<LogNotice>, (Vec<LogNotice>, LogError)> {
+    let start = SessionWriter::start_in_segments(
+        source,
+        batches_per_segment,
+        &manifest(),
+        RecordingPace::Real,
+    );
     let mut writer = start.map_err(|err| (Vec::new(), err))?;
     let mut pending = entries.iter().peekable();
     let mut pushed = Ok(());
@@ -139,19 +145,19 @@ fn record(
     }
     // The thread may not have come to the last failures yet.
     let mut notices = writer.take_notices();
-    let news = writer.news();
+    let news = writer.notices();
     let closed = writer.close(end(Nanos::from_millis(1000)));
     notices.extend(news.take());
     pushed.and(closed).map_err(|err| (notices.clone(), err))?;
     Ok(notices)
 }
 
-fn check_whole(folder: &Path, rows: &[Row], entries: &[Entry], context: &str) -> Session {
+fn check_whole(folder: &Path, rows: &[SampleRow], entries: &[LogEntry], context: &str) -> Session {
     let session = Session::open(folder).unwrap_or_else(|err| panic!("{context}: {err}"));
     assert!(same_bits(&session.rows, rows), "{context}: {}", session.rows.len());
     assert_eq!(session.entries, entries, "{context}");
     assert_eq!(session.end.as_ref().unwrap().samples, rows.len() as u64);
-    let summary = Summary::read(folder).unwrap();
+    let summary = SessionSummary::read(folder).unwrap();
     assert_eq!(summary.samples, rows.len() as u64, "{context}");
     assert_eq!(summary.end, session.end, "{context}");
     session
@@ -175,7 +181,7 @@ fn whichever_operation_fails_the_session_lacks_nothing() {
             match outcome {
                 Ok(notices) => {
                     moved += 1;
-                    let [Notice::Moved { reason, is_last: false, .. }] = &notices[..] else {
+                    let [LogNotice::Moved { reason, is_last: false, .. }] = &notices[..] else {
                         panic!("{context}: {notices:?}");
                     };
                     assert!(reason.contains("Input/output error"), "{reason}");
@@ -272,18 +278,19 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
         let own = FolderSegments::with_spare(folder.path(), spare.path(), "id").unwrap();
         let room = Arc::new(Mutex::new(room));
         let source = Full { own, room: Arc::clone(&room) };
-        let start = SessionWriter::start_in_segments(source, 100, &manifest(), Pace::Virtual);
+        let start =
+            SessionWriter::start_in_segments(source, 100, &manifest(), RecordingPace::Virtual);
         let mut writer = start.unwrap();
         rows.iter().for_each(|row| writer.push_row(*row).unwrap());
-        let news = writer.news();
+        let news = writer.notices();
         writer.close(end(Nanos::from_millis(1000))).unwrap();
         let notices = news.take();
         if *room.lock().unwrap() == 0 {
-            let [Notice::Moved { is_last: true, path, .. }] = &notices[..] else {
+            let [LogNotice::Moved { is_last: true, path, .. }] = &notices[..] else {
                 panic!("{notices:?}");
             };
             assert!(path.starts_with(spare.path().to_str().unwrap()), "{path}");
-            assert!(notices[0].ends_the_run());
+            assert!(notices[0].is_reason_to_end());
         } else {
             assert!(notices.is_empty());
         }
@@ -318,14 +325,14 @@ fn is_spare_reported(folder: &Path, spare: &Path) -> bool {
         return false;
     }
     assert!(open.notes.iter().any(|note| note.contains(words)));
-    let patient = examine(folder);
-    assert_eq!(patient.health, Health::Incomplete);
+    let patient = examine_session(folder);
+    assert_eq!(patient.health, SessionHealth::Incomplete);
     assert!(patient.findings.iter().any(|one| one.contains(words)));
     let refusal = recover(folder, "1", chrono::DateTime::UNIX_EPOCH).unwrap_err();
     assert!(matches!(refusal, RecoverError::Away { .. }), "{refusal}");
     assert!(!recovered_folder(folder).exists());
     fs::rename(away, spare).unwrap();
-    assert_eq!(examine(folder).health, Health::Healthy);
+    assert_eq!(examine_session(folder).health, SessionHealth::Healthy);
     true
 }
 

@@ -1,7 +1,7 @@
 //! A rig that fails by script, around any other rig.
 
 use super::script::{FaultKind, Rail, ScriptedFault};
-use palpate_drivers::sim::{Cause, Random, counts_from_volts, volts_from_counts};
+use palpate_drivers::sim::{Random, RandomStream, counts_from_volts, volts_from_counts};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::rig::{
     AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
@@ -84,7 +84,7 @@ impl<R: Rig> FaultyRig<R> {
         Self {
             inner,
             script,
-            noise: Random::new(seed, Cause::Fault),
+            noise: Random::new(seed, RandomStream::Fault),
             timed: timed.into(),
             reports: VecDeque::new(),
             newest: None,
@@ -319,8 +319,8 @@ impl<R: Rig> Rig for FaultyRig<R> {
         self.inner.is_virtual()
     }
 
-    fn by_hand(&mut self, action: HandAction) {
-        self.inner.by_hand(action);
+    fn apply_hand_action(&mut self, action: HandAction) {
+        self.inner.apply_hand_action(action);
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {

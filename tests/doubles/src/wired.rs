@@ -81,8 +81,8 @@ impl<R: Rig> Rig for WiredRig<R> {
         self.inner.is_virtual()
     }
 
-    fn by_hand(&mut self, action: HandAction) {
-        self.inner.by_hand(action);
+    fn apply_hand_action(&mut self, action: HandAction) {
+        self.inner.apply_hand_action(action);
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {

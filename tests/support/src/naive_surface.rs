@@ -4,7 +4,7 @@ use std::collections::{HashSet, VecDeque};
 
 /// Which of the waiting nodes comes next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
+pub enum PassOrder {
     /// The one that moved first.
     First,
     /// The one that moved last: right in one dimension, wrong in two.
@@ -17,7 +17,7 @@ pub fn push(
     columns: usize,
     limit: impl Fn(usize, usize) -> f64,
     (seed, height): (usize, f64),
-    order: Order,
+    order: PassOrder,
 ) -> usize {
     if z[seed] <= height {
         return 0;
@@ -26,8 +26,8 @@ pub fn push(
     let mut moved = HashSet::from([seed]);
     let mut waiting = VecDeque::from([seed]);
     let next = |waiting: &mut VecDeque<usize>| match order {
-        Order::First => waiting.pop_front(),
-        Order::Last => waiting.pop_back(),
+        PassOrder::First => waiting.pop_front(),
+        PassOrder::Last => waiting.pop_back(),
     };
     while let Some(node) = next(&mut waiting) {
         for other in neighbours(node, columns, z.len()) {

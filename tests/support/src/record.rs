@@ -63,7 +63,7 @@ pub fn respond(body: &ModifiedKelvin, path: &[(f64, f64)]) -> Vec<FitSample> {
 
 /// The same samples with noise of each sample's own sigma.
 #[must_use]
-pub fn noisy(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
+pub fn with_white_noise(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
     let mut noise = Noise::seeded(seed);
     samples
         .iter()
@@ -77,7 +77,7 @@ pub fn noisy(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
 /// The same samples with slow noise (standard deviation `slow`, exponential memory of `memory` s) and
 /// white noise (standard deviation `white`), in N.
 #[must_use]
-pub fn remembering(
+pub fn with_correlated_noise(
     samples: &[FitSample],
     seed: u64,
     (slow, memory, white): (f64, f64, f64),

@@ -15,7 +15,7 @@ const LIST: &str = "PALPATE_SKIPPED";
 
 /// A requirement of a test that a computer may lack.
 #[derive(Clone, Copy, Debug)]
-pub enum Need<'a> {
+pub enum TestNeed<'a> {
     Program(&'a str),
     /// A package that `python3` imports.
     Python(&'a str),
@@ -24,7 +24,7 @@ pub enum Need<'a> {
     Command(&'a str),
 }
 
-impl Need<'_> {
+impl TestNeed<'_> {
     /// Its kind, as the list has it, and its name.
     fn words(&self) -> (&'static str, String) {
         match self {
@@ -40,7 +40,7 @@ impl Need<'_> {
 ///
 /// # Panics
 /// If the list cannot be written: a gate that counts must not count too few.
-pub fn skip(need: Need, reason: &str) {
+pub fn skip(need: TestNeed, reason: &str) {
     let (kind, name) = need.words();
     let thread = std::thread::current();
     let test = thread.name().unwrap_or("a test").to_owned();
@@ -63,7 +63,7 @@ pub fn lacks_program(name: &str) -> bool {
     let folders = std::env::var_os("PATH").unwrap_or_default();
     let is_missing = !std::env::split_paths(&folders).any(|folder| folder.join(name).is_file());
     if is_missing {
-        skip(Need::Program(name), "it is not on the path");
+        skip(TestNeed::Program(name), "it is not on the path");
     }
     is_missing
 }
@@ -73,7 +73,7 @@ pub fn lacks_program(name: &str) -> bool {
 pub fn lacks_file(path: &Path) -> bool {
     let is_missing = !path.exists();
     if is_missing {
-        skip(Need::File(path), "it is not here");
+        skip(TestNeed::File(path), "it is not here");
     }
     is_missing
 }
@@ -88,7 +88,7 @@ pub fn lacks_command(line: &str) -> bool {
     let output = outcome.expect("a shell");
     let is_missing = !output.status.success();
     if is_missing {
-        skip(Need::Command(line), &String::from_utf8_lossy(&output.stderr));
+        skip(TestNeed::Command(line), &String::from_utf8_lossy(&output.stderr));
     }
     is_missing
 }

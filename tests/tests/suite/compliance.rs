@@ -1,14 +1,16 @@
 //! A rig that gives way: how much, found on a stiff surface, and what a fit makes of depths with and without it.
-use palpate_analysis::compliance::{Corrections, MeasureError, measured};
-use palpate_analysis::source::{FitSource, Stretch, samples_of};
+use palpate_analysis::compliance::{
+    ComplianceCorrections, ComplianceMeasurementError, compliance_from_session,
+};
+use palpate_analysis::source::{FitSource, RecordStretch, fit_samples};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::units::Seconds;
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{FitOptions, FitReport, fit};
 use palpate_sessions::Session;
-use palpate_sessions::shelf::save;
-use palpate_tests::recorded;
+use palpate_sessions::document_store::save_document;
+use palpate_tests::recorded_runs;
 use std::collections::BTreeMap;
 
 /// The base the simulated rig presses gives way by this much itself, in mm/N.
@@ -28,7 +30,7 @@ fn stiff_surface(um_per_n: &str) -> Session {
     let plan = protocol.plan(&BTreeMap::new()).unwrap();
     let rig = rig(um_per_n);
     let calibration = rig.calibration();
-    recorded::of_plan(Box::new(rig), calibration, plan)
+    recorded_runs::record_plan(Box::new(rig), calibration, plan)
 }
 
 /// The five parameters of the body, true and fitted with their standard errors.
@@ -55,20 +57,20 @@ fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
     let stiff = body(&rig("0"), &stiff);
     for um_per_n in ["20", "60", "100"] {
         let wanted = um_per_n.parse::<f64>().unwrap() * 1e-3 + BASE;
-        let found = measured(&stiff_surface(um_per_n), None).unwrap();
+        let found = compliance_from_session(&stiff_surface(um_per_n), None).unwrap();
         println!("{um_per_n} um/N: {:.5} ± {:.5} mm/N", found.mm_per_n, found.std_error_mm_per_n);
         assert_eq!(found.presses.len(), 3);
         let error = found.mm_per_n - wanted;
         // Four standard errors; of three presses the scatter itself is known to a half.
         assert!(error.abs() < 4.0 * found.std_error_mm_per_n + 1e-4 * wanted, "{error} {found:?}");
         let folder = library.path().join(um_per_n);
-        save(&folder, &found).unwrap();
+        save_document(&folder, &found).unwrap();
 
         let truth = rig(um_per_n);
         let session = recorded_on(um_per_n);
         let raw = source(&session);
         let mut corrected = raw.clone();
-        let corrections = Corrections::named("last", Some(&folder)).unwrap();
+        let corrections = ComplianceCorrections::named("last", Some(&folder)).unwrap();
         let correction = corrections.apply(&mut corrected).unwrap().unwrap();
         println!("  {}", correction.sentence());
         assert!(
@@ -101,12 +103,12 @@ fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
 fn recorded_on(um_per_n: &str) -> Session {
     let rig = rig(um_per_n);
     let calibration = rig.calibration();
-    recorded::session(Box::new(rig), calibration, RampHold::default())
+    recorded_runs::record_ramp_hold(Box::new(rig), calibration, RampHold::default())
 }
 
 fn source(session: &Session) -> FitSource {
     FitSource {
-        samples: samples_of(session, Stretch::RampHold).unwrap(),
+        samples: fit_samples(session, RecordStretch::RampHold).unwrap(),
         start: Seconds(0.0),
         notes: Vec::new(),
         specimen: None,
@@ -117,6 +119,6 @@ fn source(session: &Session) -> FitSource {
 
 #[test]
 fn a_session_that_touched_no_base_tells_no_compliance() {
-    let refused = measured(&recorded_on("60"), None);
-    assert!(matches!(refused, Err(MeasureError::NoSurface)), "{refused:?}");
+    let refused = compliance_from_session(&recorded_on("60"), None);
+    assert!(matches!(refused, Err(ComplianceMeasurementError::NoSurface)), "{refused:?}");
 }

@@ -7,9 +7,9 @@ use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::{HandAction, Phase};
 use palpate_model::units::{MmPerS, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::engine::{EndingKind, Record, State};
+use palpate_protocols::engine::{EndingKind, EngineState, Record};
 use palpate_protocols::plans::FindContact;
-use palpate_tests::searching::{Searched, bound_mm, search, search_on};
+use palpate_tests::contact_search::{ContactSearchResult, bound_mm, search, search_on};
 
 /// Runs of each combination in the gate; the soak does a thousand.
 const SEEDS: u64 = 7;
@@ -169,7 +169,7 @@ fn the_bound_is_the_one_of_fifty_digits() {
 }
 
 /// A refused search: not finished, with this in its reason.
-fn assert_refused(found: &Searched, words: &str) {
+fn assert_refused(found: &ContactSearchResult, words: &str) {
     let outcome = &found.outcome;
     assert!(found.contact.is_none(), "accepted {:?}", found.contact);
     assert_ne!(outcome.ending, EndingKind::Finish);
@@ -228,10 +228,10 @@ fn a_loaded_cell_is_refused() {
     assert_refused(&found, "touches the probe");
     // After the tare it is the search that notices.
     let mut rig = SimRig::new(settings(1, "20", "100"));
-    rig.by_hand(HandAction::LoadCell { mass_g: 0.0 });
+    rig.apply_hand_action(HandAction::LoadCell { mass_g: 0.0 });
     let found = search_on(rig, plan, |rig, state| {
         if state.phase() == Phase::Contact {
-            rig.by_hand(HandAction::LoadCell { mass_g: 10.0 });
+            rig.apply_hand_action(HandAction::LoadCell { mass_g: 10.0 });
         }
     });
     assert_refused(&found, "tissue is met");
@@ -245,7 +245,7 @@ fn a_drifting_signal_is_refused_and_a_steady_one_recorded() {
     let found = search_on(rig, FindContact::default(), move |rig, state| {
         if state.phase() == Phase::Tare {
             mass_g += 0.5e-3;
-            rig.by_hand(HandAction::LoadCell { mass_g });
+            rig.apply_hand_action(HandAction::LoadCell { mass_g });
         }
     });
     assert_refused(&found, "drifts by");
@@ -268,14 +268,14 @@ fn an_interval_wider_than_the_plan_allows_is_refused() {
 }
 
 /// Taps on the cell on the way to the tissue: 10 g for 30 ms, one per millimetre from 15 mm on.
-fn tapped(count: u32) -> Searched {
+fn tapped(count: u32) -> ContactSearchResult {
     let rig = SimRig::new(settings(2, "20", "100"));
     search_on(rig, FindContact::default(), move |rig, state| {
         if state.phase() == Phase::Contact {
             let way = state.derived().position.0 - 15.0;
             let is_tapped = (0.0..f64::from(count)).contains(&way) && way.fract() < 0.045;
             let mass_g = if is_tapped { 10.0 } else { 0.0 };
-            rig.by_hand(HandAction::LoadCell { mass_g });
+            rig.apply_hand_action(HandAction::LoadCell { mass_g });
         }
     })
 }
@@ -292,17 +292,17 @@ fn peaks_of_the_signal_are_not_taken_for_tissue() {
 }
 
 /// Something done by hand while the probe waits between the two touches.
-fn between_touches(action: HandAction) -> Searched {
+fn between_touches(action: HandAction) -> ContactSearchResult {
     let rig = SimRig::new(settings(3, "20", "100"));
     let mut has_touched = false;
     let mut is_done = false;
-    search_on(rig, FindContact::default(), move |rig, state: &State| {
+    search_on(rig, FindContact::default(), move |rig, state: &EngineState| {
         let depth = rig.truth().position.distance_from(rig.truth().surface);
         has_touched |= state.phase() == Phase::Contact && rig.truth().force.0 > 0.3;
         let is_away = has_touched && depth < -1.0 && state.derived().velocity == MmPerS(0.0);
         if is_away && !is_done {
             is_done = true;
-            rig.by_hand(action);
+            rig.apply_hand_action(action);
         }
     })
 }

@@ -1,7 +1,7 @@
 //! Cycles and a sine on the simulated rig, analysed as a user's record is.
 
 use palpate_analysis::cycles::CycleSource;
-use palpate_analysis::report::cycles::{CycleReport, Question, picture, whole};
+use palpate_analysis::report::cycles::{CycleReport, CycleSettings, cycles_text, picture};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -10,7 +10,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_protocols::plans::{
     FindContact, Hold, Plan, PlannedStep, Ramp, Rest, Sine, Step, Unload,
 };
-use palpate_rheology::cycles::{CycleSample, sinusoid};
+use palpate_rheology::cycles::{CycleSample, fit_sinusoid};
 use palpate_tests::lab::{Lab, retract, set_up};
 fn rig(percent: u8) -> SimRig {
     SimRig::new(SimSettings {
@@ -71,10 +71,10 @@ fn a_preconditioned_specimen_becomes_steady_and_an_elastic_one_is() {
         let lab = run(rig(percent), plan(ten_cycles()));
         let source = CycleSource { samples: samples(&lab), ..CycleSource::default() };
         let name = format!("ten cycles, preconditioning {percent} %");
-        CycleReport::of(name, source, &Question::default())
+        CycleReport::of(name, source, &CycleSettings::default())
     };
     let (soft, plain) = (report(10), report(0));
-    println!("{}\n\n{}", whole(&soft), whole(&plain));
+    println!("{}\n\n{}", cycles_text(&soft), cycles_text(&plain));
     let to = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("cycles.svg");
     std::fs::write(&to, picture(&soft)).unwrap();
     assert_eq!((soft.cycles.len(), plain.cycles.len()), (10, 10));
@@ -108,7 +108,7 @@ fn a_sine_finds_the_stiffness_of_the_body() {
     let all = samples(&lab);
     let measured: Vec<CycleSample> =
         all.iter().filter(|one| one.phase == Phase::Sine).copied().collect();
-    let found = sinusoid(&measured, frequency).unwrap();
+    let found = fit_sinusoid(&measured, frequency).unwrap();
     println!("{found:?}");
     // The same body on the same path from the true surface, without noise.
     let (body, surface) = (lab.rig.truth().body, lab.rig.truth().surface_counted());
@@ -126,7 +126,7 @@ fn a_sine_finds_the_stiffness_of_the_body() {
         })
         .filter(|one| one.phase == Phase::Sine)
         .collect();
-    let exact = sinusoid(&exact, frequency).unwrap();
+    let exact = fit_sinusoid(&exact, frequency).unwrap();
     assert!(exact.storage.value > 0.1 && exact.loss.value > 0.05, "{exact:?}");
     for (one, other) in [(found.storage, exact.storage), (found.loss, exact.loss)] {
         let miss = (one.value - other.value).abs();

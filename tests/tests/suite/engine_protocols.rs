@@ -5,9 +5,9 @@ use palpate_model::rig::{HandAction, Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record};
 use palpate_protocols::plans::{
-    Action, CheckHome, FindBase, FindContact, Hold, HoldForce, HoldRate, LoadTo, Monitor,
-    OnFailure, OnTimeout, Plan, PlannedStep, Prompt, Ramp, Rest, Settle, Side, Sine, Source, Step,
-    Unload, Weigh,
+    CheckHome, FindBase, FindContact, Hold, HoldForce, HoldRate, LoadTo, Monitor, MonitorAction,
+    MonitorSource, OnFailure, OnTimeout, Plan, PlannedStep, Prompt, Ramp, Rest, SettleLimits, Sine,
+    Step, ThresholdSide, Unload, Weigh,
 };
 use palpate_protocols::preview::preview;
 use palpate_tests::lab::{Lab, retract, set_up};
@@ -132,11 +132,12 @@ fn force_is_kept_while_the_tissue_creeps() {
     let steps = vec![Step::LoadTo(load), Step::HoldForce(creep)];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
     let creep: Vec<_> = lab.seen.iter().filter(|seen| seen.phase == Phase::Creep).collect();
-    let mean = |part: &[&palpate_tests::lab::Seen], of: fn(&palpate_tests::lab::Seen) -> f64| {
+    let mean = |part: &[&palpate_tests::lab::LabSample],
+                of: fn(&palpate_tests::lab::LabSample) -> f64| {
         part.iter().map(|seen| of(seen)).sum::<f64>() / part.len() as f64
     };
-    let force = |seen: &palpate_tests::lab::Seen| seen.derived.force.unwrap().0;
-    let depth = |seen: &palpate_tests::lab::Seen| seen.derived.depth.unwrap().0;
+    let force = |seen: &palpate_tests::lab::LabSample| seen.derived.force.unwrap().0;
+    let depth = |seen: &palpate_tests::lab::LabSample| seen.derived.depth.unwrap().0;
     // While the tissue relaxes fast, corrections come a little late; then a pulse of 0.015 mm in tissue of up to
     // 0.8 N/mm is the grain.
     for (index, second) in creep[2000..].chunks(1000).enumerate() {
@@ -280,13 +281,13 @@ fn the_base_tells_how_thick_the_specimen_is() {
 }
 
 /// A plan that loads, with a monitor of the force.
-fn watched(action: Action, threshold: f64) -> Plan {
+fn watched(action: MonitorAction, threshold: f64) -> Plan {
     let ramp = Step::Ramp(Ramp { speed: MmPerS(1.5), depth: Depth(20.0) });
     let rest = Step::Rest(Rest { duration: Seconds(30.0) });
     let mut plan = plan(vec![rest, ramp]);
     plan.monitors = vec![Monitor {
-        source: Source::Force,
-        side: Side::Above,
+        source: MonitorSource::Force,
+        side: ThresholdSide::Above,
         threshold,
         resume: 0.5 * threshold,
         settle: Seconds(0.5),
@@ -300,8 +301,11 @@ fn watched(action: Action, threshold: f64) -> Plan {
 fn a_monitor_takes_the_probe_out_also_where_nobody_watches() {
     let rig = rig(SimProfile::Ideal);
     let calibration = rig.calibration();
-    let session =
-        palpate_tests::recorded::of_plan(Box::new(rig), calibration, watched(Action::Retract, 1.0));
+    let session = palpate_tests::recorded_runs::record_plan(
+        Box::new(rig),
+        calibration,
+        watched(MonitorAction::Retract, 1.0),
+    );
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "stop", "{}", end.reason);
     let last = session.rows.last().unwrap();
@@ -311,7 +315,7 @@ fn a_monitor_takes_the_probe_out_also_where_nobody_watches() {
 #[test]
 fn a_monitor_takes_the_probe_out_of_a_search_too() {
     // A search presses to 0.42 N.
-    let mut lab = lab(SimProfile::Ideal, watched(Action::Retract, 0.3));
+    let mut lab = lab(SimProfile::Ideal, watched(MonitorAction::Retract, 0.3));
     lab.run();
     let outcome = lab.outcome.clone().unwrap();
     assert_eq!(outcome.ending, EndingKind::Stop, "{}", outcome.reason);
@@ -324,7 +328,7 @@ fn a_monitor_takes_the_probe_out_of_a_search_too() {
 
 #[test]
 fn a_condition_that_comes_back_with_its_step_ends_the_run() {
-    let mut lab = lab(SimProfile::Ideal, watched(Action::Pause, 0.3));
+    let mut lab = lab(SimProfile::Ideal, watched(MonitorAction::Pause, 0.3));
     lab.operator(Operator::Start);
     assert!(lab.run_until(Seconds(2000.0), |state| state.holding().is_some()));
     let reason = &lab.state().holding().unwrap().reason;
@@ -349,8 +353,11 @@ fn a_search_that_presses_beyond_the_limit_is_refused() {
 fn a_pause_that_cannot_go_on_ends_where_nobody_watches() {
     let rig = rig(SimProfile::Ideal);
     let calibration = rig.calibration();
-    let session =
-        palpate_tests::recorded::of_plan(Box::new(rig), calibration, watched(Action::Pause, 1.0));
+    let session = palpate_tests::recorded_runs::record_plan(
+        Box::new(rig),
+        calibration,
+        watched(MonitorAction::Pause, 1.0),
+    );
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "stop", "{}", end.reason);
     assert!(end.reason.contains("nobody is there"), "{}", end.reason);
@@ -366,14 +373,14 @@ fn touchable(plan: Plan) -> Lab<SimRig> {
 
 #[test]
 fn what_a_person_paused_only_a_person_resumes() {
-    let mut lab = touchable(watched(Action::Pause, 1.0));
+    let mut lab = touchable(watched(MonitorAction::Pause, 1.0));
     lab.operator(Operator::Start);
-    let is_resting = |state: &palpate_protocols::engine::State| state.step_progress().0 == 4;
+    let is_resting = |state: &palpate_protocols::engine::EngineState| state.step_progress().0 == 4;
     assert!(lab.run_until(Seconds(1e3), is_resting));
     lab.operator(Operator::PauseAfter { step_index: 4 });
     assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Paused));
     for mass_g in [150.0, 0.0] {
-        lab.rig.by_hand(HandAction::LoadCell { mass_g });
+        lab.rig.apply_hand_action(HandAction::LoadCell { mass_g });
         lab.run_until(Seconds(3.0), |_| false);
     }
     assert!(matches!(lab.state().pause(), PauseView::Paused { .. }));
@@ -384,15 +391,15 @@ fn what_a_person_paused_only_a_person_resumes() {
 
 #[test]
 fn a_pause_of_a_monitor_that_a_person_takes_over_stays() {
-    let mut lab = touchable(watched(Action::Pause, 1.0));
+    let mut lab = touchable(watched(MonitorAction::Pause, 1.0));
     lab.operator(Operator::Start);
-    let is_resting = |state: &palpate_protocols::engine::State| state.step_progress().0 == 4;
+    let is_resting = |state: &palpate_protocols::engine::EngineState| state.step_progress().0 == 4;
     assert!(lab.run_until(Seconds(1e3), is_resting));
-    lab.rig.by_hand(HandAction::LoadCell { mass_g: 150.0 });
+    lab.rig.apply_hand_action(HandAction::LoadCell { mass_g: 150.0 });
     lab.run_until(Seconds(3.0), |_| false);
     assert!(matches!(lab.state().pause(), PauseView::Paused { .. }));
     lab.operator(Operator::Pause);
-    lab.rig.by_hand(HandAction::LoadCell { mass_g: 0.0 });
+    lab.rig.apply_hand_action(HandAction::LoadCell { mass_g: 0.0 });
     lab.run_until(Seconds(3.0), |_| false);
     assert!(matches!(lab.state().pause(), PauseView::Paused { .. }));
     lab.operator(Operator::Resume);
@@ -494,7 +501,7 @@ fn a_calibration_can_be_paused_with_a_weight_beyond_every_limit_on_the_cell() {
             mass_g,
             is_loading: true,
             repeat: 1,
-            settle: Settle { window: Seconds(1.0), timeout: Seconds(20.0) },
+            settle: SettleLimits { window: Seconds(1.0), timeout: Seconds(20.0) },
         })
     };
     let load = Step::Prompt(Prompt {

@@ -11,9 +11,9 @@ use palpate_runner::TimeScale;
 use palpate_runner::replay::replay;
 use palpate_sessions::{EntryKind, Session};
 use palpate_test_support::wait::PATIENCE;
+use palpate_tests::built_in_plan;
 use palpate_tests::lab::Lab;
-use palpate_tests::recorded;
-use palpate_tests::shipped;
+use palpate_tests::recorded_runs;
 use palpate_tests::simulated::run;
 
 fn settings(profile: SimProfile, rate: &str, seed: u64) -> SimSettings {
@@ -82,14 +82,14 @@ fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
             };
             let rig = SimRig::new(settings);
             let curve = rig.calibration().curve().unwrap();
-            let mut lab = Lab::new(rig, curve, shipped(name, values)).forgetful();
+            let mut lab = Lab::new(rig, curve, built_in_plan(name, values)).forgetful();
             lab.run();
             let outcome = lab.outcome.clone();
             let outcome = outcome.unwrap_or_else(|| panic!("{name} {:?}", lab.state().holding()));
             assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
             lab.now.seconds().0
         });
-        // Corrections of a held force depend on the noise.
+        // ComplianceCorrections of a held force depend on the noise.
         assert!((times[1] / times[0] - 1.0).abs() < 0.02, "{name}: {times:?}");
     }
 }
@@ -136,7 +136,7 @@ fn is_whole(session: &Session, rate: f64) {
 fn all_samples_are_on_disk_and_replay() {
     let rig = SimRig::new(settings(SimProfile::Ideal, "20000", 5));
     let (calibration, tau) = (rig.calibration(), rig.truth().body.tau_eps);
-    let session = recorded::session(Box::new(rig), calibration, short());
+    let session = recorded_runs::record_ramp_hold(Box::new(rig), calibration, short());
     is_whole(&session, 20_000.0);
     assert_eq!(session.manifest.rig.as_ref().unwrap().settings["rate"], "20000");
     // Two answers of the live fit a second, the last near the truth: 0.3 % is three standard errors.
@@ -157,8 +157,13 @@ fn a_fast_rig_loses_nothing_at_real_pace_with_the_live_fit() {
     let rig = SimRig::new(settings(SimProfile::Lab, "20000", 6));
     let calibration = rig.calibration();
     // Twenty times as fast as the wall, for a run of two minutes would be a long test.
-    let (runner, woken) =
-        recorded::start(Box::new(rig), calibration, short().plan(), TimeScale::Factor(20.0), &out);
+    let (runner, woken) = recorded_runs::start(
+        Box::new(rig),
+        calibration,
+        short().plan(),
+        TimeScale::Factor(20.0),
+        &out,
+    );
     let ended = || runner.snapshot().run.as_ref().is_some_and(|run| run.outcome.is_some());
     while !ended() {
         woken.recv_timeout(PATIENCE).unwrap();

@@ -10,7 +10,7 @@ use palpate_runner::replay::replay;
 use palpate_runner::{Runner, TimeScale};
 use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;
-use palpate_tests::recorded;
+use palpate_tests::recorded_runs;
 
 fn params() -> RampHold {
     RampHold { speed: MmPerS(3.0), depth: Depth(12.0), hold: Seconds(2.0), ..RampHold::default() }
@@ -21,7 +21,7 @@ fn run_with(kind: FaultKind, at: Nanos) -> Session {
     let rig = SimRig::new(SimSettings::default());
     let calibration = rig.calibration();
     let faulty = FaultyRig::new(rig, vec![ScriptedFault::from(at, kind)], 5);
-    recorded::session(Box::new(faulty), calibration, params())
+    recorded_runs::record_ramp_hold(Box::new(faulty), calibration, params())
 }
 
 /// Half a minute into the run the probe is in the contact search, most of the time moving.
@@ -82,7 +82,8 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
             let plan = RampHold { hold: Seconds(3600.0), ..params() }.plan();
             let calibration = rig.calibration();
             let scale = TimeScale::Factor(50.0);
-            let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
+            let (runner, woken) =
+                recorded_runs::start(Box::new(rig), calibration, plan, scale, &place);
             let is_pressing = |runner: &Runner| {
                 let snapshot = runner.snapshot();
                 let run = snapshot.run.as_ref();

@@ -1,24 +1,24 @@
 //! A slave that goes where it is led, on the simulated rig: its bounds, its lag, its stops, and the whole with a master.
 use palpate_analysis::fidelity::of_session;
-use palpate_analysis::source::{Stretch, samples_of};
+use palpate_analysis::source::{RecordStretch, fit_samples};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_haptics::Period;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Limits, Phase, Reading, RigCommand};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_protocols::engine::{EndingKind, Input, Interlock, Operator, Record};
+use palpate_protocols::engine::{EndingKind, EngineInput, Interlock, Operator, Record};
 use palpate_protocols::plans::Follow;
-use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
+use palpate_runner::haptics::slave::{SlaveLeader, SlaveReport, SlaveSettings};
 use palpate_runner::replay::replay;
-use palpate_runner::{Felt, Leading, TimeScale};
+use palpate_runner::{LeadSource, SlaveSample, TimeScale};
 use palpate_sessions::{EntryKind, Session};
-use palpate_tests::lab::{Lab, Seen};
-use palpate_tests::recorded;
+use palpate_tests::lab::{Lab, LabSample};
+use palpate_tests::recorded_runs;
 use std::sync::{Arc, Mutex};
 
 /// Way of a pulse of the simulated rig.
@@ -56,15 +56,15 @@ fn lead(lab: &mut Lab<SimRig>, most: f64, path: impl Fn(f64) -> Option<f64>) {
             led = lab.now;
             if let Some(depth) = path(lab.now.since(begun).seconds().0) {
                 let depth = Some(Depth(depth));
-                lab.give(Input::Lead { depth });
+                lab.give(EngineInput::Lead { depth });
             }
         }
     }
 }
 
 /// The samples of the step that follows.
-fn followed(lab: &Lab<SimRig>) -> Vec<Seen> {
-    let own = |seen: &&Seen| seen.phase == Phase::Follow;
+fn followed(lab: &Lab<SimRig>) -> Vec<LabSample> {
+    let own = |seen: &&LabSample| seen.phase == Phase::Follow;
     lab.seen.iter().filter(own).copied().collect()
 }
 
@@ -193,7 +193,7 @@ fn a_lead_that_is_no_number_is_refused_once_and_is_no_lead() {
     lead(&mut lab, 2.0, |_| Some(1.0));
     let before = lab.records.len();
     for depth in [None, Some(Depth(f64::NAN)), Some(Depth(f64::INFINITY)), None] {
-        lab.give(Input::Lead { depth });
+        lab.give(EngineInput::Lead { depth });
     }
     let count_notes = |lab: &Lab<SimRig>| {
         let own = lab.records[before..].iter();
@@ -224,7 +224,7 @@ fn the_operator_and_every_interlock_end_it_as_any_step() {
         for _ in 0..2000 {
             lab.advance();
             let depth = Some(Depth(25.0));
-            lab.give(Input::Lead { depth });
+            lab.give(EngineInput::Lead { depth });
         }
         assert_eq!(lab.state().holding().unwrap().ending, expected);
         assert!(is_at_rest(lab));
@@ -257,14 +257,14 @@ fn the_operator_and_every_interlock_end_it_as_any_step() {
         if interlock == Interlock::SampleAge {
             lab.now = lab.now + Nanos::from_millis(100);
         }
-        lab.give(Input::Reading(reading));
+        lab.give(EngineInput::Reading(reading));
         let tripped = |(_, record): &(Nanos, Record)| matches!(record, Record::InterlockTripped { interlock: found, .. } if *found == interlock);
         assert!(lab.records.iter().any(tripped), "{interlock}");
         assert_eq!(lab.commands.last().unwrap().1, RigCommand::Stop);
     }
     let mut lab = led();
     let detail = "full".into();
-    lab.give(Input::Fault(Fault::LogFailed { detail }));
+    lab.give(EngineInput::Fault(Fault::LogFailed { detail }));
     check(&mut lab, EndingKind::Abort);
     // By the tissue itself: a force that the slave is led into.
     let mut lab = following(follow(60.0, 3.0, 60.0));
@@ -286,7 +286,7 @@ fn paused_it_rests_whatever_leads_and_resumed_it_follows_again() {
     for _ in 0..3000 {
         lab.advance();
         let depth = Some(Depth(25.0));
-        lab.give(Input::Lead { depth });
+        lab.give(EngineInput::Lead { depth });
     }
     assert!(is_at_rest(&lab));
     assert_eq!(moves(&lab, at), []);
@@ -297,9 +297,9 @@ fn paused_it_rests_whatever_leads_and_resumed_it_follows_again() {
 }
 
 /// A slave led by a simulated master whose hand goes on a path.
-fn slaved(path: HandPath, follow: Follow) -> (Session, Slaved) {
+fn slaved(path: HandPath, follow: Follow) -> (Session, SlaveReport) {
     let rig = rig();
-    let hand = Hand::firm(path);
+    let hand = SimulatedHand::firm(path);
     let body = rig.truth().body;
     let leader = SlaveLeader::new(SlaveSettings {
         master: SimulationSettings::of(body, Period::MILLISECOND, hand),
@@ -310,14 +310,14 @@ fn slaved(path: HandPath, follow: Follow) -> (Session, Slaved) {
     });
     let leader = Arc::new(Mutex::new(leader.unwrap()));
     let calibration = rig.calibration();
-    let led = recorded::of_led_plan(
+    let led = recorded_runs::record_led_plan(
         Box::new(rig),
         calibration,
         follow.plan(),
         TimeScale::Max,
         Arc::clone(&leader) as _,
     );
-    let slaved = leader.lock().unwrap().slaved().unwrap();
+    let slaved = leader.lock().unwrap().report().unwrap();
     (led, slaved)
 }
 
@@ -376,7 +376,7 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     assert_eq!(again.rows, session.rows);
     assert_eq!(same, summary);
     // A fit takes the first way in: the hand is back at 8 mm after 6.5 s, its slave soon after.
-    let fitted = samples_of(&session, Stretch::default()).unwrap();
+    let fitted = fit_samples(&session, RecordStretch::default()).unwrap();
     let measured = fitted.iter().filter(|one| one.is_measured());
     let last = measured.map(|one| one.t.0).fold(0.0, f64::max);
     assert!((6.4..7.5).contains(&last), "{last}");
@@ -401,8 +401,8 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
 #[derive(Debug)]
 struct Broken(u32);
 
-impl Leading for Broken {
-    fn lead(&mut self, felt: &Felt) -> Option<f64> {
+impl LeadSource for Broken {
+    fn lead(&mut self, felt: &SlaveSample) -> Option<f64> {
         assert!(felt.sigma > Newtons(0.0));
         self.0 += 1;
         match self.0 {
@@ -419,7 +419,8 @@ fn what_leads_may_fail_and_the_session_says_so() {
     let calibration = rig.calibration();
     let leader = Arc::new(Mutex::new(Broken(0)));
     let plan = follow(60.0, 6.0, 8.0).plan();
-    let session = recorded::of_led_plan(Box::new(rig), calibration, plan, TimeScale::Max, leader);
+    let session =
+        recorded_runs::record_led_plan(Box::new(rig), calibration, plan, TimeScale::Max, leader);
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "finish");
     let records =

@@ -1,22 +1,22 @@
 //! The screen of the daily checks, by accessible name: what two sessions measured, and what there is to do before the first.
 
 use eframe::egui::Key;
-use palpate_analysis::daily::{PastCheck, judge};
+use palpate_analysis::daily::{PastCheck, assess_daily_check};
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{TimeScale, wall_now};
 use palpate_sessions::Session;
 use palpate_sessions::checks::{DailyCheck, add_check};
-use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::checks::{ChecksScreen, SCREEN};
 use std::path::Path;
 
-fn checks(window: &Window) -> Option<&[PastCheck]> {
+fn checks(window: &TestWindow) -> Option<&[PastCheck]> {
     let checks = screen_of::<ChecksScreen>(window).checks()?;
     Some(checks.as_ref().unwrap())
 }
 
 /// Runs the daily check in the window, answering what it asks for.
-fn check(flow: &mut Flow) {
+fn check(flow: &mut WindowFlow) {
     flow.window.key_press(Key::F5);
     flow.window.run_steps(2);
     for _ in 0..3 {
@@ -38,7 +38,7 @@ fn check(flow: &mut Flow) {
 /// Keeps the result of a session as `palpate daily-check` does.
 fn keep(library: &Path, folder: &Path, rig: &str, session_id: Option<&str>) -> DailyCheck {
     let session = Session::open(folder).unwrap();
-    let parts = judge(&session).unwrap();
+    let parts = assess_daily_check(&session).unwrap();
     let check = DailyCheck {
         at: wall_now().into(),
         rig: rig.into(),
@@ -54,7 +54,7 @@ fn keep(library: &Path, folder: &Path, rig: &str, session_id: Option<&str>) -> D
 
 #[test]
 fn checks_stand_over_time_with_what_their_sessions_measured() {
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     flow.click(SCREEN.name);
     flow.wait("no check", |window| checks(window).is_some());
     flow.window.run_steps(2);

@@ -7,10 +7,10 @@ use egui_kittest::kittest::Queryable;
 use palpate_analysis::report::text;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
-use palpate_rheology::fit::{FitReport, Parameter};
+use palpate_rheology::fit::{FitReport, FittedParameter};
 use palpate_runner::TimeScale;
 use palpate_sessions::log::Session;
-use palpate_tests::flow::{Flow, Window, refit};
+use palpate_tests::flow::{TestWindow, WindowFlow, refit};
 use palpate_tests::workspace;
 use palpate_window::screens::exact_fit::exact_ui;
 use palpate_window::shell::activity::{is_motion_possible, run_in_progress};
@@ -18,7 +18,7 @@ use palpate_window::workers::fit::Refit;
 
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.wait("the serial ports", |window| window.query_by_label("listing them").is_none());
     flow.window.run();
     flow.window.check_accessibility();
@@ -32,7 +32,7 @@ fn an_idle_window_settles_and_every_control_has_a_name() {
 
 #[test]
 fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.type_into("operator", "A. Tester");
     flow.type_into("specimen", "S-014");
     flow.type_into("hold", "5");
@@ -55,7 +55,7 @@ fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
 
 #[test]
 fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.type_into("hold", "10");
     flow.click("Start  F5");
     flow.wait_for_end();
@@ -84,7 +84,7 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
 
 #[test]
 fn every_sentence_of_a_report_is_on_the_screen() {
-    let parameter = |name: &str, std_error: Option<f64>| Parameter {
+    let parameter = |name: &str, std_error: Option<f64>| FittedParameter {
         name: name.into(),
         value: 1.5,
         unit: "N*s/mm^2".into(),
@@ -122,7 +122,7 @@ fn every_sentence_of_a_report_is_on_the_screen() {
 
 #[test]
 fn a_wrong_speed_gives_a_sentence_and_no_start() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     for (text, sentence) in [
         ("fast", "\"fast\" is not a speed"),
         ("0,75", "write a point, not a comma"),
@@ -146,7 +146,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
 #[test]
 fn f12_and_escape_stop_with_a_text_field_focused() {
     for key in [Key::F12, Key::Escape] {
-        let mut flow = Flow::open(TimeScale::Factor(20.0));
+        let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
         flow.window.key_press(Key::F5);
         flow.wait_for_phase(Phase::Contact);
         assert!(flow.says("State: CONTACT"));
@@ -172,7 +172,7 @@ fn f12_and_escape_stop_with_a_text_field_focused() {
 
 #[test]
 fn the_probe_is_retracted_after_a_stop_in_the_tissue() {
-    let mut flow = Flow::open(TimeScale::Factor(40.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(40.0));
     flow.click("Start  F5");
     flow.wait_for_phase(Phase::Ramp);
     flow.click("Stop motion  F12");
@@ -191,7 +191,7 @@ fn the_probe_is_retracted_after_a_stop_in_the_tissue() {
 
 #[test]
 fn closing_while_moving_stops_first() {
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     flow.click("Start  F5");
     flow.wait_for_phase(Phase::Contact);
     assert!(is_motion_possible(flow.window.state().snapshot()));
@@ -203,7 +203,7 @@ fn closing_while_moving_stops_first() {
     flow.wait("the window closing", |window| commands(window).contains(&ViewportCommand::Close));
     assert!(!is_motion_possible(flow.window.state().snapshot()));
     let session = flow.sessions().remove(0);
-    let Flow { window, folder: _folder } = flow;
+    let WindowFlow { window, folder: _folder } = flow;
     // eframe drops the app when the window closes; the runner then closes the session.
     drop(window);
     let session = Session::open(&session).unwrap();
@@ -212,20 +212,20 @@ fn closing_while_moving_stops_first() {
 
 #[test]
 fn closing_at_rest_is_not_held_up() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     let root = flow.window.input_mut().viewports.get_mut(&ViewportId::ROOT);
     root.unwrap().events.push(ViewportEvent::Close);
     flow.window.step();
     assert!(!commands(&flow.window).contains(&ViewportCommand::CancelClose));
 }
 
-fn commands(window: &Window) -> &[ViewportCommand] {
+fn commands(window: &TestWindow) -> &[ViewportCommand] {
     &window.output().viewport_output[&ViewportId::ROOT].commands
 }
 
 #[test]
 fn forces_beyond_the_calibration_ask_for_an_acknowledgement() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     let tick = "I accept this; it is recorded";
     assert!(flow.window.query_by_label(tick).is_none());
     flow.type_into("depth", "45");
@@ -244,7 +244,7 @@ fn forces_beyond_the_calibration_ask_for_an_acknowledgement() {
 
 #[test]
 fn an_unusable_folder_is_refused_in_words_and_nothing_moves() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     let file = flow.folder.path().join("a-file");
     std::fs::write(&file, "not a folder").unwrap();
     flow.type_into("sessions in", &file.display().to_string());
@@ -255,7 +255,7 @@ fn an_unusable_folder_is_refused_in_words_and_nothing_moves() {
 }
 
 /// Corners of all triangles of a frame.
-fn vertices(window: &Window) -> usize {
+fn vertices(window: &TestWindow) -> usize {
     let shapes = window.output().shapes.clone();
     let meshes = window.ctx.tessellate(shapes, 1.0);
     meshes
@@ -270,10 +270,10 @@ fn vertices(window: &Window) -> usize {
 /// What a frame takes is what it draws; `scripts/measure window` measures the time.
 #[test]
 fn frames_draw_as_much_of_a_long_run_as_of_a_short_one() {
-    let mut flow = Flow::open(TimeScale::Factor(40.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(40.0));
     flow.click("Start  F5");
     flow.wait_for_phase(Phase::Hold);
-    let samples = |flow: &Flow| flow.run().map_or(0, |run| run.samples);
+    let samples = |flow: &WindowFlow| flow.run().map_or(0, |run| run.samples);
     let (before, early) = (samples(&flow), vertices(&flow.window));
     flow.wait_for_end();
     let (after, late) = (samples(&flow), vertices(&flow.window));
@@ -292,7 +292,7 @@ fn what_a_crash_left_is_recovered_and_reported_when_the_window_opens() {
     let whole = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
     let bytes = std::fs::read(whole).unwrap();
     std::fs::write(crashed.join("000.mcap"), &bytes[..bytes.len() / 2]).unwrap();
-    let mut flow = Flow::open_in(folder, TimeScale::Max);
+    let mut flow = WindowFlow::open_in(folder, TimeScale::Max);
     flow.wait("the recovery", |window| window.query_by_label("Recovered after a crash").is_some());
     let kept = flow.folder.path().join("sessions/crashed.recovered");
     let session = palpate_sessions::Session::open(&kept).unwrap();

@@ -1,11 +1,11 @@
 //! The library's screen: found, chosen, looked at, spoken of, taken back, written out.
 use eframe::egui::{Key, Modifiers, Role};
 use egui_kittest::kittest::Queryable;
-use palpate_analysis::edited;
+use palpate_analysis::edited_session;
 use palpate_runner::TimeScale;
-use palpate_sessions::edits::{Change, Edits, Verdict};
-use palpate_tests::flow::Flow;
-use palpate_tests::many::{original, write};
+use palpate_sessions::edits::{DataQuality, EditChange, Edits};
+use palpate_tests::flow::WindowFlow;
+use palpate_tests::sample_library::{read_original, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -14,12 +14,12 @@ use tempfile::TempDir;
 const SESSIONS: usize = 24;
 
 /// A library, the folder of each of its sessions, and the window on its library screen.
-fn opened() -> (Flow, Vec<PathBuf>) {
+fn opened() -> (WindowFlow, Vec<PathBuf>) {
     let folder = TempDir::new().unwrap();
-    let original = original();
+    let original = read_original();
     let sessions = (0..SESSIONS).map(|number| write(folder.path(), &original, number));
     let sessions = sessions.collect();
-    let mut flow = Flow::open_in(folder, TimeScale::Max);
+    let mut flow = WindowFlow::open_in(folder, TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num4);
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     (flow, sessions)
@@ -30,7 +30,7 @@ fn row(number: usize) -> String {
     format!("20260101T000000Z-{number:08x}")
 }
 
-fn click_row(flow: &mut Flow, number: usize, modifiers: Modifiers) {
+fn click_row(flow: &mut WindowFlow, number: usize, modifiers: Modifiers) {
     let name = row(number);
     let row = flow.window.get_by_label_contains(&name);
     match modifiers {
@@ -41,7 +41,7 @@ fn click_row(flow: &mut Flow, number: usize, modifiers: Modifiers) {
 }
 
 /// Takes a name from a list that is open, once it is there: the catalog may still be reading what was said.
-fn pick(flow: &mut Flow, name: &str) {
+fn pick(flow: &mut WindowFlow, name: &str) {
     flow.wait(name, |window| {
         let mut found = window.query_all_by_role_and_label(Role::Button, name);
         found.next().is_some()
@@ -174,9 +174,9 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.wait_for_words("accepted, by Grace: looked at with the video");
     let written = edits(&sessions[20]);
     let (worth, why) = written.verdict().unwrap();
-    assert_eq!((worth, why.by.as_str()), (Verdict::Suspect, "Grace"));
+    assert_eq!((worth, why.by.as_str()), (DataQuality::Suspect, "Grace"));
     assert_eq!(written.notes().count(), 1);
-    assert!(written.all.iter().any(|edit| matches!(edit.change, Change::Review { .. })));
+    assert!(written.all.iter().any(|edit| matches!(edit.change, EditChange::Review { .. })));
     flow.window.check_accessibility();
     // Whoever types a note finds the session by it.
     flow.type_into("find", "warm gel");
@@ -187,17 +187,17 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.wait_for_words("valid: finished, no sample missing");
     // The review saw another verdict.
     flow.wait_for_words("outdated, by Grace");
-    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Valid);
+    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, DataQuality::Valid);
     // A verdict that was replaced since is not undone.
     flow.type_into("reason", "hair again");
     flow.click("Rejected");
     flow.wait_for_words("rejected: hair again");
-    let subject = palpate_analysis::edits::Subject::read(&sessions[20]).unwrap();
-    let verdict = Verdict::Suspect;
-    subject.say("Mary", "not that bad", Change::Verdict { verdict }).unwrap();
+    let subject = palpate_analysis::edits::EditTarget::read(&sessions[20]).unwrap();
+    let verdict = DataQuality::Suspect;
+    subject.add_edit("Mary", "not that bad", EditChange::Verdict { verdict }).unwrap();
     flow.click("Undo: verdict rejected on 1 session");
     flow.wait_for_words("given again");
-    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Suspect);
+    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, DataQuality::Suspect);
     flow.wait_for_words("suspect: not that bad");
 }
 
@@ -225,7 +225,7 @@ fn damage_is_reported_and_sessions_are_exported() {
     flow.wait_for_words("2 of 3 sessions written");
     assert!(flow.says(&format!("{}: ", row(7))), "what was not exported is listed");
     let text = fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap();
-    let rows = edited::open(&sessions[8]).unwrap().session.rows.len();
+    let rows = edited_session::open(&sessions[8]).unwrap().session.rows.len();
     assert_eq!(text.lines().count(), rows + 1);
     // Nothing is written over.
     fs::write(to.join(format!("{}.csv", row(8))), "mine").unwrap();

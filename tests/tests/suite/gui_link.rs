@@ -5,7 +5,7 @@ use palpate_drivers::{Rig, RigError, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand, RigDescription};
 use palpate_runner::TimeScale;
-use palpate_tests::flow::Flow;
+use palpate_tests::flow::WindowFlow;
 use palpate_window::window::WindowOptions;
 
 /// A rig whose plug is pulled after a second, and put back after the first try to connect again.
@@ -44,7 +44,7 @@ impl Rig for Unplugged {
     fn reconnect(&mut self) -> Result<(), RigError> {
         self.tries += 1;
         if self.tries < 2 {
-            return Err(RigError::NotAgain);
+            return Err(RigError::CannotReconnect);
         }
         Ok(())
     }
@@ -63,7 +63,7 @@ fn a_lost_link_is_reported_and_reconnected_by_a_button() {
         tries: 0,
         is_reported: false,
     });
-    let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
+    let mut flow = WindowFlow::open_on(options, tempfile::tempdir().unwrap());
     flow.wait("the loss", |window| window.state().snapshot().rig.link_error.is_some());
     flow.window.step();
     assert!(flow.says("State: LINK LOST"));

@@ -3,9 +3,9 @@ use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_haptics::Flags;
 use palpate_model::{Depth, Seconds};
-use palpate_rheology::families::by_key;
+use palpate_rheology::families::find_family;
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::extremes::ExtremesScreen;
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::models::ModelsScreen;
@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// A ramp and hold of a Kelvin body with 1 % of repeatable roughness, as a table.
 fn table(path: &Path, speed: f64) {
-    let body = by_key("kelvin").unwrap().model(&[1.5], &[0.15, 0.6]).unwrap();
+    let body = find_family("kelvin").unwrap().model(&[1.5], &[0.15, 0.6]).unwrap();
     let times = || (0..500).map(|i| 0.05 * f64::from(i));
     let forces = body.along(times().map(|t| (Seconds(t), Depth((speed * t).min(10.0))))).unwrap();
     let mut text = String::from("t_s,F_N,x_mm\n");
@@ -29,14 +29,14 @@ fn table(path: &Path, speed: f64) {
     std::fs::write(path, text).unwrap();
 }
 
-fn show_screen(flow: &mut Flow, key: Key) {
+fn show_screen(flow: &mut WindowFlow, key: Key) {
     flow.window.key_press_modifiers(Modifiers::COMMAND, key);
     flow.window.run_steps(3);
 }
 
 #[test]
 fn models_are_compared_in_the_window() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num6);
     assert!(!flow.is_enabled("Compare models  F6"));
     assert!(flow.says("add a recording first"));
@@ -52,7 +52,7 @@ fn models_are_compared_in_the_window() {
     flow.type_into("tolerance", "1%");
     flow.window.check_accessibility();
     flow.click("Compare models  F6");
-    let has_answer = |window: &Window| screen_of::<ModelsScreen>(window).answer().is_some();
+    let has_answer = |window: &TestWindow| screen_of::<ModelsScreen>(window).answer().is_some();
     flow.wait("the comparison", has_answer);
     flow.window.run_steps(3);
     let answer = screen_of::<ModelsScreen>(&flow.window).answer().unwrap();
@@ -80,7 +80,7 @@ fn models_are_compared_in_the_window() {
 
 #[test]
 fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     flow.click("Start  F5");
     flow.wait_for_phase(palpate_model::rig::Phase::Contact);
     show_screen(&mut flow, Key::Num8);
@@ -95,7 +95,7 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
 
 #[test]
 fn the_trade_is_measured_in_the_window() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num7);
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
@@ -114,7 +114,7 @@ fn the_trade_is_measured_in_the_window() {
 
 #[test]
 fn the_extremes_are_tested_in_the_window() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num8);
     flow.click("Test the extremes  F6");
     flow.wait("progress", |window| screen_of::<ExtremesScreen>(window).rows().is_none());
@@ -126,25 +126,25 @@ fn the_extremes_are_tested_in_the_window() {
 }
 
 /// The device of the guide's example: it buzzes without its guards.
-fn type_buzz(flow: &mut Flow) {
+fn type_buzz(flow: &mut WindowFlow) {
     flow.click("current");
     for (name, text) in [("damping", "0.5"), ("friction", "0"), ("delay", "2")] {
         flow.type_into(name, text);
     }
 }
 
-fn check_haptics(flow: &mut Flow) {
+fn check_haptics(flow: &mut WindowFlow) {
     flow.click("Check  F6");
     flow.wait("the check", |window| {
         let haptics = screen_of::<HapticsScreen>(window);
-        haptics.looked().is_some() && !haptics.is_busy()
+        haptics.check_result().is_some() && !haptics.is_busy()
     });
     flow.window.run_steps(3);
 }
 
 #[test]
 fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num9);
     assert!(flow.says("nothing checked yet") && flow.says("check this setting first"));
     assert!(!flow.is_enabled("Start the loop"));
@@ -155,11 +155,11 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
     flow.type_into("rate", "1000");
     type_buzz(&mut flow);
     check_haptics(&mut flow);
-    let looked = screen_of::<HapticsScreen>(&flow.window).looked().unwrap();
+    let looked = screen_of::<HapticsScreen>(&flow.window).check_result().unwrap();
     let checked = &looked.as_ref().unwrap().checked;
     // The source thesis's body: the model itself returns energy below 0.712 mm.
     assert!((checked.margin.cycles[0].to.0 - 0.712).abs() < 1e-3);
-    assert!(checked.tried[0].buzz_share > 0.5);
+    assert!(checked.trials[0].buzz_share > 0.5);
     let sentences = checked.sentences.clone();
     for sentence in &sentences {
         assert!(flow.says(sentence), "{sentence}");
@@ -188,8 +188,8 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
 }
 
 /// Depth of the slave and force commanded, as the screen has them.
-fn felt(window: &Window) -> [f64; 2] {
-    let feel = screen_of::<HapticsScreen>(window).feel();
+fn felt(window: &TestWindow) -> [f64; 2] {
+    let feel = screen_of::<HapticsScreen>(window).live_loop();
     feel.map_or([0.0; 2], |feel| {
         let seen = &feel.last().snapshot;
         [seen.depth.0, seen.force.0]
@@ -198,18 +198,18 @@ fn felt(window: &Window) -> [f64; 2] {
 
 #[test]
 fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num9);
     check_haptics(&mut flow);
     flow.click("Start the loop");
     flow.wait("the loop", |window| {
-        let feel = screen_of::<HapticsScreen>(window).feel();
+        let feel = screen_of::<HapticsScreen>(window).live_loop();
         feel.is_some_and(|feel| feel.kept().work.count > 0)
     });
     // Above the surface there is none, and the screen says so.
     flow.click("Lift off");
     flow.wait("the words", |window| {
-        screen_of::<HapticsScreen>(window).feel().is_some_and(|feel| {
+        screen_of::<HapticsScreen>(window).live_loop().is_some_and(|feel| {
             let flags = feel.flags();
             flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
         })
@@ -227,7 +227,8 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     flow.click("Lift off");
     flow.wait("none", |window| felt(window)[1] == 0.0);
     // The slider leads the hand as the buttons do.
-    let at_hand = |flow: &Flow| screen_of::<HapticsScreen>(&flow.window).feel().unwrap().place();
+    let at_hand =
+        |flow: &WindowFlow| screen_of::<HapticsScreen>(&flow.window).live_loop().unwrap().place();
     let before = at_hand(&flow);
     flow.window.get_all_by_label("hand").next().unwrap().focus();
     flow.window.run_steps(2);
@@ -245,7 +246,7 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
 
 #[test]
 fn a_scene_is_measured_and_planned_in_the_window() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num7);
     flow.click("Scene: mesh");
     assert!(flow.says("nothing measured on this machine yet") && flow.says("measure first"));
@@ -279,7 +280,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
 
 #[test]
 fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     show_screen(&mut flow, Key::Num9);
     check_haptics(&mut flow);
     let folder = flow.folder.path().join("felt");

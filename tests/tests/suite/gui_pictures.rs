@@ -129,7 +129,7 @@ fn show(window: &mut Window, session: &Path) {
 
 /// Checks the device of the guide's example on the haptics screen, unless that is done.
 fn check_buzz(window: &mut Window) {
-    if screen_of::<HapticsScreen>(window).looked().is_some() {
+    if screen_of::<HapticsScreen>(window).check_result().is_some() {
         return;
     }
     window.get_by_label("current").click_accesskit();
@@ -143,7 +143,7 @@ fn check_buzz(window: &mut Window) {
     window.get_by_label("Check  F6").click_accesskit();
     for _ in 0..FRAMES_MAX {
         window.step();
-        if screen_of::<HapticsScreen>(window).looked().is_some() {
+        if screen_of::<HapticsScreen>(window).check_result().is_some() {
             // A caret in a field would come and go.
             window.get_by_label("Check  F6").focus();
             window.run_steps(2);
@@ -158,7 +158,7 @@ fn check_buzz(window: &mut Window) {
 fn compute_poke(window: &mut Window) {
     for _ in 0..FRAMES_MAX {
         window.step();
-        if screen_of::<SceneScreen>(window).ahead().is_some() {
+        if screen_of::<SceneScreen>(window).computed_path().is_some() {
             window.run_steps(2);
             return;
         }

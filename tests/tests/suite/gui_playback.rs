@@ -1,8 +1,8 @@
 //! The window of a replay, driven by accessible name: no display, no pixels.
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use palpate_analysis::opening::PlaybackRequest;
 use palpate_analysis::source::calibration_of;
+use palpate_analysis::window_requests::PlaybackRequest;
 use palpate_model::units::Newtons;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::replay::Player;

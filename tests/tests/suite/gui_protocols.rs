@@ -5,18 +5,18 @@ use egui_kittest::kittest::Queryable;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{EndingKind, PauseView};
 use palpate_runner::{RunView, TimeScale};
-use palpate_sessions::{Session, Shelf};
-use palpate_tests::flow::Flow;
+use palpate_sessions::{CalibrationStore, Session};
+use palpate_tests::flow::WindowFlow;
 
 /// Opens the list of protocols and takes one by its title.
-fn choose(flow: &mut Flow, title: &str) {
+fn choose(flow: &mut WindowFlow, title: &str) {
     flow.click("Change protocol...");
     flow.click(title);
     flow.window.run_steps(2);
 }
 
 /// Waits until the run on the screen is as wanted.
-fn wait_for(flow: &mut Flow, what: &str, is_so: impl Fn(&RunView) -> bool) {
+fn wait_for(flow: &mut WindowFlow, what: &str, is_so: impl Fn(&RunView) -> bool) {
     flow.wait(what, |window| window.state().snapshot().run.as_ref().is_some_and(&is_so));
     flow.window.run_steps(2);
 }
@@ -26,7 +26,7 @@ fn is_paused(run: &RunView) -> bool {
 }
 
 /// Fills in a short preconditioning of so many cycles.
-fn short_preconditioning(flow: &mut Flow, cycles: &str) {
+fn short_preconditioning(flow: &mut WindowFlow, cycles: &str) {
     for (name, text) in [
         ("operator", "Ada"),
         ("specimen", "S-014"),
@@ -42,7 +42,7 @@ fn short_preconditioning(flow: &mut Flow, cycles: &str) {
 
 #[test]
 fn preconditioning_is_paused_after_a_cycle_and_resumed() {
-    let mut flow = Flow::open(TimeScale::Factor(10.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(10.0));
     choose(&mut flow, "Preconditioning to a depth");
     assert!(flow.says("Depth as planned"));
     assert!(!flow.is_enabled("Start  F5"));
@@ -79,7 +79,7 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
 
 #[test]
 fn an_interrupted_ramp_is_not_resumed_but_finished_early() {
-    let mut flow = Flow::open(TimeScale::Factor(10.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(10.0));
     choose(&mut flow, "Preconditioning to a depth");
     short_preconditioning(&mut flow, "3");
     // A ramp that a busy computer does not miss: a minute of session time.
@@ -109,7 +109,7 @@ fn abort_and_halt_end_a_paused_run() {
         ("Halt  F11", EndingKind::Halt),
         ("Stop motion  F12", EndingKind::Stop),
     ] {
-        let mut flow = Flow::open(TimeScale::Factor(20.0));
+        let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
         flow.click("Start  F5");
         flow.wait_for_phase(Phase::Contact);
         flow.click("Pause  F7");
@@ -129,7 +129,7 @@ fn abort_and_halt_end_a_paused_run() {
 
 #[test]
 fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     let file = flow.folder.path().join("own.toml");
     let good = "palpate = 1\nname = \"own\"\nversion = 1\ntitle = \"My own\"\nabout = \"Press and wait.\"\nsource = \"mine\"\n[parameters]\ndeep = { default = \"4 mm\", about = \"how deep\" }\n[procedure]\nsteps = [\n  { do = \"self-test\" },\n  { do = \"home\" },\n  { do = \"tare\" },\n  { do = \"find-contact\" },\n  { do = \"ramp\", speed = \"3 mm/s\", depth = \"$deep\" },\n  { do = \"hold\", for = \"1 s\" },\n  { do = \"retract\" },\n]\n";
     std::fs::write(&file, good.replace("\"ramp\"", "\"rmap\"")).unwrap();
@@ -158,7 +158,7 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
 
 #[test]
 fn a_calibration_is_measured_by_prompts_kept_and_used() {
-    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(30.0));
     flow.click("Calibration");
     flow.wait_for_words("(built in)");
     flow.window.check_accessibility();
@@ -197,7 +197,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     flow.click("Save this calibration");
     flow.wait_for_words("saved as ");
     flow.window.run_steps(2);
-    let shelf = Shelf::open(flow.folder.path());
+    let shelf = CalibrationStore::open(flow.folder.path());
     let kept = shelf.in_force("sim").unwrap();
     assert!(flow.says(&kept.id) && flow.says("in force"));
     assert!(flow.is_enabled("Use calibration  F6"));
@@ -222,7 +222,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
 
 #[test]
 fn a_declined_prompt_stops_and_keeps_nothing() {
-    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(30.0));
     choose(&mut flow, "Load-cell calibration");
     assert!(flow.says("this protocol does not indent"));
     flow.type_into("operator", "Ada");

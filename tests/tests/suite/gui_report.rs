@@ -3,15 +3,15 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_analysis::fit::Recipe;
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::report::text;
-use palpate_analysis::source::Wanted;
+use palpate_analysis::source::SourceSelection;
 use palpate_model::calibration::Calibration;
 use palpate_rheology::fit::FitOptions;
-use palpate_sessions::analyses::{Analysed, Analyses};
-use palpate_sessions::edits::{Edits, Verdict};
+use palpate_sessions::analyses::{Analyses, AnalysisContent};
+use palpate_sessions::edits::{DataQuality, Edits};
 use palpate_tests::workspace;
-use palpate_window::screens::review::Looked;
+use palpate_window::screens::review::ReviewSource;
 use palpate_window::screens::review::analyses::AnalysesPanel;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ const FRAMES_MAX: usize = 12_000;
 
 struct Shown {
     panel: AnalysesPanel,
-    looked: Looked,
+    looked: ReviewSource,
 }
 
 struct Panel {
@@ -45,12 +45,12 @@ impl Panel {
         });
         let shown = Shown {
             panel: AnalysesPanel::new(Ok(folder.path().join("library"))),
-            looked: Looked { session: session.clone(), analysis: None },
+            looked: ReviewSource { session: session.clone(), analysis: None },
         };
         let window = Harness::builder().with_size((340.0, 1400.0)).build_ui_state(
             move |ui, shown: &mut Shown| {
                 shown.panel.poll(&ui.ctx().clone());
-                let second = Looked { session: beside.clone(), analysis: None };
+                let second = ReviewSource { session: beside.clone(), analysis: None };
                 let all = [shown.looked.clone(), second];
                 shown.panel.set_shown(&all);
                 let mut commands = Default::default();
@@ -111,7 +111,7 @@ impl Panel {
     }
 
     fn id(&self) -> String {
-        let summary = palpate_sessions::Summary::read(&self.session).expect("a summary");
+        let summary = palpate_sessions::SessionSummary::read(&self.session).expect("a summary");
         summary.manifest.session_id
     }
 
@@ -134,7 +134,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     assert_eq!(panel.chosen().as_deref(), Some("all of it"));
     assert!(panel.says("95 % from the profile likelihood"));
     // The numbers of the command line, in its words.
-    let recipe = Recipe::new(FitOptions::default(), Wanted::default());
+    let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
     let report = recipe.fit(&panel.session).expect("a source").result.expect("a fit");
     panel.click("Compare with the session's own fit");
     panel.wait_for("session: ");
@@ -147,7 +147,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     assert_eq!((kept.all.len(), kept.all[0].by.as_str()), (1, "Ada"));
     assert_eq!(kept.all[0].reason, "whole hold");
     assert!(
-        matches!(&kept.all[0].what, Analysed::Fit { results, .. } if results["profile"].is_array())
+        matches!(&kept.all[0].what, AnalysisContent::Fit { results, .. } if results["profile"].is_array())
     );
     // A name is used once.
     panel.type_into("name", "all of it");
@@ -159,7 +159,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     panel.wait_for("withdrawn by Ada");
     assert_eq!(panel.chosen(), None);
     assert_eq!(panel.analyses().all.len(), 2);
-    assert_eq!(panel.analyses().counting().count(), 0);
+    assert_eq!(panel.analyses().active().count(), 0);
     assert!(panel.says("there is no analysis to withdraw"));
 }
 
@@ -175,7 +175,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("forces are left out");
     panel.wait_for("Found by 'knock'");
     let kept = panel.analyses();
-    let Analysed::Mask { left_out_s } = &kept.all[0].what else {
+    let AnalysisContent::Mask { left_out_s } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);
     };
     assert_eq!(left_out_s, &[[20.0, 22.0]]);
@@ -189,7 +189,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("kept as 'simpler'");
     panel.wait_for("Found by 'simpler'");
     let kept = panel.analyses();
-    let Analysed::Fit { based_on, settings, .. } = &kept.all[1].what else {
+    let AnalysisContent::Fit { based_on, settings, .. } = &kept.all[1].what else {
         panic!("{:?}", kept.all[1]);
     };
     assert_eq!((based_on.as_deref(), &settings["family"]), (Some("knock"), &"kelvin".into()));
@@ -208,7 +208,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("kept as 'repeat'");
     panel.wait_for("Found by 'repeat'");
     panel.wait_for("N rms and at most");
-    assert_eq!(panel.analyses().counting().count(), 3);
+    assert_eq!(panel.analyses().active().count(), 3);
     panel.type_into("reason", "only tried");
     panel.click("Withdraw last analysis");
     panel.wait_for("withdrawn by");
@@ -225,7 +225,7 @@ fn sessions_shown_together_are_fitted_as_one_body() {
     panel.click("Make analysis");
     panel.wait_for("kept as 'together'");
     let kept = panel.analyses();
-    let Analysed::Fit { settings, results, .. } = &kept.all[0].what else {
+    let AnalysisContent::Fit { settings, results, .. } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);
     };
     assert_eq!(settings["together_with"][0]["session"], "beside");
@@ -254,7 +254,7 @@ fn a_verdict_and_a_contact_are_corrected_with_a_reason() {
     assert_eq!(changed.as_deref(), Some(panel.session.as_path()));
     let edits = Edits::read(&panel.session, &panel.id()).expect("edits");
     let verdict = edits.verdict().map(|(verdict, edit)| (verdict, edit.reason.as_str()));
-    assert_eq!(verdict, Some((Verdict::Suspect, "hair under the probe")));
+    assert_eq!(verdict, Some((DataQuality::Suspect, "hair under the probe")));
     assert!(edits.contact(1).is_some());
 }
 

@@ -2,20 +2,20 @@
 use eframe::egui::{Key, Modifiers};
 use palpate_runner::TimeScale;
 use palpate_sessions::Session;
-use palpate_tests::flow::Flow;
+use palpate_tests::flow::WindowFlow;
 use palpate_tests::workspace;
 use std::path::PathBuf;
 
 /// A window on the review screen.
-fn review() -> Flow {
-    let mut flow = Flow::open(TimeScale::Max);
+fn review() -> WindowFlow {
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num5);
     flow.window.run_steps(3);
     flow
 }
 
 /// Shows a copy of a recorded session.
-fn show(flow: &mut Flow, name: &str) -> PathBuf {
+fn show(flow: &mut WindowFlow, name: &str) -> PathBuf {
     let path = flow.folder.path().join(name);
     std::fs::create_dir(&path).unwrap();
     for item in std::fs::read_dir(workspace().join("tests/sessions").join(name)).unwrap() {
@@ -128,7 +128,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     flow.window.run_steps(2);
     // The same words as the command line has.
     let options = palpate_rheology::fit::FitOptions::default();
-    let recipe = palpate_analysis::fit::Recipe::new(options, Default::default());
+    let recipe = palpate_analysis::fit::FitRecipe::new(options, Default::default());
     let report = recipe.fit(&path).unwrap().result.unwrap();
     assert!(flow.says(&palpate_analysis::report::text::quality(&report)));
     for sentence in report.sentences() {

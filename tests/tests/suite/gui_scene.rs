@@ -2,22 +2,22 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
-use palpate_haptics::scene::WhyNoForce;
+use palpate_haptics::scene::NoForceReason;
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::scene::SceneScreen;
 use palpate_window::screens::trade::TradeScreen;
 use std::path::Path;
 
-fn open() -> Flow {
-    let mut flow = Flow::open(TimeScale::Max);
+fn open() -> WindowFlow {
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.window.run_steps(3);
     flow
 }
 
 /// Writes a scene file and reads it in the window; `name` is the scene's.
-fn read(flow: &mut Flow, path: &Path, text: &str, name: &str) {
+fn read(flow: &mut WindowFlow, path: &Path, text: &str, name: &str) {
     std::fs::write(path, text).expect("a scene file");
     flow.type_into("file", &path.display().to_string());
     flow.click("Open");
@@ -25,8 +25,8 @@ fn read(flow: &mut Flow, path: &Path, text: &str, name: &str) {
 }
 
 /// The newest depth in mm and force in N.
-fn felt(window: &Window) -> Option<(f64, f64)> {
-    let tick = screen_of::<SceneScreen>(window).touch()?.moment().tick;
+fn felt(window: &TestWindow) -> Option<(f64, f64)> {
+    let tick = screen_of::<SceneScreen>(window).live_scene()?.moment().tick;
     let [x, y, z] = tick.force;
     Some((tick.depth, x.hypot(y).hypot(z)))
 }
@@ -34,9 +34,9 @@ fn felt(window: &Window) -> Option<(f64, f64)> {
 #[test]
 fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     let mut flow = open();
-    flow.wait("the path", |window| screen_of::<SceneScreen>(window).ahead().is_some());
+    flow.wait("the path", |window| screen_of::<SceneScreen>(window).computed_path().is_some());
     flow.window.run_steps(3);
-    let ahead = screen_of::<SceneScreen>(&flow.window).ahead().unwrap();
+    let ahead = screen_of::<SceneScreen>(&flow.window).computed_path().unwrap();
     let deepest = ahead.as_ref().unwrap().deepest.tick;
     assert!(flow.says(&format!("at {:.2} mm", deepest.depth)));
     assert!(flow.says("poke, computed: the deepest point"));
@@ -52,7 +52,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
         felt(window).is_some_and(|(depth, force)| depth > 2.0 && force > 0.05)
     });
     assert!(flow.says("the path leads the hand"));
-    assert!(!flow.says(WhyNoForce::NoContact.name()));
+    assert!(!flow.says(NoForceReason::NoContact.name()));
     flow.window.check_accessibility();
     // Nothing else that keeps time is started beside it.
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num9);
@@ -60,12 +60,12 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     assert!(flow.says("the scene runs and would be disturbed"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.wait("the end of the path", |window| {
-        let touch = screen_of::<SceneScreen>(window).touch().unwrap();
+        let touch = screen_of::<SceneScreen>(window).live_scene().unwrap();
         touch.is_running() && !touch.is_led()
     });
     flow.wait("the stylus above", |window| felt(window).is_some_and(|(depth, _)| depth == 0.0));
     flow.window.run_steps(2);
-    assert!(flow.says(WhyNoForce::NoContact.name()));
+    assert!(flow.says(NoForceReason::NoContact.name()));
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(3);
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
@@ -88,7 +88,7 @@ fn keys_press_into_the_tissue_and_lift_again() {
     flow.wait("a force", |window| {
         felt(window).is_some_and(|(depth, force)| depth > 1.0 && force > 0.02)
     });
-    assert!(!flow.says(WhyNoForce::NoContact.name()));
+    assert!(!flow.says(NoForceReason::NoContact.name()));
     for _ in 0..12 {
         flow.window.key_press(Key::PageUp);
         flow.window.step();
@@ -97,7 +97,7 @@ fn keys_press_into_the_tissue_and_lift_again() {
         felt(window).is_some_and(|(depth, force)| depth == 0.0 && force == 0.0)
     });
     flow.window.run_steps(2);
-    assert!(flow.says(WhyNoForce::NoContact.name()));
+    assert!(flow.says(NoForceReason::NoContact.name()));
     flow.click("Stop the scene");
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
 }
@@ -109,16 +109,19 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
     let text = "name = \"soft pad\"\n[tissue]\nside_mm = 40.0\n[mesh]\nnodes = 81\n";
     read(&mut flow, &path, text, "soft pad");
     flow.click("Start the scene");
-    let touch = screen_of::<SceneScreen>(&flow.window).touch().unwrap();
+    let touch = screen_of::<SceneScreen>(&flow.window).live_scene().unwrap();
     assert_eq!((touch.settings().side_mm, touch.settings().nodes), (40.0, 81));
     flow.click("Stop the scene");
     std::fs::write(&path, text.replace("40.0", "-1.0")).unwrap();
     flow.click("Open");
     flow.wait_for_words("side_mm");
-    assert_eq!(screen_of::<SceneScreen>(&flow.window).touch().unwrap().settings().side_mm, 40.0);
+    assert_eq!(
+        screen_of::<SceneScreen>(&flow.window).live_scene().unwrap().settings().side_mm,
+        40.0
+    );
 }
 
-fn replayed(window: &Window) -> Option<Result<bool, String>> {
+fn replayed(window: &TestWindow) -> Option<Result<bool, String>> {
     let replayed = screen_of::<SceneScreen>(window).replayed()?;
     Some(replayed.as_ref().map(|one| one.is_identical).map_err(Clone::clone))
 }
@@ -134,7 +137,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     flow.click("Start the scene");
     assert!(!flow.is_enabled("Replay recording"));
     flow.wait("the end of the path", |window| {
-        let touch = screen_of::<SceneScreen>(window).touch().unwrap();
+        let touch = screen_of::<SceneScreen>(window).live_scene().unwrap();
         touch.is_running() && !touch.is_led()
     });
     flow.window.key_press(Key::Escape);
@@ -190,7 +193,7 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     flow.click("Use plan");
     flow.window.run_steps(3);
     flow.click("Start the scene");
-    let settings = *screen_of::<SceneScreen>(&flow.window).touch().unwrap().settings();
+    let settings = *screen_of::<SceneScreen>(&flow.window).live_scene().unwrap().settings();
     let curves = screen_of::<TradeScreen>(&flow.window).scene_curves().unwrap();
     let meshes = curves.meshes.iter().map(|mesh| mesh.nodes as usize);
     assert!(meshes.clone().any(|nodes| nodes == settings.nodes));
@@ -208,7 +211,7 @@ fn a_missed_budget_is_reported_before_anything_was_measured_and_a_button_leads_t
     read(&mut flow, &path, text, "strict");
     flow.click("Start the scene");
     flow.wait("times", |window| {
-        let touch = screen_of::<SceneScreen>(window).touch();
+        let touch = screen_of::<SceneScreen>(window).live_scene();
         touch.is_some_and(|touch| touch.kept().work.count > 0)
     });
     flow.window.run_steps(2);

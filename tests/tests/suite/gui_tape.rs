@@ -2,29 +2,29 @@
 use eframe::App;
 use eframe::egui::{DroppedFile, Key, Modifiers};
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::scene::SceneScreen;
 use palpate_window::screens::screen::Screen;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-fn open(key: Key) -> Flow {
-    let mut flow = Flow::open(TimeScale::Max);
+fn open(key: Key) -> WindowFlow {
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, key);
     flow.window.run_steps(3);
     flow
 }
 
 /// Asks for a recording in a new folder.
-fn record(flow: &mut Flow, name: &str) -> PathBuf {
+fn record(flow: &mut WindowFlow, name: &str) -> PathBuf {
     let folder = flow.folder.path().join(name);
     flow.type_into("record to", &folder.display().to_string());
     folder
 }
 
-fn is_deep(window: &Window) -> bool {
-    let touch = screen_of::<SceneScreen>(window).touch();
+fn is_deep(window: &TestWindow) -> bool {
+    let touch = screen_of::<SceneScreen>(window).live_scene();
     touch.is_some_and(|touch| touch.moment().tick.depth > 1.0)
 }
 
@@ -38,7 +38,7 @@ fn write(folder: &Path, lines: &[String]) {
 }
 
 /// The recording is described as it stands on disk. A changed digit of a column is refused, and named where no end tells of it.
-fn check_description(flow: &mut Flow, folder: &Path, column: &str) {
+fn check_description(flow: &mut WindowFlow, folder: &Path, column: &str) {
     flow.wait_for_words("ticks recorded, none lost");
     let whole = lines(folder);
     let end: Vec<&str> = whole.last().unwrap().split(',').collect();
@@ -103,7 +103,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     flow.click("Check  F6");
     flow.wait("the check", |window| {
         let haptics = screen_of::<HapticsScreen>(window);
-        haptics.looked().is_some() && !haptics.is_busy()
+        haptics.check_result().is_some() && !haptics.is_busy()
     });
     // What is recorded is what runs: without guards too.
     flow.click("without guards and controller");
@@ -111,7 +111,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     flow.click("Start the loop");
     flow.click("Ramp and hold");
     flow.wait("a force", |window| {
-        let feel = screen_of::<HapticsScreen>(window).feel();
+        let feel = screen_of::<HapticsScreen>(window).live_loop();
         feel.is_some_and(|feel| feel.last().snapshot.force.0 > 1.0)
     });
     flow.click("Stop the loop");
@@ -158,7 +158,7 @@ impl DroppedFile for Dropped {
     }
 }
 
-fn drop_on(flow: &mut Flow, folder: &Path) {
+fn drop_on(flow: &mut WindowFlow, folder: &Path) {
     let dropped = Dropped(folder.to_owned());
     let input = flow.window.input_mut();
     input.dropped_files.push(Arc::new(dropped));

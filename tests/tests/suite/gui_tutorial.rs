@@ -4,7 +4,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::{TestWindow, WindowFlow};
 use palpate_tests::workspace;
 
 /// One thing that the text asks for.
@@ -95,11 +95,11 @@ fn steps(text: &str) -> Vec<String> {
     steps
 }
 
-fn says(window: &Window, words: &str) -> bool {
+fn says(window: &TestWindow, words: &str) -> bool {
     window.query_all_by_label_contains(words).next().is_some()
 }
 
-fn carry_out(flow: &mut Flow, deed: &Deed) {
+fn carry_out(flow: &mut WindowFlow, deed: &Deed) {
     match deed {
         Deed::Key(key, modifiers) => {
             flow.window.key_press_modifiers(*modifiers, *key);
@@ -153,7 +153,7 @@ fn every_step_of_the_tutorial_does_what_it_says() {
     let steps = steps(&text);
     let count: usize = steps.iter().map(|step| deeds(step).len()).sum();
     assert!(steps.len() > 20 && count > 45, "{count} deeds in {} steps", steps.len());
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     std::fs::create_dir(flow.folder.path().join("out")).unwrap();
     for step in &steps {
         for deed in deeds(step) {

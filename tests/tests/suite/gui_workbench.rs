@@ -6,18 +6,18 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
-use palpate_runner::programme::calibration_of;
+use palpate_runner::programme::calibration_from_session;
 use palpate_runner::replay::replay;
 use palpate_runner::{RunView, TimeScale};
 use palpate_sessions::log::Session;
-use palpate_tests::flow::Flow;
+use palpate_tests::flow::WindowFlow;
 use palpate_window::screens::rig;
 use palpate_window::screens::table::SCREENS;
 use palpate_window::widgets::places::places;
 use palpate_window::window::WindowOptions;
 
 /// Opens the palette, types and takes the first that is found.
-fn by_name(flow: &mut Flow, words: &str) {
+fn by_name(flow: &mut WindowFlow, words: &str) {
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
     flow.window.run_steps(3);
     flow.type_into("what to do", words);
@@ -27,7 +27,7 @@ fn by_name(flow: &mut Flow, words: &str) {
 
 #[test]
 fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.window.key_press(Key::F1);
     flow.window.run_steps(3);
     flow.window.check_accessibility();
@@ -63,7 +63,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
 
 #[test]
 fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     by_name(&mut flow, "start the protocol");
     flow.wait_for_phase(Phase::Contact);
     flow.type_into("note", "a visitor leaned on the table");
@@ -91,7 +91,7 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
 
 #[test]
 fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.window.check_accessibility();
@@ -124,7 +124,7 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
 fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
     options.to_acknowledge = vec!["the daily check failed: zero".into()];
-    let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
+    let mut flow = WindowFlow::open_on(options, tempfile::tempdir().unwrap());
     flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.click("+5 mm");
@@ -139,7 +139,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
 
 #[test]
 fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     let mut seen = 0;
     for screen in SCREENS {
         by_name(&mut flow, &format!("screen {}", screen.name));
@@ -164,13 +164,13 @@ fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
 
 #[test]
 fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
-    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
     by_name(&mut flow, "protocol load-cell-calibration");
     flow.type_into("operator", "Ada");
     flow.type_into("masses", "140 g, 540 g");
     flow.type_into("repeats", "1");
     flow.window.key_press(Key::F5);
-    let weighed = |flow: &Flow| flow.run().map_or(0, |run| run.weighed.len());
+    let weighed = |flow: &WindowFlow| flow.run().map_or(0, |run| run.weight_readings.len());
     let mut redone = false;
     for _ in 0..20 {
         flow.wait("a prompt or the end", |window| {
@@ -211,7 +211,7 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
     let readings =
         session.entries.iter().filter(|one| one.body.to_string().contains("\"weighed\""));
     assert_eq!(readings.count(), 8, "what was read first stays in the session");
-    let calibration = calibration_of(&session, "again").unwrap();
+    let calibration = calibration_from_session(&session, "again").unwrap();
     assert_eq!(calibration.series_steps().count(), 7);
     // The same decisions from the record alone.
     let replayed = replay(&session, &[]).unwrap();
@@ -220,19 +220,19 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
 
 #[test]
 fn zeroing_shows_what_the_probe_feels() {
-    let mut flow = Flow::open(TimeScale::Max);
+    let mut flow = WindowFlow::open(TimeScale::Max);
     by_name(&mut flow, "protocol zeroing");
     flow.window.key_press(Key::F5);
     flow.wait_for_end();
     flow.window.run_steps(3);
     let run = flow.run().unwrap();
-    assert_eq!(run.touches.iter().map(|one| one.pass).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!(run.contact_triggers.iter().map(|one| one.pass).collect::<Vec<_>>(), [1, 2]);
     let contact = run.contact.unwrap();
     assert!(flow.says(&format!("the contact point is at {:.3}", contact.position.0)));
     // The search felt the tissue where it says that it did.
     let points = run.approach.points();
     let deepest = points.iter().map(|point| point.depth).fold(0.0, f64::max);
-    assert!(run.touches.iter().all(|one| one.position.0 <= deepest + 0.1), "{deepest}");
+    assert!(run.contact_triggers.iter().all(|one| one.position.0 <= deepest + 0.1), "{deepest}");
     flow.window.check_accessibility();
 }
 
@@ -244,7 +244,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
         let mut options =
             WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
         options.settings = Some(file.clone());
-        Flow::open_on(options, tempfile::tempdir().unwrap())
+        WindowFlow::open_on(options, tempfile::tempdir().unwrap())
     };
     let mut flow = open();
     assert!(flow.says("Tour 1 of 7"));
@@ -260,7 +260,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     by_name(&mut flow, "light or dark");
     by_name(&mut flow, "larger text");
     // The view's tabs stand right of the left panel: they move with its edge, by name and by the pointer.
-    let edge = |flow: &Flow| flow.window.get_by_label("Protocols").rect().left();
+    let edge = |flow: &WindowFlow| flow.window.get_by_label("Protocols").rect().left();
     let usual = edge(&flow);
     by_name(&mut flow, "larger left panel");
     let larger = edge(&flow);

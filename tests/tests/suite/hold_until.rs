@@ -7,7 +7,7 @@ use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_rheology::fit::{FitOptions, LiveFit, fit};
 use palpate_runner::replay::replay;
 use palpate_sessions::{EntryKind, Session};
-use palpate_tests::recorded;
+use palpate_tests::recorded_runs;
 use serde_json::json;
 
 /// A run with a rule for tau, up to 20 s of hold, and its session.
@@ -21,7 +21,7 @@ fn run_until(relative: f64) -> Session {
         ..RampHold::default()
     };
     let calibration = rig.calibration();
-    let session = recorded::session(Box::new(rig), calibration, params);
+    let session = recorded_runs::record_ramp_hold(Box::new(rig), calibration, params);
     assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
     session
 }

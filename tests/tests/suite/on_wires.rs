@@ -4,10 +4,10 @@
 
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, open_wired};
-use palpate_emulators::galil::{GalilEmulator, GalilSettings};
-use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator};
+use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
 use palpate_haptics::Period;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
@@ -15,14 +15,14 @@ use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::{FindContact, Follow, Plan, Step};
-use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
+use palpate_runner::haptics::slave::{SlaveLeader, SlaveReport, SlaveSettings};
 use palpate_runner::replay::replay;
-use palpate_runner::{Request, Runner, TimeScale, driver_clock};
+use palpate_runner::{Runner, RunnerRequest, TimeScale, driver_clock};
 use palpate_sessions::Session;
 use palpate_test_support::skip::lacks_terminals;
 use palpate_test_support::wait::{Deadline, PATIENCE, retry, until};
 use palpate_tests::lab::{retract, set_up};
-use palpate_tests::{recorded, shipped};
+use palpate_tests::{built_in_plan, recorded_runs};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -42,7 +42,7 @@ impl Emulator {
         let stop = Arc::clone(&is_over);
         let (sender, events) = sync_channel(4);
         let options = ServeOptions {
-            place: Place::Ptys(vec![Some(path.to_owned())]),
+            address: EmulatorAddress::Ptys(vec![Some(path.to_owned())]),
             baud: None,
             latency: Nanos::ZERO,
             faults: Vec::new(),
@@ -51,9 +51,9 @@ impl Emulator {
         let thread = std::thread::Builder::new()
             .name("emulator".into())
             .spawn(move || {
-                let mut device = GalilEmulator::new(GalilSettings {
+                let mut device = GalilEmulator::new(EmulatedGalilSettings {
                     is_serial: true,
-                    ..GalilSettings::default()
+                    ..EmulatedGalilSettings::default()
                 });
                 let (_orders, received) = sync_channel(1);
                 let mut tell = |event| drop(sender.try_send(event));
@@ -62,7 +62,7 @@ impl Emulator {
             })
             .map_err(|err| err.to_string())?;
         match events.recv_timeout(PATIENCE) {
-            Ok(Told::Ready(_)) => Ok(Self(is_over, Some(thread))),
+            Ok(ServeEvent::Ready(_)) => Ok(Self(is_over, Some(thread))),
             _ => Err("there is no pseudo-terminal".into()),
         }
     }
@@ -134,7 +134,7 @@ fn a_slave_on_wires_follows_a_master_in_real_time() {
     let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
     assert_eq!(lost.count(), 0);
     // Its loop is in real time: a tick a millisecond of what followed, missed ones among them.
-    let kept = slaved.master_loop.unwrap().kept;
+    let kept = slaved.master_loop.unwrap().timing;
     let ticks = kept.late.count + kept.missed;
     assert!(ticks >= 5_500, "{ticks}");
 }
@@ -146,7 +146,7 @@ fn deepest_followed(session: &Session) -> f64 {
 }
 
 /// One run of a slave, checked however it ended; what was followed, or why it ended early.
-fn slave_once() -> Result<(Slaved, Session), String> {
+fn slave_once() -> Result<(SlaveReport, Session), String> {
     let folder = tempfile::tempdir().unwrap();
     let port = folder.path().join("galil");
     let _emulator = Emulator::at(&port).unwrap();
@@ -164,7 +164,7 @@ fn slave_once() -> Result<(Slaved, Session), String> {
     };
     let mut steps = set_up(Seconds(1.0), contact);
     steps.extend([Step::Follow(follow), retract()]);
-    let hand = Hand::firm(HandPath::Sine { middle: 3.0, amplitude: 3.0, hz: 0.2 });
+    let hand = SimulatedHand::firm(HandPath::Sine { middle: 3.0, amplitude: 3.0, hz: 0.2 });
     let body = ModifiedKelvin::THESIS;
     let leader = SlaveLeader::new(SlaveSettings {
         master: SimulationSettings::of(body, Period::MILLISECOND, hand),
@@ -176,11 +176,12 @@ fn slave_once() -> Result<(Slaved, Session), String> {
     let leader = Arc::new(Mutex::new(leader.unwrap()));
     let plan = Plan::of("slave", 1, steps);
     let scale = TimeScale::Factor(1.0);
-    let session = recorded::of_led_plan(rig, calibration, plan, scale, Arc::clone(&leader) as _);
+    let session =
+        recorded_runs::record_led_plan(rig, calibration, plan, scale, Arc::clone(&leader) as _);
     let deepest = deepest_followed(&session);
     assert!(deepest <= 4.0 + 1e-9, "{deepest}");
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
-    let slaved = leader.lock().unwrap().slaved();
+    let slaved = leader.lock().unwrap().report();
     match early_end(&session) {
         None => Ok((slaved.unwrap(), session)),
         Some(why) => Err(why),
@@ -201,9 +202,10 @@ fn protocol_once() -> Result<(), String> {
     let port = folder.path().join("galil");
     let emulator = Emulator::at(&port).unwrap();
     let (rig, calibration) = bench(folder.path(), &port).unwrap();
-    let plan = shipped("check-home", &[]);
+    let plan = built_in_plan("check-home", &[]);
     let out = folder.path().join("session");
-    let (runner, woken) = recorded::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
+    let (runner, woken) =
+        recorded_runs::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
     let has_ended = || {
         let snapshot = runner.snapshot();
         snapshot.run.as_ref().is_some_and(|run| run.outcome.is_some())
@@ -217,7 +219,7 @@ fn protocol_once() -> Result<(), String> {
     // What was ended late may be short.
     if early_end.is_none() {
         assert!(session.rows.len() > 100, "{}", session.rows.len());
-        assert!(session.beside.raw_bytes > 1000);
+        assert!(session.auxiliary.raw_bytes > 1000);
     }
     // A sample is never younger than nothing, and its age is known to some ten milliseconds on any computer.
     let ages = session.rows.iter().map(|row| row.age);
@@ -233,7 +235,7 @@ fn protocol_once() -> Result<(), String> {
     let is_lost = || runner.snapshot().rig.link_error.is_some();
     assert!(wait(&runner, &woken, is_lost), "the loss is not noticed");
     let _emulator = Emulator::at(&port).unwrap();
-    runner.request(Request::Reconnect).unwrap();
+    runner.request(RunnerRequest::Reconnect).unwrap();
     let is_back = || {
         let rig = &runner.snapshot().rig;
         rig.link_error.is_none() && rig.reading.is_some() && !rig.is_homed

@@ -5,11 +5,11 @@ use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::Limits;
 use palpate_model::units::{MmPerS, Seconds};
-use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record, State};
+use palpate_protocols::engine::{EndingKind, EngineState, Operator, PauseView, Record};
 use palpate_protocols::file::{BUILT_IN, built_in};
-use palpate_protocols::plans::{Plan, Press, Step, Tare};
+use palpate_protocols::plans::{ContactPress, Plan, Step, Tare};
 use palpate_protocols::preview::preview;
-use palpate_tests::lab::{Lab, Seen};
+use palpate_tests::lab::{Lab, LabSample};
 use std::collections::BTreeMap;
 
 /// Values that make a protocol short and keep each of its steps; for every built-in one.
@@ -67,7 +67,8 @@ fn plan(name: &str) -> Plan {
             Step::FindContact(search) => {
                 search.recovery = Seconds(0.5);
                 search.approach_speed = MmPerS(3.0);
-                search.press = search.press.map(|press| Press { dwell: Seconds(1.0), ..press });
+                search.press =
+                    search.press.map(|press| ContactPress { dwell: Seconds(1.0), ..press });
                 search.pass_speed = MmPerS(0.3);
             }
             Step::Tare(Tare { duration }) => *duration = Seconds(1.0),
@@ -93,9 +94,9 @@ fn lab(plan: &Plan) -> Lab<SimRig> {
 }
 
 /// Goes on, prompts answered, until the run ends or `is_reached`.
-fn go_on(lab: &mut Lab<SimRig>, is_reached: impl Fn(&State) -> bool) {
+fn go_on(lab: &mut Lab<SimRig>, is_reached: impl Fn(&EngineState) -> bool) {
     loop {
-        let is_stop = |state: &State| is_reached(state) || state.prompt().is_some();
+        let is_stop = |state: &EngineState| is_reached(state) || state.prompt().is_some();
         assert!(lab.run_until(Seconds(1e4), is_stop), "it does not end");
         if is_reached(lab.state()) || lab.outcome.is_some() || lab.state().holding().is_some() {
             return;
@@ -116,7 +117,7 @@ fn undisturbed(plan: &Plan) -> Lab<SimRig> {
 fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
     let mut lab = lab(plan);
     lab.operator(Operator::Start);
-    go_on(&mut lab, |state: &State| {
+    go_on(&mut lab, |state: &EngineState| {
         let (index, started) = state.step_progress();
         index == step_index && started > Nanos::ZERO
     });
@@ -125,7 +126,7 @@ fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
     }
     assert_eq!(lab.state().step_progress().0, step_index);
     lab.operator(Operator::Pause);
-    let is_paused = |state: &State| matches!(state.pause(), PauseView::Paused { .. });
+    let is_paused = |state: &EngineState| matches!(state.pause(), PauseView::Paused { .. });
     assert!(lab.run_until(Seconds(100.0), is_paused));
     let PauseView::Paused { no_resume } = lab.state().pause() else {
         panic!("{:?}, {:?}", lab.state().pause(), lab.state().holding());
@@ -153,7 +154,7 @@ fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
 }
 
 /// Mean of something over the last samples of a step.
-fn at_end(lab: &Lab<SimRig>, step_index: usize, of: fn(&Seen) -> Option<f64>) -> Option<f64> {
+fn at_end(lab: &Lab<SimRig>, step_index: usize, of: fn(&LabSample) -> Option<f64>) -> Option<f64> {
     let own = lab.seen.iter().rev();
     let own = own
         .skip_while(|seen| seen.step_index != step_index)
@@ -209,7 +210,7 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
             false => DEPTH_OF_FORCE,
         };
         assert!(deep <= allowed, "{what}: {deep} mm");
-        let force = |seen: &Seen| seen.derived.force.map(|force| force.0);
+        let force = |seen: &LabSample| seen.derived.force.map(|force| force.0);
         let [hard, usual] = [now, before].map(|lab| at_end(lab, index, force).unwrap());
         let is_alike = (hard - usual).abs() <= FORCE || has_rested && index > paused;
         assert!(is_alike, "{what}: {hard} {usual} N");

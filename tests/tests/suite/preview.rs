@@ -2,7 +2,7 @@
 //! that the preview kept quiet about.
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -16,7 +16,7 @@ use palpate_tests::lab::{Lab, retract, set_up};
 /// Random plans in the test suite: about ten seconds.
 const PLANS: u64 = 30;
 
-fn bench(seed: u64) -> (SimRig, Curve) {
+fn bench(seed: u64) -> (SimRig, CalibrationCurve) {
     let rig =
         SimRig::new(SimSettings { profile: SimProfile::Ideal, seed, ..SimSettings::default() });
     let curve = rig.calibration().curve().unwrap();

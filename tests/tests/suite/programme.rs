@@ -4,11 +4,12 @@ use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
-use palpate_protocols::file::{Problem, Severity};
+use palpate_protocols::file::{ProblemSeverity, ProtocolProblem};
 use palpate_runner::programme::{
-    Done, Entry, Event, Laboratory, Programme, ProgrammeError, RunError, run,
+    Programme, ProgrammeEntry, ProgrammeError, ProgrammeEvent, ProgrammeResult, ProgrammeRunError,
+    ProgrammeSetup, run_programme,
 };
-use palpate_runner::{Answers, Runner, TimeScale};
+use palpate_runner::{PromptResponder, Runner, TimeScale};
 use palpate_sessions::journal::JOURNAL_FILE;
 use palpate_sessions::text::checksum;
 use palpate_tests::workspace;
@@ -21,7 +22,7 @@ fn programme(text: &str) -> Programme {
 }
 
 /// Carries a programme out in a folder on a rig just switched on.
-fn carry_out(text: &str, folder: &Path) -> Result<Done, RunError> {
+fn carry_out(text: &str, folder: &Path) -> Result<ProgrammeResult, ProgrammeRunError> {
     let whole = programme(text);
     carry_out_on(&whole, text, folder, SimSettings::default(), &|_, _| {})
 }
@@ -33,7 +34,7 @@ fn carry_out_on(
     folder: &Path,
     settings: SimSettings,
     change: &dyn Fn(&mut Limits, &mut Calibration),
-) -> Result<Done, RunError> {
+) -> Result<ProgrammeResult, ProgrammeRunError> {
     let rig = SimRig::new(settings);
     let description = rig.description().clone();
     let mut calibration = rig.calibration();
@@ -44,19 +45,19 @@ fn carry_out_on(
         let _ = wake.try_send(());
     })
     .unwrap();
-    let laboratory = Laboratory {
+    let laboratory = ProgrammeSetup {
         runner: &runner,
         woken: &woken,
         rig: &description,
         limits,
         calibration,
         folder,
-        answers: Answers::Confirm,
+        answers: PromptResponder::Confirm,
         gate: &|_| Ok(Vec::new()),
     };
     let mut begun = 0;
-    let done = run(whole, &checksum(text), laboratory, &mut |event| {
-        begun += u32::from(matches!(event, Event::Begun { .. }));
+    let done = run_programme(whole, &checksum(text), laboratory, &mut |event| {
+        begun += u32::from(matches!(event, ProgrammeEvent::Begun { .. }));
     });
     assert!(begun > 0 || done.is_err() || done.as_ref().unwrap().was_continued);
     done
@@ -93,15 +94,15 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
         text += &lines[kept][..lines[kept].len() / 2];
         std::fs::write(folder.path().join(JOURNAL_FILE), &text).unwrap();
         let entries = lines[..kept].iter().map(|line| serde_json::from_str::<Value>(line).unwrap());
-        let entries: Vec<Entry> =
+        let entries: Vec<ProgrammeEntry> =
             entries.map(|line| serde_json::from_value(line["body"].clone()).unwrap()).collect();
         for entry in &entries {
-            if let Entry::Begun { session, .. } = entry {
+            if let ProgrammeEntry::Begun { session, .. } = entry {
                 std::fs::create_dir_all(folder.path().join(session)).unwrap();
                 std::fs::write(folder.path().join(session).join("000.mcap"), "broken").unwrap();
             }
         }
-        let is_interrupted = matches!(entries.last(), Some(Entry::Begun { .. }));
+        let is_interrupted = matches!(entries.last(), Some(ProgrammeEntry::Begun { .. }));
         let again = carry_out(JOGS, folder.path()).unwrap();
         let finished = |task| again.progress.finished(task).len();
         assert_eq!((finished(0), finished(1)), (3, 1), "{kept}");
@@ -335,7 +336,7 @@ name = "stomach"
 
 /// Whether a problem of that line has that fact.
 fn has_problem(refusal: &ProgrammeError, (line, fact): &(u32, &str)) -> bool {
-    let is_it = |one: &Problem| one.line == *line && one.message.contains(fact);
+    let is_it = |one: &ProtocolProblem| one.line == *line && one.message.contains(fact);
     refusal.0.iter().any(is_it)
 }
 
@@ -383,9 +384,9 @@ fn what_could_never_work_is_refused_with_its_line() {
 #[test]
 fn the_day_in_the_laboratory_is_a_programme() {
     let text = std::fs::read_to_string(workspace().join("examples/day-in-the-lab.toml")).unwrap();
-    assert!(Programme::is_meant(&text));
+    assert!(Programme::is_programme_text(&text));
     assert_eq!(programme(&text).session_count(), 10);
-    assert_eq!(programme(&text).questions(), []);
+    assert_eq!(programme(&text).open_questions(), []);
 }
 
 const LABELLED: &str = r#"
@@ -433,15 +434,15 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
     let text = LABELLED.replace("specimen-source = \"x\"\n", "");
     let mut whole = programme(&text);
     // Without a source the two protocols that ask for it say so, each at its line.
-    let asked = whole.questions();
+    let asked = whole.open_questions();
     assert_eq!(asked.len(), 3, "{asked:?}");
-    assert_eq!((asked[0].line, asked[0].severity), (24, Severity::Warning));
+    assert_eq!((asked[0].line, asked[0].severity), (24, ProblemSeverity::Warning));
     for (question, task) in asked.iter().zip(["'first'", "'second'"]) {
         let message = &question.message;
         assert!(message.contains(task) && message.contains("specimen.source"), "{asked:?}");
     }
-    whole.tell("specimen.source", "pig").unwrap();
-    assert_eq!(whole.questions(), []);
+    whole.set_label("specimen.source", "pig").unwrap();
+    assert_eq!(whole.open_questions(), []);
     let labels = |task, repeat| whole.labels(task, repeat).unwrap();
     // The scale has weights on it; then there is the specimen that is there, then each by its number.
     let names: Vec<String> = (0..5).map(|task| labels(task, 1).specimen).collect();
@@ -456,8 +457,8 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
     assert_eq!(second.about.get("series.repeat"), Some(&2.into()));
     assert_eq!(second.about.get("series.id"), Some(&"labelled/second".into()));
     // The command line holds over the file, and two specimens stay two.
-    whole.tell("operator", "Grace").unwrap();
-    whole.tell("specimen", "rabbit").unwrap();
+    whole.set_label("operator", "Grace").unwrap();
+    whole.set_label("specimen", "rabbit").unwrap();
     let (first, second) = (whole.labels(2, 1).unwrap(), whole.labels(3, 1).unwrap());
     assert_eq!(first.operator, "Grace");
     assert_eq!(
@@ -467,7 +468,7 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
     for (key, value, words) in
         [("series.repeat", "2", "series"), ("specimen.colour", "red", "there is no entry")]
     {
-        let refusal = whole.tell(key, value).unwrap_err();
+        let refusal = whole.set_label(key, value).unwrap_err();
         assert!(refusal.contains(words), "{refusal}");
     }
 }
@@ -512,7 +513,7 @@ fn the_programme_of_the_guide_is_one() {
     let (first, second) = (labels(0), labels(1));
     assert_eq!((first.operator.as_str(), first.specimen.as_str()), ("Ada", "specimen 1"));
     assert_eq!(second.specimen, "stomach 8, fundus");
-    assert!(second.is_told("specimen.source") && second.is_told("specimen.thickness_mm"));
+    assert!(second.is_set("specimen.source") && second.is_set("specimen.thickness_mm"));
 }
 
 #[test]

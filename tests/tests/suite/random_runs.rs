@@ -2,21 +2,22 @@
 //! the way of the brake, and a reason. A few hundred here; `scripts/soak runs` for a hundred thousand.
 use palpate_doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::Rig;
-use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, Truth};
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, SimTruth};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{HandAction, Limits, RigCommand};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
-use palpate_protocols::engine::{EndingKind, Input, Operator};
+use palpate_protocols::engine::{EndingKind, EngineInput, Operator};
 use palpate_protocols::plans::{
-    Action, CheckHome, FindBase, FindContact, Follow, Hold, HoldForce, HoldRate, HoldUntil, Home,
-    Jog, LoadTo, Monitor, OnFailure, OnTimeout, Plan, PlannedStep, Press, Prompt, Ramp, Rest,
-    Retract, SelfTest, Settle, Side, Sine, Source, Step, Tare, Unload, Weigh,
+    CheckHome, ContactPress, FindBase, FindContact, Follow, Hold, HoldForce, HoldRate, HoldUntil,
+    Home, Jog, LoadTo, Monitor, MonitorAction, MonitorSource, OnFailure, OnTimeout, Plan,
+    PlannedStep, Prompt, Ramp, Rest, Retract, SelfTest, SettleLimits, Sine, Step, Tare,
+    ThresholdSide, Unload, Weigh,
 };
 use palpate_runner::StartError;
 use palpate_runner::replay::replay;
 use palpate_tests::lab::Lab;
-use palpate_tests::recorded;
+use palpate_tests::recorded_runs;
 use std::collections::VecDeque;
 
 /// Runs in the test suite: about ten seconds.
@@ -56,7 +57,7 @@ fn any_step(random: &mut SplitMix) -> Step {
             mass_g: 0.0,
             is_loading: true,
             repeat: 1,
-            settle: Settle { window: Seconds(0.1), timeout: Seconds(0.5) },
+            settle: SettleLimits { window: Seconds(0.1), timeout: Seconds(0.5) },
         }),
         4 => Step::CheckHome(CheckHome { speed: MmPerS(9.0), touch_speed: MmPerS(0.9) }),
         5 | 6 => Step::Ramp(Ramp {
@@ -113,7 +114,7 @@ fn any_plan(random: &mut SplitMix) -> Plan {
         let short = FindContact { recovery: Seconds(0.3), ..FindContact::default() };
         steps.push(Step::FindContact(match random.below(3) {
             0 => FindContact {
-                press: short.press.map(|press| Press { dwell: Seconds(0.5), ..press }),
+                press: short.press.map(|press| ContactPress { dwell: Seconds(0.5), ..press }),
                 ..short
             },
             _ => FindContact {
@@ -133,14 +134,24 @@ fn any_plan(random: &mut SplitMix) -> Plan {
         let on_failure = [OnFailure::Abort, OnFailure::Retry(2), OnFailure::Skip][random.below(3)];
         *planned = PlannedStep { cycle: random.below(3) as u32, on_failure, ..planned.clone() };
     }
-    let actions = [Action::Note, Action::Pause, Action::Stop, Action::Retract, Action::Halt];
+    let actions = [
+        MonitorAction::Note,
+        MonitorAction::Pause,
+        MonitorAction::Stop,
+        MonitorAction::Retract,
+        MonitorAction::Halt,
+    ];
     plan.monitors = (0..random.below(3))
         .map(|_| {
             let threshold = between(random, 0.1, 3.0);
             Monitor {
-                source: [Source::Force, Source::Depth, Source::Volts, Source::Position]
-                    [random.below(4)],
-                side: Side::Above,
+                source: [
+                    MonitorSource::Force,
+                    MonitorSource::Depth,
+                    MonitorSource::Volts,
+                    MonitorSource::Position,
+                ][random.below(4)],
+                side: ThresholdSide::Above,
                 threshold,
                 resume: 0.8 * threshold,
                 settle: Seconds(0.1),
@@ -238,7 +249,7 @@ const RECENT: Nanos = Nanos::from_millis(350);
 const COMPLIANCE_UM_PER_N: f64 = 30.0;
 
 /// Where the axis is; the probe is behind it by what the rig gives way.
-fn axis(truth: &Truth) -> f64 {
+fn axis(truth: &SimTruth) -> f64 {
     truth.position.0 + 1e-3 * COMPLIANCE_UM_PER_N * truth.force.0
 }
 
@@ -287,7 +298,7 @@ fn one_run(seed: u64) -> EndingKind {
         }
         if leading.below(20) == 0 {
             let depth = Some(Depth(place));
-            lab.give(Input::Lead { depth });
+            lab.give(EngineInput::Lead { depth });
         }
         let truth = lab.rig.inner().truth();
         // What the axis still does when the limit is seen: the way of the brake, the answer, and the 0.1 mm that
@@ -415,7 +426,7 @@ fn whatever_happens_the_session_is_closed_with_its_reason() {
         let fault = (random.below(2) == 0).then(|| any_fault(&mut random));
         let about = format!("seed {seed}, {fault:?}, {:?}", plan.steps);
         let rig = FaultyRig::new(sim, fault.into_iter().collect(), seed);
-        let session = match recorded::of_any_plan(Box::new(rig), calibration, plan) {
+        let session = match recorded_runs::try_record_plan(Box::new(rig), calibration, plan) {
             Ok(session) => session,
             // Some plans ask for more than the rig can do, and say so.
             Err(StartError::Refused(reason)) => {

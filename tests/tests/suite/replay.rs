@@ -83,7 +83,7 @@ fn a_changed_input_is_noticed() {
     assert_eq!(replay(&session, &[]).unwrap().first_difference.unwrap().what, "live fit");
 
     let mut session = open("ramp-hold-lab");
-    let stop = palpate_sessions::Entry {
+    let stop = palpate_sessions::LogEntry {
         kind: EntryKind::Input,
         order: session.entries.last().unwrap().order + 1,
         after_sample: 50_000,

@@ -6,16 +6,16 @@ use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::Limits;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::engine::{EndingKind, Outcome};
+use palpate_protocols::engine::{EndingKind, RunOutcome};
 use palpate_protocols::file::Protocol;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
-use palpate_rheology::cycles::{Sinusoid, analyse, sinusoid};
-use palpate_runner::fidelity::first_verdict;
+use palpate_rheology::cycles::{Sinusoid, analyse_cycles, fit_sinusoid};
+use palpate_runner::fidelity::assess_data_quality;
 use palpate_sessions::Session;
-use palpate_sessions::edits::Verdict;
-use palpate_tests::recorded::of_plan;
-use palpate_tests::shipped;
+use palpate_sessions::edits::DataQuality;
+use palpate_tests::built_in_plan;
+use palpate_tests::recorded_runs::record_plan;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -26,7 +26,7 @@ fn rig(profile: SimProfile) -> SimRig {
 fn ran(profile: SimProfile, plan: &Plan) -> Session {
     let rig = rig(profile);
     let calibration = rig.calibration();
-    let session = of_plan(Box::new(rig), calibration, plan.clone());
+    let session = record_plan(Box::new(rig), calibration, plan.clone());
     assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
     session
 }
@@ -40,14 +40,14 @@ fn notes(plan: &Plan) -> Vec<String> {
     previewed.notes
 }
 
-fn verdict(session: &Session) -> (Verdict, String) {
-    let outcome = Outcome { ending: EndingKind::Finish, reason: String::new() };
-    first_verdict(&outcome, &fidelity::of_session(session).unwrap())
+fn verdict(session: &Session) -> (DataQuality, String) {
+    let outcome = RunOutcome { ending: EndingKind::Finish, reason: String::new() };
+    assess_data_quality(&outcome, &fidelity::of_session(session).unwrap())
 }
 
 fn sines(source: &CycleSource) -> Vec<Sinusoid> {
     let of = |(frequency, range): &(f64, std::ops::Range<usize>)| {
-        sinusoid(&source.samples[range.clone()], *frequency).unwrap()
+        fit_sinusoid(&source.samples[range.clone()], *frequency).unwrap()
     };
     source.sines.iter().map(of).collect()
 }
@@ -69,13 +69,13 @@ fn shipped_sines_keep_contact_and_find_the_stiffness_of_the_body() {
         (SimProfile::Ideal, "sine", vec![0.5]),
         (SimProfile::Lab, "frequency-sweep", vec![0.05, 0.1, 0.2, 0.5, 1.0]),
     ] {
-        let plan = shipped(name, &[]);
+        let plan = built_in_plan(name, &[]);
         assert!(notes(&plan).is_empty(), "{:?}", notes(&plan));
         let session = ran(profile, &plan);
         // The specimen of this seed: like that of the source, its stiffness a tenth lower.
         let body = rig(profile).truth().body;
         let (verdict, reason) = verdict(&session);
-        assert_eq!(verdict, Verdict::Valid, "{reason}");
+        assert_eq!(verdict, DataQuality::Valid, "{reason}");
         let found = sines(&of_session(&session).unwrap());
         assert_eq!(found.len(), frequencies.len());
         for (one, frequency) in found.iter().zip(&frequencies) {
@@ -122,12 +122,12 @@ fn a_sine_that_loses_the_tissue_is_noted_before_and_after() {
             vec![("depth", "10 mm"), ("frequencies", "0.2 Hz, 0.5 Hz"), ("pause", "3 s")],
         ),
     ] {
-        let plan = shipped(name, &values);
+        let plan = built_in_plan(name, &values);
         let found = notes(&plan);
         assert!(found.len() == 1 && found[0].contains("lose the tissue"), "{found:?}");
         let session = ran(SimProfile::Lab, &plan);
         let (verdict, reason) = verdict(&session);
-        assert_eq!(verdict, Verdict::Suspect, "{reason}");
+        assert_eq!(verdict, DataQuality::Suspect, "{reason}");
         assert!(reason.contains("lost the tissue"), "{reason}");
         for one in sines(&of_session(&session).unwrap()) {
             println!(
@@ -143,17 +143,17 @@ fn a_sine_that_loses_the_tissue_is_noted_before_and_after() {
 #[test]
 fn a_force_too_small_to_tell_is_not_called_met() {
     let brief = ("duration", "3 s");
-    let plan = shipped("creep", &[("force", "0.001 N"), brief]);
+    let plan = built_in_plan("creep", &[("force", "0.001 N"), brief]);
     let found = notes(&plan);
     assert!(found.len() == 1 && found[0].contains("whether it was met"), "{found:?}");
     let (of_little, reason) = verdict(&ran(SimProfile::Lab, &plan));
-    assert_eq!(of_little, Verdict::Suspect, "{reason}");
+    assert_eq!(of_little, DataQuality::Suspect, "{reason}");
     assert!(reason.contains("0.0010 N"), "{reason}");
     // One that may be off by a quarter is met, and that is said.
-    let plan = shipped("creep", &[("force", "0.2 N"), brief]);
+    let plan = built_in_plan("creep", &[("force", "0.2 N"), brief]);
     assert!(notes(&plan).is_empty());
     let (of_more, reason) = verdict(&ran(SimProfile::Lab, &plan));
-    assert_eq!(of_more, Verdict::Valid, "{reason}");
+    assert_eq!(of_more, DataQuality::Valid, "{reason}");
     assert!(reason.contains("0.0500 N of 0.2000 N"), "{reason}");
 }
 
@@ -184,7 +184,7 @@ steps = [
 "#;
     let plan = Protocol::read(text).unwrap().plan(&BTreeMap::new()).unwrap();
     let source = of_session(&ran(SimProfile::Lab, &plan)).unwrap();
-    let cycles = analyse(&source.samples, None, source.pulse);
+    let cycles = analyse_cycles(&source.samples, None, source.pulse);
     let [cycle] = &cycles[..] else {
         panic!("{} cycles", cycles.len());
     };

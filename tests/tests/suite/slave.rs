@@ -2,20 +2,20 @@
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_haptics::Period;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
-use palpate_runner::{Felt, Leading};
+use palpate_runner::haptics::slave::{SlaveLeader, SlaveReport, SlaveSettings};
+use palpate_runner::{LeadSource, SlaveSample};
 
 const BODY: ModifiedKelvin = ModifiedKelvin::THESIS;
 
 fn leader(path: HandPath) -> SlaveLeader {
     let rig = SimRig::new(SimSettings::default());
     let settings = SlaveSettings {
-        master: SimulationSettings::of(BODY, Period::MILLISECOND, Hand::firm(path)),
+        master: SimulationSettings::of(BODY, Period::MILLISECOND, SimulatedHand::firm(path)),
         body: BODY,
         depth_max: Depth(20.0),
         rig: rig.description().clone(),
@@ -24,8 +24,8 @@ fn leader(path: HandPath) -> SlaveLeader {
     SlaveLeader::new(settings).unwrap()
 }
 
-fn felt(ms: u64, depth: f64, force: f64) -> Felt {
-    Felt {
+fn felt(ms: u64, depth: f64, force: f64) -> SlaveSample {
+    SlaveSample {
         at: Nanos::from_millis(ms),
         depth: Depth(depth),
         force: Newtons(force),
@@ -39,7 +39,7 @@ fn ramp(to: f64, speed: f64) -> HandPath {
 }
 
 /// A slave that is where its master was so many milliseconds ago, and whose cell feels a share of the body.
-fn late(path: HandPath, delay: usize, share: f64, ms: u64) -> Slaved {
+fn late(path: HandPath, delay: usize, share: f64, ms: u64) -> SlaveReport {
     let mut leader = leader(path);
     let mut places = vec![0.0; delay];
     let mut body = KelvinState::at_rest();
@@ -49,7 +49,7 @@ fn late(path: HandPath, delay: usize, share: f64, ms: u64) -> Slaved {
         let place = leader.lead(&felt(at, depth, share * force.0.max(0.0)));
         places.push(place.unwrap_or(places[places.len() - 1]));
     }
-    leader.slaved().unwrap()
+    leader.report().unwrap()
 }
 
 #[test]

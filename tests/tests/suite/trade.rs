@@ -1,9 +1,9 @@
 //! Recorded curves of the trade: their errors are found again, and a perturbed one is noticed.
 
-use palpate_analysis::progress::Unwatched;
+use palpate_analysis::progress::NoProgress;
 use palpate_analysis::trade::stored::read_trade;
-use palpate_analysis::trade::{Extent, errors};
-use palpate_rheology::trade::{TradeCurves, last_digits};
+use palpate_analysis::trade::{TradeExtent, errors};
+use palpate_rheology::trade::{TradeCurves, rounding_share};
 use palpate_tests::workspace;
 
 fn recorded() -> TradeCurves {
@@ -13,7 +13,7 @@ fn recorded() -> TradeCurves {
 #[test]
 fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
     let recorded = recorded();
-    let now = errors(Extent::Quick, &Unwatched).unwrap();
+    let now = errors(TradeExtent::Quick, &NoProgress).unwrap();
     let now = now.expect("it was not cancelled");
     recorded.agrees_with(&now).unwrap();
     // Every error counts, to a percent at least, whose percent is twice its rounding.
@@ -21,7 +21,7 @@ fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
     for index in 0..recorded.integrators.len() {
         let mut changed = recorded.clone();
         let row = &mut changed.integrators[index];
-        let visible = 200.0 * last_digits(row.precision) * recorded.peak.ramp_hold_n;
+        let visible = 200.0 * rounding_share(row.precision) * recorded.peak.ramp_hold_n;
         if let Some(error) = &mut row.error
             && error.ramp_hold_n > visible
         {

@@ -1,6 +1,6 @@
 //! Unloading: what the fitted law says of tissue whose own law is another one, and of real tissue.
 
-use palpate_analysis::source::{Stretch, read_stretch, samples_of};
+use palpate_analysis::source::{RecordStretch, fit_samples, read_stretch};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::Phase;
 use palpate_model::signal::work;
@@ -11,7 +11,7 @@ use palpate_rheology::fit::{FitOptions, FitReport, FitSample, fit};
 use palpate_runner::replay::replay;
 use palpate_sessions::Session;
 use palpate_test_support::skip;
-use palpate_tests::{recorded, workspace};
+use palpate_tests::{recorded_runs, workspace};
 /// A load-hold-unload of the specimen of seed 7, which loses up to 40 % of its elastic force.
 fn run(speed: f64, depth: f64, unload: f64) -> Session {
     let rig = SimRig::new(SimSettings {
@@ -28,7 +28,7 @@ fn run(speed: f64, depth: f64, unload: f64) -> Session {
         ..RampHold::default()
     };
     let calibration = rig.calibration();
-    let session = recorded::session(Box::new(rig), calibration, params);
+    let session = recorded_runs::record_ramp_hold(Box::new(rig), calibration, params);
     assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
     session
 }
@@ -84,16 +84,26 @@ fn fitted(key: &str, samples: &[FitSample]) -> FitReport {
 #[test]
 fn one_loop_predicts_another_depth_and_another_speed() {
     let session = run(0.75, 30.0, 0.3);
-    let known = samples_of(&session, Stretch::WithUnload).unwrap();
-    let held = samples_of(&session, Stretch::RampHold).unwrap();
+    let known = fit_samples(&session, RecordStretch::WithUnload).unwrap();
+    let held = fit_samples(&session, RecordStretch::RampHold).unwrap();
     let (soft, hard) = (fitted("unloading-3", &known), fitted("series-3", &held));
     // What is left is that the laws differ (a cubic for a hyperbolic tangent of energy), what little the search
     // for contact softened, and 0.05 mm of contact position, 25 mN where the body is stiffest. Measured: 0.2,
     // 1.0 and 0.1 % of the peak, and without softening 6.5, 3.7 and 6.2 %.
     for (what, samples, softening_at_most, none_at_least) in [
         ("itself", known, 0.004, 0.05),
-        ("20 mm", samples_of(&run(0.75, 20.0, 0.3), Stretch::WithUnload).unwrap(), 0.015, 0.03),
-        ("1.5 mm/s", samples_of(&run(1.5, 30.0, 0.6), Stretch::WithUnload).unwrap(), 0.004, 0.05),
+        (
+            "20 mm",
+            fit_samples(&run(0.75, 20.0, 0.3), RecordStretch::WithUnload).unwrap(),
+            0.015,
+            0.03,
+        ),
+        (
+            "1.5 mm/s",
+            fit_samples(&run(1.5, 30.0, 0.6), RecordStretch::WithUnload).unwrap(),
+            0.004,
+            0.05,
+        ),
     ] {
         let one = agreement(&samples, &along(&soft.body, &samples), 50);
         let other = agreement(&samples, &along(&hard.body, &samples), 50);
@@ -123,8 +133,8 @@ fn unloading_is_recorded_until_the_force_is_gone_and_replays() {
     let mean = last.map(|row| row.force.unwrap()).sum::<f64>() / 1000.0;
     assert!(mean.abs() < 0.01, "{mean}");
     // The fit of ramp and hold does not know of it.
-    let held = samples_of(&session, Stretch::RampHold).unwrap();
-    let whole = samples_of(&session, Stretch::WithUnload).unwrap();
+    let held = fit_samples(&session, RecordStretch::RampHold).unwrap();
+    let whole = fit_samples(&session, RecordStretch::WithUnload).unwrap();
     assert_eq!(held, whole[..held.len()]);
     assert_eq!(whole.len() - held.len(), unload.len());
     // From lift-off on the force says nothing, at whatever depth the tissue still is.
@@ -140,7 +150,7 @@ fn unloading_of_real_tissue_is_explained() {
     if skip::lacks_file(&path) {
         return;
     }
-    let samples = read_stretch(&path, None, Stretch::WithUnload).unwrap().samples;
+    let samples = read_stretch(&path, None, RecordStretch::WithUnload).unwrap().samples;
     let held = &samples[..=turn(&samples)];
     let forces = |fit: &FitReport| -> Vec<f64> {
         fit.predict(&samples).into_iter().map(|one| one.0).collect()

@@ -11,7 +11,7 @@ use palpate_protocols::plans::{OnTimeout, Plan, SelfTest, WaitCondition, WaitUnt
 use palpate_protocols::preview::preview;
 use palpate_runner::replay::replay;
 use palpate_tests::lab::Lab;
-use palpate_tests::recorded;
+use palpate_tests::recorded_runs;
 
 const HIGH: WaitCondition = WaitCondition::DigitalInput { number: 1, is_high: true };
 
@@ -94,8 +94,11 @@ fn input_that_never_comes_ends_as_the_plan_says() {
 fn recorded_wait_replays_to_identical_decisions() {
     let rig = rig();
     let calibration = rig.calibration();
-    let session =
-        recorded::of_plan(Box::new(rig), calibration, plan(wait(HIGH, 60.0, OnTimeout::Stop)));
+    let session = recorded_runs::record_plan(
+        Box::new(rig),
+        calibration,
+        plan(wait(HIGH, 60.0, OnTimeout::Stop)),
+    );
     let replayed = replay(&session, &[]).unwrap();
     assert_eq!(replayed.first_difference, None);
     // Without the recorded level of the input the wait does not end where it did.

@@ -9,8 +9,8 @@ use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::RampHold;
 use palpate_runner::TimeScale;
 use palpate_runner::replay::replay;
-use palpate_sessions::{Part, Session};
-use palpate_tests::recorded;
+use palpate_sessions::{LogPart, Session};
+use palpate_tests::recorded_runs;
 use std::path::Path;
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ fn run(rig: Box<dyn Rig>, scale: TimeScale, out: &Path) -> Session {
         hold: Seconds(2.0),
         ..RampHold::default()
     };
-    recorded::to_its_end(recorded::start(rig, calibration, plan.plan(), scale, out));
+    recorded_runs::wait_for_end(recorded_runs::start(rig, calibration, plan.plan(), scale, out));
     Session::open(out).expect("the session")
 }
 
@@ -40,7 +40,7 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
     assert_eq!(end.outcome, "finish", "{}", end.reason);
     let (mut cell, mut sent, mut bytes) = (Vec::new(), String::new(), 0);
     Session::scan_parts(&out, &mut |part| {
-        let Part::Raw(block) = part else { return };
+        let LogPart::Raw(block) = part else { return };
         bytes += block.len() as u64;
         for piece in block.pieces() {
             let text = String::from_utf8(piece.bytes.to_vec()).unwrap();
@@ -64,7 +64,7 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
         .collect();
     assert!(cell == readings, "{} readings, {} sent", readings.len(), cell.len());
     assert!(sent.starts_with("EnableMotor\r"), "{sent}");
-    assert_eq!(session.beside.raw_bytes, bytes);
+    assert_eq!(session.auxiliary.raw_bytes, bytes);
     assert_eq!(end.raw_bytes, bytes);
 }
 
@@ -116,7 +116,7 @@ fn a_computer_that_stands_still_before_a_rig_on_wires_ends_the_run() {
         assert_eq!(end.outcome, ending, "{}", end.reason);
         let is_reported = end.reason.contains("stood still");
         assert_eq!(is_reported, !is_virtual, "{}", end.reason);
-        let worst = session.beside.health.worst.unwrap();
+        let worst = session.auxiliary.health.worst.unwrap();
         assert!(worst.lateness_s >= 0.5, "{worst:?}");
         assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
     }

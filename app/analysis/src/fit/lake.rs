@@ -1,16 +1,17 @@
 //! Fits of the sessions of a lake, or of one part of them, stored in the lake.
 
-use super::{Fitted, NotFitted, Recipe};
-use crate::compliance::Correction;
+use super::{FitRecipe, SourceFit, SourceFitError};
+use crate::compliance::ComplianceCorrection;
 use crate::exports::sweep_lake;
-use crate::pool::{News, WorkFailure, in_order};
+use crate::pool::{WorkEvent, WorkFailure, in_order};
+use crate::recordings::recovered_originals_note;
 use crate::source;
-use crate::sources::copied_sentence;
-use palpate_rheology::fit::{FitReport, Systematic};
+use palpate_rheology::fit::{FitReport, SystematicUncertainty};
 use palpate_sessions::recover::recovered_id;
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
-    FitFile, FitState, InLake, LakeError, Shard, keep_fit, read_session, sessions, state_of_fit,
+    FitFile, FitState, LakeError, LakeSession, Shard, find_fit, list_sessions, read_session,
+    store_fit,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -24,10 +25,10 @@ use thiserror::Error;
 const MODEL: &str = "modified-kelvin";
 
 #[derive(Debug)]
-pub struct LakeRequest<'a> {
+pub struct LakeFitRequest<'a> {
     pub lake: &'a Path,
     pub shard: Shard,
-    pub recipe: &'a Recipe,
+    pub recipe: &'a FitRecipe,
     /// Parameters held, as name=value.
     pub fixed: &'a [String],
     /// Parameters found that are held by default.
@@ -39,25 +40,25 @@ pub struct LakeRequest<'a> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    Made,
-    There,
+pub enum LakeFitOutcome {
+    Fitted,
+    AlreadyFitted,
     Rejected,
 }
 
 #[derive(Debug, Error)]
-pub enum LakeFailure {
+pub enum LakeFitError {
     #[error(transparent)]
     Lake(#[from] LakeError),
     #[error(transparent)]
     Keep(#[from] ExportError),
     #[error(transparent)]
-    NotFitted(#[from] NotFitted),
+    NotFitted(#[from] SourceFitError),
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
 }
 
-impl From<source::SourceError> for LakeFailure {
+impl From<source::SourceError> for LakeFitError {
     fn from(err: source::SourceError) -> Self {
         Self::NotFitted(err.into())
     }
@@ -65,12 +66,12 @@ impl From<source::SourceError> for LakeFailure {
 
 /// An event in the fitting of a lake.
 #[derive(Debug)]
-pub enum LakeFit<'a> {
+pub enum LakeFitEvent<'a> {
     Note(String),
     /// Number of sessions done, and of all.
     Done(usize, usize),
     /// Outcome of a session, in the sessions' order.
-    Next(&'a str, Result<Outcome, LakeFailure>),
+    Next(&'a str, Result<LakeFitOutcome, LakeFitError>),
 }
 
 /// Counts of outcomes.
@@ -89,18 +90,18 @@ struct StoredFit<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     #[serde(skip_serializing_if = "Option::is_none")]
-    systematic: Option<&'a Systematic>,
+    systematic: Option<&'a SystematicUncertainty>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    compliance: Option<&'a Correction>,
+    compliance: Option<&'a ComplianceCorrection>,
     notes: &'a [String],
 }
 
 /// Fits the sessions. Once `is_ending` is set no fit is begun; asked again it goes on.
 pub fn fit_lake(
-    request: &LakeRequest<'_>,
+    request: &LakeFitRequest<'_>,
     is_ending: &AtomicBool,
-    mut hear: impl FnMut(LakeFit<'_>),
-) -> Result<LakeTally, LakeFailure> {
+    mut hear: impl FnMut(LakeFitEvent<'_>),
+) -> Result<LakeTally, LakeFitError> {
     // Named or not, it is one body, whose fits are kept in one folder.
     let key = request.recipe.options.family().key();
     let model = match key.as_str() {
@@ -108,60 +109,65 @@ pub fn fit_lake(
         key => key,
     };
     let settings = request.settings(model);
-    let mut found = sessions(request.lake)?;
+    let mut found = list_sessions(request.lake)?;
     sweep_lake(request.lake);
     // Before the shards are made, so that all leave out the same.
     let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
-    let is_copied = |one: &InLake| ids.contains(&recovered_id(&one.id));
+    let is_copied = |one: &LakeSession| ids.contains(&recovered_id(&one.id));
     let copied = found.iter().filter(|one| is_copied(one));
-    if let Some(note) = copied_sentence(copied.map(|one| one.id.clone())) {
-        hear(LakeFit::Note(note));
+    if let Some(note) = recovered_originals_note(copied.map(|one| one.id.clone())) {
+        hear(LakeFitEvent::Note(note));
     }
     found.retain(|one| !is_copied(one) && request.shard.has(&one.id));
     let mut tally =
         LakeTally { model: model.to_owned(), sessions: found.len(), ..LakeTally::default() };
     let mut ids = found.iter().map(|one| one.id.as_str());
-    let work = |one: &InLake| request.fit_one(one, model, &settings);
+    let work = |one: &LakeSession| request.fit_one(one, model, &settings);
     in_order(request.jobs, &found, is_ending, work, |news| match news {
-        News::Done(count) => hear(LakeFit::Done(count, found.len())),
-        News::Next(answer) => {
-            let came =
-                answer.unwrap_or_else(|failure: WorkFailure| Err(NotFitted::from(failure).into()));
+        WorkEvent::Done(count) => hear(LakeFitEvent::Done(count, found.len())),
+        WorkEvent::Next(answer) => {
+            let came = answer
+                .unwrap_or_else(|failure: WorkFailure| Err(SourceFitError::from(failure).into()));
             match &came {
-                Ok(Outcome::Made) => tally.made += 1,
-                Ok(Outcome::There) => tally.were_there += 1,
-                Ok(Outcome::Rejected) => tally.rejected += 1,
+                Ok(LakeFitOutcome::Fitted) => tally.made += 1,
+                Ok(LakeFitOutcome::AlreadyFitted) => tally.were_there += 1,
+                Ok(LakeFitOutcome::Rejected) => tally.rejected += 1,
                 Err(_) => {}
             }
-            hear(LakeFit::Next(ids.next().unwrap_or_default(), came));
+            hear(LakeFitEvent::Next(ids.next().unwrap_or_default(), came));
         }
     })
-    .map_err(LakeFailure::Threads)?;
+    .map_err(LakeFitError::Threads)?;
     Ok(tally)
 }
 
-impl LakeRequest<'_> {
-    fn fit_one(&self, one: &InLake, model: &str, settings: &Value) -> Result<Outcome, LakeFailure> {
+impl LakeFitRequest<'_> {
+    fn fit_one(
+        &self,
+        one: &LakeSession,
+        model: &str,
+        settings: &Value,
+    ) -> Result<LakeFitOutcome, LakeFitError> {
         let file = FitFile { lake: self.lake, model, session_id: &one.id, settings };
-        if state_of_fit(&file)? == FitState::There {
-            return Ok(Outcome::There);
+        if find_fit(&file)? == FitState::There {
+            return Ok(LakeFitOutcome::AlreadyFitted);
         }
         let (session, rejection) = read_session(self.lake, one)?;
-        let wanted = self.recipe.wanted;
+        let wanted = self.recipe.selection;
         if rejection.is_some() && !wanted.is_rejected_included {
-            return Ok(Outcome::Rejected);
+            return Ok(LakeFitOutcome::Rejected);
         }
         let source = source::of_session(session, wanted.stretch, &[])?;
-        let fitted: Fitted = self.recipe.fit_read(source)?;
-        let report = fitted.result.map_err(NotFitted::Fit)?;
+        let fitted: SourceFit = self.recipe.fit_read(source)?;
+        let report = fitted.result.map_err(SourceFitError::Fit)?;
         let stored = StoredFit {
             report: &report,
             systematic: fitted.systematic.as_ref(),
             compliance: fitted.compliance.as_ref(),
             notes: &fitted.notes,
         };
-        keep_fit(&file, &stored)?;
-        Ok(Outcome::Made)
+        store_fit(&file, &stored)?;
+        Ok(LakeFitOutcome::Fitted)
     }
 
     /// Everything that determines a fit apart from its session.
@@ -177,7 +183,7 @@ impl LakeRequest<'_> {
             "systematic": self.recipe.is_systematic,
             "compliance_sha256": self.compliance_sha256,
         });
-        if self.recipe.wanted.stretch == source::Stretch::WithUnload {
+        if self.recipe.selection.stretch == source::RecordStretch::WithUnload {
             settings["unload"] = json!(true);
         }
         settings

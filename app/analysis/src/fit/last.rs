@@ -3,9 +3,9 @@
 //! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
 //! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
-use crate::source::{self, SourceError, Stretch};
+use crate::source::{self, RecordStretch, SourceError};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_rheology::fit::{FitError, FitOptions, FitReport, Parameter, fit};
+use palpate_rheology::fit::{FitError, FitOptions, FitReport, FittedParameter, fit};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
 use palpate_tables::import::ColumnNames;
@@ -41,7 +41,7 @@ pub struct KnownFit {
     pub source: Option<String>,
     /// Root mean square of the residuals in N.
     pub rmse_n: f64,
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<FittedParameter>,
 }
 
 impl KnownFit {
@@ -83,7 +83,7 @@ impl KnownFit {
         if path.extension().is_some_and(|ending| ending == "json") {
             return Ok((Self::read(path)?, Vec::new()));
         }
-        let source = source::read_stretch(path, columns, Stretch::RampHold)?;
+        let source = source::read_stretch(path, columns, RecordStretch::RampHold)?;
         let report = fit(&source.samples, &FitOptions::default());
         let report =
             report.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
@@ -113,7 +113,7 @@ impl KnownFit {
 
 /// Whether a fit is a poor ground for a plan, because it hardly knows how fast the tissue relaxes.
 #[must_use]
-pub fn is_hardly_known(parameters: &[Parameter]) -> bool {
+pub fn is_poorly_identified(parameters: &[FittedParameter]) -> bool {
     let mut all = parameters.iter();
     let tau = all.find(|parameter| parameter.name == "tau_eps");
     tau.is_some_and(|tau| match tau.std_error {
@@ -175,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_relaxation_time_that_is_hardly_known_is_doubted() {
-        let tau = |std_error, is_fixed| Parameter {
+        let tau = |std_error, is_fixed| FittedParameter {
             name: "tau_eps".into(),
             value: 1.0,
             unit: "s".into(),
@@ -184,10 +184,10 @@ mod tests {
             is_fixed,
             systematic_error: None,
         };
-        assert!(!is_hardly_known(&[tau(Some(0.01), false)]));
-        assert!(!is_hardly_known(&[tau(None, true)]));
+        assert!(!is_poorly_identified(&[tau(Some(0.01), false)]));
+        assert!(!is_poorly_identified(&[tau(None, true)]));
         for poor in [tau(Some(2.0), false), tau(None, false)] {
-            assert!(is_hardly_known(&[poor]));
+            assert!(is_poorly_identified(&[poor]));
         }
     }
 

@@ -4,19 +4,19 @@ mod lake;
 mod last;
 mod together;
 
-pub use lake::{LakeFailure, LakeFit, LakeRequest, LakeTally, Outcome, fit_lake};
-pub use last::{KnownFit, KnownFitError, is_hardly_known, remember};
-pub use together::{Together, TogetherRequest, fit_together};
+pub use lake::{LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally, fit_lake};
+pub use last::{KnownFit, KnownFitError, is_poorly_identified, remember};
+pub use together::{JointFit, JointFitRequest, fit_together};
 
-use crate::compliance::{Correction, Corrections};
-use crate::pool::{News, WorkFailure, in_order};
-use crate::report::fit_json::{Beside, Overlay};
-use crate::source::{self, FitSource, SourceError, Wanted};
+use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
+use crate::pool::{WorkEvent, WorkFailure, in_order};
+use crate::report::fit_json::{FitDetails, FitOverlay};
+use crate::source::{self, FitSource, SourceError, SourceSelection};
 use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty};
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
     self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample,
-    ProfileInterval, Systematic, Traced, systematic,
+    ProfileInterval, SystematicUncertainty, TracedRecord, estimate_systematic,
 };
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
@@ -28,7 +28,7 @@ use thiserror::Error;
 
 /// Options for reading and fitting sources.
 #[derive(Debug)]
-pub struct Recipe {
+pub struct FitRecipe {
     /// The family, and which of its parameters are found.
     pub options: FitOptions,
     /// Names of the columns of tables without a header.
@@ -36,40 +36,40 @@ pub struct Recipe {
     /// Whether the systematic uncertainty from calibration and compliance is estimated.
     pub is_systematic: bool,
     /// Which part of a source, and whether rejected ones are taken.
-    pub wanted: Wanted,
+    pub selection: SourceSelection,
     /// The analysis that a session is read by.
     pub analysis: Option<String>,
-    pub corrections: Corrections,
+    pub corrections: ComplianceCorrections,
 }
 
-impl Recipe {
+impl FitRecipe {
     /// With systematic uncertainty and uncorrected depths.
     #[must_use]
-    pub fn new(options: FitOptions, wanted: Wanted) -> Self {
+    pub fn new(options: FitOptions, wanted: SourceSelection) -> Self {
         Self {
             options,
             columns: None,
             is_systematic: true,
-            wanted,
+            selection: wanted,
             analysis: None,
-            corrections: Corrections::none(None),
+            corrections: ComplianceCorrections::none(None),
         }
     }
 
-    pub fn fit(&self, path: &Path) -> Result<Fitted, SourceError> {
+    pub fn fit(&self, path: &Path) -> Result<SourceFit, SourceError> {
         let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
-        self.fit_read(source::read_analysed(path, columns, self.wanted, name)?)
+        self.fit_read(source::read_analysed(path, columns, self.selection, name)?)
     }
 
-    pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
+    pub fn fit_read(&self, mut source: FitSource) -> Result<SourceFit, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
-        let fitted = Fitted { compliance, ..Fitted::of(source, &self.options) };
+        let fitted = SourceFit { compliance, ..SourceFit::of(source, &self.options) };
         Ok(if self.is_systematic { fitted.with_systematic(&self.options) } else { fitted })
     }
 }
 
 #[derive(Debug, Error)]
-pub enum NotFitted {
+pub enum SourceFitError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(transparent)]
@@ -80,7 +80,7 @@ pub enum NotFitted {
     Died,
 }
 
-impl From<WorkFailure> for NotFitted {
+impl From<WorkFailure> for SourceFitError {
     fn from(failure: WorkFailure) -> Self {
         match failure {
             WorkFailure::NotBegun => Self::NotBegun,
@@ -90,19 +90,19 @@ impl From<WorkFailure> for NotFitted {
 }
 
 /// Fits every source with `jobs` threads and tells `hear` every answer, in order. Once `is_ending` is set no fit is begun.
-pub fn each(
+pub fn fit_each(
     sources: &[PathBuf],
     jobs: usize,
-    recipe: &Recipe,
+    recipe: &FitRecipe,
     is_ending: &AtomicBool,
-    hear: impl FnMut(News<Result<Fitted, SourceError>>),
+    hear: impl FnMut(WorkEvent<Result<SourceFit, SourceError>>),
 ) -> io::Result<()> {
     in_order(jobs, sources, is_ending, |source| recipe.fit(source), hear)
 }
 
 /// Result for a source that could be read.
 #[derive(Clone, Debug)]
-pub struct Fitted {
+pub struct SourceFit {
     pub samples: Vec<FitSample>,
     /// Session time of the first sample.
     pub start: Seconds,
@@ -112,12 +112,12 @@ pub struct Fitted {
     pub seconds: f64,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
-    pub systematic: Option<Systematic>,
+    pub systematic: Option<SystematicUncertainty>,
     /// What the rig's compliance does to the depths, or would, once asked for.
-    pub compliance: Option<Correction>,
+    pub compliance: Option<ComplianceCorrection>,
 }
 
-impl Fitted {
+impl SourceFit {
     #[must_use]
     pub fn of(source: FitSource, options: &FitOptions) -> Self {
         let watch = Stopwatch::start();
@@ -142,7 +142,7 @@ impl Fitted {
         let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
         let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
             let record = origin.traced("", &self.samples);
-            let found = origin.is_known().then(|| systematic(record, options));
+            let found = origin.is_known().then(|| estimate_systematic(record, options));
             found.transpose().map_err(|err| err.to_string())
         });
         match found {
@@ -157,8 +157,12 @@ impl Fitted {
     }
 
     #[must_use]
-    pub fn beside<'a>(&'a self, overlay: &'a Overlay, intervals: &'a Intervals) -> Beside<'a> {
-        Beside {
+    pub fn details<'a>(
+        &'a self,
+        overlay: &'a FitOverlay,
+        intervals: &'a FitIntervals,
+    ) -> FitDetails<'a> {
+        FitDetails {
             overlay,
             intervals,
             systematic: self.systematic.as_ref(),
@@ -170,13 +174,13 @@ impl Fitted {
     pub fn intervals(
         &self,
         options: &FitOptions,
-        wanted: IntervalsWanted,
+        wanted: IntervalRequest,
         progress: impl FnMut(usize),
-    ) -> Result<Intervals, FitError> {
-        if wanted == IntervalsWanted::default() {
-            return Ok(Intervals::default());
+    ) -> Result<FitIntervals, FitError> {
+        if wanted == IntervalRequest::default() {
+            return Ok(FitIntervals::default());
         }
-        let exact = fit::Fitted::of(&self.samples, options)?;
+        let exact = fit::FitSolution::of(&self.samples, options)?;
         wanted.find(&exact, 0, progress)
     }
 }
@@ -188,21 +192,21 @@ pub fn no_systematic(reason: &str) -> String {
 
 /// Request for intervals that take more than one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct IntervalsWanted {
+pub struct IntervalRequest {
     pub with_profile: bool,
     /// From fits to residuals shuffled in blocks.
     pub bootstrap: Option<Bootstrap>,
 }
 
-impl IntervalsWanted {
+impl IntervalRequest {
     /// Finds those of one record of a fit; `progress` hears how many fits of the bootstrap are done.
     pub fn find(
         self,
-        fitted: &fit::Fitted<'_>,
+        fitted: &fit::FitSolution<'_>,
         record: usize,
         progress: impl FnMut(usize),
-    ) -> Result<Intervals, FitError> {
-        Ok(Intervals {
+    ) -> Result<FitIntervals, FitError> {
+        Ok(FitIntervals {
             profile: if self.with_profile { fitted.profile(record)? } else { Vec::new() },
             bootstrap_seed: self.bootstrap.map(|choice| choice.seed),
             bootstrap: match self.bootstrap {
@@ -215,7 +219,7 @@ impl IntervalsWanted {
 
 /// Intervals that take more than one pass, as far as they were asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Intervals {
+pub struct FitIntervals {
     /// From the profile likelihood; ends are null where they are open.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<ProfileInterval>,
@@ -238,7 +242,7 @@ impl Origin {
     /// Of forces read with this calibration, if with any, and depths from which this was taken, if anything was.
     pub fn of(
         calibration: Option<&Calibration>,
-        compliance: Option<&Correction>,
+        compliance: Option<&ComplianceCorrection>,
     ) -> Result<Self, CalibrationError> {
         let stated = |one: &Calibration| {
             ForceUncertainty::of(one).map(|uncertainty| (one.name.clone(), uncertainty))
@@ -255,10 +259,10 @@ impl Origin {
     }
 
     #[must_use]
-    pub fn traced<'a>(&'a self, name: &'a str, samples: &'a [FitSample]) -> Traced<'a> {
+    pub fn traced<'a>(&'a self, name: &'a str, samples: &'a [FitSample]) -> TracedRecord<'a> {
         let calibration = self.calibration.as_ref();
         let compliance = self.compliance.as_ref();
-        Traced {
+        TracedRecord {
             name,
             samples,
             calibration: calibration.map(|(name, uncertainty)| (name.as_str(), uncertainty)),

@@ -1,10 +1,11 @@
 //! Several recordings fitted together, with some parameters the same in all.
 
-use super::{Intervals, IntervalsWanted, no_systematic};
-use crate::report::fit_json::{Beside, JointObject, Overlay};
-use crate::sources::Recordings;
+use super::{FitIntervals, IntervalRequest, no_systematic};
+use crate::recordings::Recordings;
+use crate::report::fit_json::{FitDetails, FitOverlay, JointObject};
 use palpate_rheology::fit::{
-    FitError, FitOptions, Fitted, JointReport, Systematic, Traced, systematic_joint,
+    FitError, FitOptions, FitSolution, JointReport, SystematicUncertainty, TracedRecord,
+    estimate_systematic_jointly,
 };
 use palpate_runner::Stopwatch;
 
@@ -12,7 +13,7 @@ use palpate_runner::Stopwatch;
 const BODY: &str = "body";
 
 #[derive(Clone, Debug)]
-pub struct TogetherRequest<'a> {
+pub struct JointFitRequest<'a> {
     /// The family, and which of its parameters are found.
     pub options: &'a FitOptions,
     /// Names of the parameters that are the same in all, `body` for all of the specimen.
@@ -20,19 +21,19 @@ pub struct TogetherRequest<'a> {
     /// Whether the systematic uncertainty from calibrations and compliances is estimated.
     pub is_systematic: bool,
     /// Intervals that take more than one pass.
-    pub intervals: IntervalsWanted,
+    pub intervals: IntervalRequest,
 }
 
 /// A fit of several recordings, with the details of each beside its report.
 #[derive(Clone, Debug)]
-pub struct Together {
+pub struct JointFit {
     pub report: JointReport,
     /// The modelled force along each recording.
-    pub overlays: Vec<Overlay>,
+    pub overlays: Vec<FitOverlay>,
     /// Intervals of each recording, as far as they were asked for.
-    pub intervals: Vec<Intervals>,
+    pub intervals: Vec<FitIntervals>,
     /// What calibrations and compliances add, for each recording.
-    pub systematic: Option<Vec<Systematic>>,
+    pub systematic: Option<Vec<SystematicUncertainty>>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
     pub notes: Vec<String>,
@@ -41,9 +42,9 @@ pub struct Together {
 /// Fits recordings together. `progress` hears for which recording how many fits of the bootstrap are done.
 pub fn fit_together(
     records: &Recordings,
-    request: &TogetherRequest<'_>,
+    request: &JointFitRequest<'_>,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Together, FitError> {
+) -> Result<JointFit, FitError> {
     let body = request.options.body_names();
     let names = request.shared.iter().flat_map(|name| match *name {
         BODY => body.clone(),
@@ -52,11 +53,12 @@ pub fn fit_together(
     let shared: Vec<&str> = names.collect();
     let borrowed = records.borrowed();
     let watch = Stopwatch::start();
-    let fitted = Fitted::joint(&borrowed, request.options, &shared)?;
+    let fitted = FitSolution::fit_jointly(&borrowed, request.options, &shared)?;
     let mut report = fitted.joint_report();
     let seconds = watch.seconds();
     let mut notes = Vec::new();
-    let find = |traced: &[Traced<'_>]| systematic_joint(traced, request.options, &shared);
+    let find =
+        |traced: &[TracedRecord<'_>]| estimate_systematic_jointly(traced, request.options, &shared);
     let found = request.is_systematic.then(|| records.systematic(find));
     let systematic = found.and_then(|found| {
         found.unwrap_or_else(|reason| {
@@ -68,10 +70,10 @@ pub fn fit_together(
         report = report.with_systematic(found);
     }
     let overlays = report.records.iter().zip(&borrowed);
-    let overlays = overlays.map(|(one, (_, samples))| Overlay::of(&one.report, samples));
+    let overlays = overlays.map(|(one, (_, samples))| FitOverlay::of(&one.report, samples));
     let intervals = (0..borrowed.len())
         .map(|record| request.intervals.find(&fitted, record, |done| progress(record, done)));
-    Ok(Together {
+    Ok(JointFit {
         overlays: overlays.collect(),
         intervals: intervals.collect::<Result<_, _>>()?,
         systematic,
@@ -81,14 +83,14 @@ pub fn fit_together(
     })
 }
 
-impl Together {
+impl JointFit {
     #[must_use]
-    pub fn beside<'a>(&'a self, records: &'a Recordings) -> Vec<Beside<'a>> {
+    pub fn details<'a>(&'a self, records: &'a Recordings) -> Vec<FitDetails<'a>> {
         self.overlays
             .iter()
             .zip(&self.intervals)
             .zip(&records.all)
-            .map(|((overlay, intervals), record)| Beside {
+            .map(|((overlay, intervals), record)| FitDetails {
                 overlay,
                 intervals,
                 systematic: None,
@@ -98,7 +100,11 @@ impl Together {
     }
 
     #[must_use]
-    pub fn object<'a>(&'a self, options: &FitOptions, beside: &[Beside<'a>]) -> JointObject<'a> {
+    pub fn object<'a>(
+        &'a self,
+        options: &FitOptions,
+        beside: &[FitDetails<'a>],
+    ) -> JointObject<'a> {
         let systematic = self.systematic.as_deref();
         JointObject::of(options.family(), &self.report, beside, systematic, self.seconds)
     }

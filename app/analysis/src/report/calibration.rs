@@ -4,16 +4,16 @@
 pub use super::calibration_plot::picture;
 use super::text::table;
 use palpate_model::calibration::{
-    Calibration, CalibrationError, Candidate, CheckResult, CurveKind, ForceUncertainty, Quality,
-    Term, candidates, judge_kind,
+    Calibration, CalibrationError, CalibrationQuality, CurveCandidate, CurveKind, ForceUncertainty,
+    UncertaintyTerm, WeightCheck, assess_curve_kind, curve_candidates,
 };
 use palpate_model::units::Newtons;
-use palpate_sessions::calibrations::{Kept, Shelf};
+use palpate_sessions::calibrations::{CalibrationStore, StoredCalibration};
 use serde::Serialize;
 use std::path::Path;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Entry {
+pub struct CalibrationEntry {
     pub id: String,
     pub name: String,
     pub rig: String,
@@ -26,10 +26,10 @@ pub struct Entry {
     pub superseded_by: Option<String>,
 }
 
-impl Entry {
+impl CalibrationEntry {
     /// Of a stored calibration.
     #[must_use]
-    pub fn of(shelf: &Shelf, kept: &Kept, age_days: Option<i64>) -> Self {
+    pub fn of(shelf: &CalibrationStore, kept: &StoredCalibration, age_days: Option<i64>) -> Self {
         let document = &kept.document;
         let in_force = shelf.in_force(&document.rig);
         Self {
@@ -70,11 +70,11 @@ impl Entry {
 }
 
 #[must_use]
-pub fn list(entries: &[Entry], folder: &Path) -> String {
+pub fn list(entries: &[CalibrationEntry], folder: &Path) -> String {
     if entries.is_empty() {
         return format!("no calibration in {}", folder.display());
     }
-    let row = |one: &Entry| {
+    let row = |one: &CalibrationEntry| {
         let age = one.age_days.map_or("not stated".to_owned(), |age| format!("{age} d"));
         vec![one.id.clone(), one.name.clone(), one.rig.clone(), one.cell.clone(), age, one.state()]
     };
@@ -93,25 +93,25 @@ pub struct Budget {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BudgetTerm {
-    pub term: Term,
+    pub term: UncertaintyTerm,
     /// Its standard uncertainty in N; null where it is not stated.
     pub uncertainty_n: Option<f64>,
 }
 
-/// Quality, candidate curves and uncertainty of a calibration.
+/// CalibrationQuality, candidate curves and uncertainty of a calibration.
 #[derive(Clone, Debug, Serialize)]
-pub struct Told {
-    pub quality: Quality,
+pub struct CalibrationDetails {
+    pub quality: CalibrationQuality,
     /// Every curve tried, the best first.
-    pub candidates: Vec<Candidate>,
-    pub chosen: Option<Candidate>,
+    pub candidates: Vec<CurveCandidate>,
+    pub chosen: Option<CurveCandidate>,
     /// Uncertainty at each weight and half-way to the next.
     pub budget: Vec<Budget>,
     #[serde(skip)]
     pub uncertainty: ForceUncertainty,
 }
 
-impl Told {
+impl CalibrationDetails {
     pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
         let points = calibration.points()?;
         let uncertainty = ForceUncertainty::of(calibration)?;
@@ -121,7 +121,7 @@ impl Told {
         let budget = |&force_n: &f64| Budget {
             force_n,
             uncertainty_n: uncertainty.sigma(Newtons(force_n)).map(|sigma| sigma.0),
-            terms: Term::ALL
+            terms: UncertaintyTerm::ALL
                 .map(|term| BudgetTerm {
                     term,
                     uncertainty_n: uncertainty
@@ -132,8 +132,8 @@ impl Told {
         };
         Ok(Self {
             quality: calibration.quality()?,
-            candidates: candidates(&points),
-            chosen: judge_kind(&calibration.curve, &points),
+            candidates: curve_candidates(&points),
+            chosen: assess_curve_kind(&calibration.curve, &points),
             budget: forces.iter().map(budget).collect(),
             uncertainty,
         })
@@ -141,10 +141,10 @@ impl Told {
 }
 
 #[must_use]
-pub fn whole(
+pub fn calibration_page(
     calibration: &Calibration,
     id: Option<&str>,
-    details: &Told,
+    details: &CalibrationDetails,
     doubts: &[String],
 ) -> String {
     let sentences = details.quality.findings.iter().chain(doubts);
@@ -180,7 +180,7 @@ fn head(calibration: &Calibration, id: Option<&str>) -> String {
     lines.join("\n")
 }
 
-fn points(quality: &Quality) -> String {
+fn points(quality: &CalibrationQuality) -> String {
     let some = |value: Option<f64>, digits: usize| {
         value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
     };
@@ -201,9 +201,9 @@ fn points(quality: &Quality) -> String {
     table(head, rows)
 }
 
-fn curves(calibration: &Calibration, details: &Told) -> String {
+fn curves(calibration: &Calibration, details: &CalibrationDetails) -> String {
     let newtons = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
-    let is_chosen = |one: &Candidate| one.curve == calibration.curve;
+    let is_chosen = |one: &CurveCandidate| one.curve == calibration.curve;
     let own = details.chosen.iter().filter(|_| !details.candidates.iter().any(is_chosen));
     let rows = details.candidates.iter().chain(own).map(|one| {
         if let Some(reason) = &one.refused {
@@ -231,7 +231,7 @@ fn curves(calibration: &Calibration, details: &Told) -> String {
     table("curve | left out, rms (N) | worst (N) | ends, rms (N) | residuals, rms (mN) | ", rows)
 }
 
-fn spread(quality: &Quality) -> String {
+fn spread(quality: &CalibrationQuality) -> String {
     let hysteresis = match &quality.hysteresis {
         Some(one) => format!(
             "hysteresis: at most {:.2} mV or {:.3} N, rms {:.2} mV or {:.3} N",
@@ -256,9 +256,10 @@ fn spread(quality: &Quality) -> String {
 }
 
 /// The uncertainty by its terms, as far as they are stated; empty without any.
-fn budget(details: &Told) -> String {
+fn budget(details: &CalibrationDetails) -> String {
     let missing = details.uncertainty.not_stated();
-    let stated: Vec<Term> = Term::ALL.into_iter().filter(|term| !missing.contains(term)).collect();
+    let stated: Vec<UncertaintyTerm> =
+        UncertaintyTerm::ALL.into_iter().filter(|term| !missing.contains(term)).collect();
     if !details.uncertainty.is_stated() {
         return String::new();
     }
@@ -274,7 +275,7 @@ fn budget(details: &Told) -> String {
 }
 
 #[must_use]
-pub fn check(result: &CheckResult) -> String {
+pub fn check(result: &WeightCheck) -> String {
     let verdict = if result.is_passed { "passed" } else { "FAILED" };
     let own = result.uncertainty_n.map_or("not stated by the calibration".to_owned(), |sigma| {
         format!("{sigma:.3} N from calibration and weight")
@@ -296,8 +297,8 @@ mod tests {
     #[test]
     fn the_page_tells_every_weight_every_curve_and_every_finding() {
         let thesis = Calibration::thesis();
-        let details = Told::of(&thesis).unwrap();
-        let page = whole(&thesis, Some("id-1"), &details, &["a doubt".into()]);
+        let details = CalibrationDetails::of(&thesis).unwrap();
+        let page = calibration_page(&thesis, Some("id-1"), &details, &["a doubt".into()]);
         for weight in &details.quality.points {
             assert!(page.contains(&format!("{:.1} ", weight.mass_g)), "{}", weight.mass_g);
         }
@@ -315,8 +316,8 @@ mod tests {
     #[test]
     fn a_straight_line_of_two_points_has_a_page_too() {
         let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
-        let details = Told::of(&line).unwrap();
-        let page = whole(&line, None, &details, &[]);
+        let details = CalibrationDetails::of(&line).unwrap();
+        let page = calibration_page(&line, None, &details, &[]);
         assert!(page.contains("monotone interpolation") && !page.contains("NaN"), "{page}");
         assert!(!picture(&line, &details).contains("NaN"));
     }

@@ -1,12 +1,14 @@
 //! A calibration as one picture: the curve with its readings, what it misses, its slope, and the uncertainty
 //! of a force with every term.
 
-use super::calibration::Told;
+use super::calibration::CalibrationDetails;
 use super::picture::{LEFT, LINE, RIGHT, sentence_lines, titled};
-use palpate_figures::drawing::{Drawing, Ink as TextInk};
-use palpate_figures::figure::{self, AxisNames, Ink, Level, Plot, Series, Stretch};
+use palpate_figures::drawing::{Drawing, TextStyle as TextInk};
+use palpate_figures::figure::{self, AxisNames, Ink, Plot, PlotLevel, PlotSeries, PlotStretch};
 use palpate_figures::tokens::LIGHT;
-use palpate_model::calibration::{Calibration, CalibrationError, Direction, FlatStretch, Term};
+use palpate_model::calibration::{
+    Calibration, CalibrationError, Direction, FlatStretch, UncertaintyTerm,
+};
 use palpate_model::units::{Newtons, Volts};
 
 /// Places along the force axis: more than a pixel has.
@@ -28,7 +30,10 @@ impl Axis {
 }
 
 /// The plots of a calibration over force in N: signal, residual, slope and uncertainty.
-pub fn plots(calibration: &Calibration, details: &Told) -> Result<[Plot; 4], CalibrationError> {
+pub fn plots(
+    calibration: &Calibration,
+    details: &CalibrationDetails,
+) -> Result<[Plot; 4], CalibrationError> {
     let (curve, points) = (calibration.curve()?, calibration.points()?);
     let (first, last) = curve.force_range();
     let axis = Axis([first.0, last.0 + BEYOND * (last.0 - first.0)]);
@@ -49,68 +54,68 @@ pub fn plots(calibration: &Calibration, details: &Told) -> Result<[Plot; 4], Cal
         }
     }
     let slope = axis.along(|force| curve.sensitivity_at(Newtons(force)));
-    let plot = |title: &str, y: figure::Axis| Plot {
+    let plot = |title: &str, y: figure::PlotAxis| Plot {
         stretches: details.quality.flat.iter().map(flat).collect(),
-        ..Plot::new(title, figure::Axis::linear("force (N)").over(axis.0), y)
+        ..Plot::new(title, figure::PlotAxis::linear("force (N)").with_range(axis.0), y)
     };
-    let upright = figure::Axis::linear;
+    let upright = figure::PlotAxis::linear;
     let lines = [
-        Series::line("", Ink::Text, 1.4, signal),
+        PlotSeries::line("", Ink::Text, 1.4, signal),
         // Beyond the heaviest weight nothing was measured.
-        Series::dashed("", Ink::Quiet, 1.0, beyond),
+        PlotSeries::dashed("", Ink::Quiet, 1.0, beyond),
     ];
-    let zero = Level::plain(0.0, Ink::Quiet);
+    let zero = PlotLevel::plain(0.0, Ink::Quiet);
     Ok([
         plot("signal (V)", upright("signal (V)")).with(lines.into_iter().chain(dots(readings))),
         Plot {
             levels: vec![zero],
-            ..plot("residual (mN)", upright("residual (mN)").seeing(&[-1.0, 1.0]))
+            ..plot("residual (mN)", upright("residual (mN)").with_visible_values(&[-1.0, 1.0]))
                 .with(dots(misses))
         },
-        plot("slope (V/N)", upright("slope (V/N)").seeing(&[0.0])).with([Series::line(
-            "",
-            Ink::Text,
-            1.4,
-            slope,
-        )]),
+        plot("slope (V/N)", upright("slope (V/N)").with_visible_values(&[0.0]))
+            .with([PlotSeries::line("", Ink::Text, 1.4, slope)]),
         Plot {
             remark: (!details.uncertainty.is_stated())
                 .then(|| "the calibration states no uncertainty".to_owned()),
-            ..plot("uncertainty (mN)", upright("u (mN)").seeing(&[0.0, 1.0]))
+            ..plot("uncertainty (mN)", upright("u (mN)").with_visible_values(&[0.0, 1.0]))
                 .with(uncertainties(details, axis))
         },
     ])
 }
 
-fn flat(one: &FlatStretch) -> Stretch {
-    Stretch { name: "flat stretch".to_owned(), ends: [one.from_n, one.to_n], ink: Some(Ink::Line) }
+fn flat(one: &FlatStretch) -> PlotStretch {
+    PlotStretch {
+        name: "flat stretch".to_owned(),
+        ends: [one.from_n, one.to_n],
+        ink: Some(Ink::Line),
+    }
 }
 
-fn dots([loading, unloading]: [Vec<[f64; 2]>; 2]) -> impl Iterator<Item = Series> {
+fn dots([loading, unloading]: [Vec<[f64; 2]>; 2]) -> impl Iterator<Item = PlotSeries> {
     let both = [
-        Series::dots("loading", Ink::Series, 3.6, loading),
-        Series::dots("unloading", Ink::Limit, 2.6, unloading),
+        PlotSeries::dots("loading", Ink::Series, 3.6, loading),
+        PlotSeries::dots("unloading", Ink::Limit, 2.6, unloading),
     ];
     both.into_iter().filter(|one| !one.points.is_empty())
 }
 
 /// Every term that is stated, and all of them together.
-fn uncertainties(details: &Told, axis: Axis) -> Vec<Series> {
+fn uncertainties(details: &CalibrationDetails, axis: Axis) -> Vec<PlotSeries> {
     let own = &details.uncertainty;
     if !own.is_stated() {
         return Vec::new();
     }
     let inks = [Ink::Series, Ink::Quiet, Ink::Notice, Ink::Alarm, Ink::Active, Ink::Limit];
-    let terms = Term::ALL.into_iter().zip(inks);
+    let terms = UncertaintyTerm::ALL.into_iter().zip(inks);
     let stated = terms.filter(|(term, _)| own.errors().any(|one| one == *term));
-    let mut series: Vec<Series> = stated
+    let mut series: Vec<PlotSeries> = stated
         .map(|(term, ink)| {
             let line = axis.along(|force| in_mn(own.term_sigma(term, Newtons(force))));
-            Series::line(term.name(), ink, 1.2, line)
+            PlotSeries::line(term.name(), ink, 1.2, line)
         })
         .collect();
     let all = axis.along(|force| in_mn(own.sigma(Newtons(force))));
-    series.push(Series::line("all terms", Ink::Text, 2.2, all));
+    series.push(PlotSeries::line("all terms", Ink::Text, 2.2, all));
     series
 }
 
@@ -119,7 +124,7 @@ fn in_mn(sigma: Option<Newtons>) -> f64 {
 }
 
 #[must_use]
-pub fn picture(calibration: &Calibration, details: &Told) -> String {
+pub fn picture(calibration: &Calibration, details: &CalibrationDetails) -> String {
     drawing(calibration, details).svg()
 }
 
@@ -127,7 +132,7 @@ pub fn picture(calibration: &Calibration, details: &Told) -> String {
 const PLACES_PX: [[f64; 2]; 4] = [[84.0, 320.0], [356.0, 450.0], [486.0, 600.0], [654.0, 820.0]];
 
 #[must_use]
-pub fn drawing(calibration: &Calibration, details: &Told) -> Drawing {
+pub fn drawing(calibration: &Calibration, details: &CalibrationDetails) -> Drawing {
     let line = format!("{}; {}", calibration.curve, calibration.source);
     let mut svg = titled(&calibration.name, &line);
     let Ok(plots) = plots(calibration, details) else {

@@ -1,11 +1,11 @@
 //! Results of a catalog search as text.
 
 use super::text::{in_columns, table};
-use palpate_sessions::catalog::{Entry, Event, Found, ReviewIs};
+use palpate_sessions::catalog::{CatalogEntry, CatalogPage, HistoryEvent, ReviewFilter};
 
 /// One line a session, and how many there are.
 #[must_use]
-pub fn list(found: &Found, page: usize, pages: usize) -> String {
+pub fn list(found: &CatalogPage, page: usize, pages: usize) -> String {
     if found.count == 0 {
         return "no session matches".into();
     }
@@ -19,7 +19,7 @@ pub fn list(found: &Found, page: usize, pages: usize) -> String {
     text
 }
 
-fn line(entry: &Entry) -> Vec<String> {
+fn line(entry: &CatalogEntry) -> Vec<String> {
     if let (true, Some(trouble)) = (entry.session_id.is_empty(), &entry.trouble) {
         return vec![format!("{}: {trouble}", entry.folder)];
     }
@@ -54,7 +54,7 @@ fn line(entry: &Entry) -> Vec<String> {
         },
         match entry.review.as_ref() {
             None if entry.trouble.is_some() => "?".into(),
-            review => ReviewIs::of(review).word().to_owned(),
+            review => ReviewFilter::of(review).word().to_owned(),
         },
         folder,
     ]
@@ -62,8 +62,8 @@ fn line(entry: &Entry) -> Vec<String> {
 
 /// One line an event, oldest first.
 #[must_use]
-pub fn history(events: &[Event]) -> String {
-    let line = |event: &Event| {
+pub fn history(events: &[HistoryEvent]) -> String {
+    let line = |event: &HistoryEvent| {
         let at = event.at.get(..19).map_or("undated".to_owned(), |at| at.replace('T', " "));
         let by = match event.by.as_str() {
             "" => "-".to_owned(),

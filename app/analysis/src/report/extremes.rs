@@ -1,13 +1,13 @@
 //! The extremes as people read them: a summary by group, and the page with all tables.
 
 use super::text::capital;
-use palpate_rheology::extremes::{Row, Verdict};
+use palpate_rheology::extremes::{ExtremesRow, ExtremesVerdict};
 use std::collections::BTreeMap;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroupSummary {
     pub group: &'static str,
-    /// Rows of each of [`Verdict::ALL`].
+    /// Rows of each of [`ExtremesVerdict::ALL`].
     pub counts: [usize; 4],
     /// The right row that used most of its tolerance, in words.
     pub tightest: Option<String>,
@@ -15,12 +15,12 @@ pub struct GroupSummary {
 
 /// Every group in numbers, in the order they were run.
 #[must_use]
-pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
+pub fn summary(rows: &[ExtremesRow]) -> Vec<GroupSummary> {
     grouped(rows, |row| row.group)
         .into_iter()
         .map(|(group, rows)| GroupSummary {
             group,
-            counts: Verdict::ALL
+            counts: ExtremesVerdict::ALL
                 .map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count()),
             tightest: tightest(&rows).map(|(row, error)| {
                 format!("{error:.1e} of {:.0e}: {}, {}", row.tolerance, row.subject, row.case)
@@ -31,10 +31,10 @@ pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
 
 /// Rows by a word of theirs, in the order in which the words come first.
 fn grouped<'a, K: PartialEq>(
-    rows: impl IntoIterator<Item = &'a Row>,
-    word: impl Fn(&'a Row) -> K,
-) -> Vec<(K, Vec<&'a Row>)> {
-    let mut groups: Vec<(K, Vec<&Row>)> = Vec::new();
+    rows: impl IntoIterator<Item = &'a ExtremesRow>,
+    word: impl Fn(&'a ExtremesRow) -> K,
+) -> Vec<(K, Vec<&'a ExtremesRow>)> {
+    let mut groups: Vec<(K, Vec<&ExtremesRow>)> = Vec::new();
     for row in rows {
         let key = word(row);
         match groups.iter_mut().find(|(group, _)| *group == key) {
@@ -46,16 +46,16 @@ fn grouped<'a, K: PartialEq>(
 }
 
 /// The right row that used most of its tolerance.
-fn tightest<'a>(rows: &[&'a Row]) -> Option<(&'a Row, f64)> {
+fn tightest<'a>(rows: &[&'a ExtremesRow]) -> Option<(&'a ExtremesRow, f64)> {
     rows.iter()
-        .filter(|row| row.verdict == Verdict::Right)
+        .filter(|row| row.verdict == ExtremesVerdict::Right)
         .filter_map(|row| Some((*row, row.relative_error?)))
         .max_by(|(a, x), (b, y)| (x / a.tolerance).total_cmp(&(y / b.tolerance)))
 }
 
 /// One line for each group, then every wrong row.
 #[must_use]
-pub fn text(rows: &[Row]) -> String {
+pub fn text(rows: &[ExtremesRow]) -> String {
     let mut lines = Vec::new();
     for one in summary(rows) {
         let [right, refused, flagged, wrong] = one.counts;
@@ -67,7 +67,7 @@ pub fn text(rows: &[Row]) -> String {
             lines.push(format!("  closest to its tolerance: {tightest}"));
         }
     }
-    let wrong = rows.iter().filter(|row| row.verdict == Verdict::Wrong);
+    let wrong = rows.iter().filter(|row| row.verdict == ExtremesVerdict::Wrong);
     lines.extend(wrong.map(|row| {
         format!("WRONG {}: {}, {}: {}", row.group, row.subject, row.case, row.sentence)
     }));
@@ -75,7 +75,7 @@ pub fn text(rows: &[Row]) -> String {
 }
 
 #[must_use]
-pub fn page(rows: &[Row]) -> String {
+pub fn page(rows: &[ExtremesRow]) -> String {
     let mut page = format!("{PAGE_HEAD}{INTRODUCTION}");
     page += "| group | right | refused | flagged | wrong | closest to its tolerance |\n|---|---|---|---|---|---|\n";
     for one in summary(rows) {
@@ -103,14 +103,14 @@ Written by `palpate extremes --page docs/explanation/extremes.md`; do not edit.
 const INTRODUCTION: &str = include_str!("extremes.md");
 
 /// What became of several rows in one short cell: the worst error, or the worst verdict.
-fn cell(rows: &[&Row]) -> String {
+fn cell(rows: &[&ExtremesRow]) -> String {
     let worst = rows.iter().max_by(|a, b| {
-        let error = |row: &Row| row.relative_error.unwrap_or_default();
+        let error = |row: &ExtremesRow| row.relative_error.unwrap_or_default();
         a.verdict.cmp(&b.verdict).then(error(a).total_cmp(&error(b)))
     });
     match worst {
         None => String::new(),
-        Some(row) if row.verdict == Verdict::Right => {
+        Some(row) if row.verdict == ExtremesVerdict::Right => {
             format!("{:.0e}", row.relative_error.unwrap_or_default())
         }
         Some(row) => row.verdict.name().to_owned(),
@@ -124,8 +124,8 @@ fn exponents(case: &str) -> Option<(i32, i32)> {
     Some((tau, step.strip_suffix(" s")?.parse().ok()?))
 }
 
-fn by_time_and_step(rows: &[&Row]) -> String {
-    let mut cells: BTreeMap<i32, BTreeMap<i32, Vec<&Row>>> = BTreeMap::new();
+fn by_time_and_step(rows: &[&ExtremesRow]) -> String {
+    let mut cells: BTreeMap<i32, BTreeMap<i32, Vec<&ExtremesRow>>> = BTreeMap::new();
     for row in rows {
         if let Some((tau, step)) = exponents(&row.case) {
             cells.entry(tau).or_default().entry(step).or_default().push(row);
@@ -142,10 +142,10 @@ fn by_time_and_step(rows: &[&Row]) -> String {
     table
 }
 
-fn by_ratio(rows: &[&Row]) -> String {
-    let of_ratio = |row: &&&Row| exponents(&row.case).is_some();
+fn by_ratio(rows: &[&ExtremesRow]) -> String {
+    let of_ratio = |row: &&&ExtremesRow| exponents(&row.case).is_some();
     let subjects = grouped(rows.iter().filter(of_ratio).copied(), |row| row.subject.as_str());
-    let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
+    let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&ExtremesRow>>> = BTreeMap::new();
     for row in rows {
         if let Some((tau, step)) = exponents(&row.case) {
             cells.entry(step - tau).or_default().entry(&row.subject).or_default().push(row);
@@ -161,7 +161,7 @@ fn by_ratio(rows: &[&Row]) -> String {
     table
 }
 
-fn by_case(rows: &[&Row]) -> String {
+fn by_case(rows: &[&ExtremesRow]) -> String {
     let names = ["what", "worst error", "the first sentence"];
     let mut table = header("case", names.into_iter().map(str::to_owned));
     for (case, rows) in grouped(rows.iter().copied(), |row| row.case.as_str()) {
@@ -174,8 +174,8 @@ fn by_case(rows: &[&Row]) -> String {
 }
 
 /// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
-fn verdicts(rows: &[&Row]) -> String {
-    let mut named: [(Verdict, Vec<&str>); 4] = Verdict::ALL.map(|verdict| {
+fn verdicts(rows: &[&ExtremesRow]) -> String {
+    let mut named: [(ExtremesVerdict, Vec<&str>); 4] = ExtremesVerdict::ALL.map(|verdict| {
         let own = rows.iter().filter(|row| row.verdict == verdict);
         (verdict, own.map(|row| row.subject.as_str()).collect())
     });

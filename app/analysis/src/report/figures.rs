@@ -1,12 +1,14 @@
 //! The figures of a session: force over time and over depth, alone or several sessions over each other.
 
 use super::picture::{LEFT, RIGHT, titled};
-use palpate_figures::drawing::{Drawing, Ink as TextInk};
-use palpate_figures::figure::{Axis, AxisNames, Ink, Level, Plot, Series, Shape, Stretch};
+use palpate_figures::drawing::{Drawing, TextStyle as TextInk};
+use palpate_figures::figure::{
+    AxisNames, Ink, Plot, PlotAxis, PlotLevel, PlotSeries, PlotStretch, SeriesShape,
+};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::rig::Phase;
-use palpate_model::signal::polyline::Reducer;
+use palpate_model::signal::polyline::PolylineReducer;
 use palpate_model::units::Newtons;
 use palpate_sessions::contacts::contacts;
 use palpate_sessions::log::Session;
@@ -20,12 +22,12 @@ const LEGEND: f64 = 20.0;
 
 /// A stretch of time in s since the first sample, as the column `t_s` of an export has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
+pub struct TimeWindow {
     pub from: f64,
     pub until: f64,
 }
 
-impl Window {
+impl TimeWindow {
     pub const WHOLE: Self = Self { from: f64::NEG_INFINITY, until: f64::INFINITY };
 
     fn holds(self, at: f64) -> bool {
@@ -35,7 +37,7 @@ impl Window {
 
 /// Origin of time in an overlay of several sessions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Align {
+pub enum TimeAlignment {
     /// The first sample of the first ramp.
     #[default]
     Ramp,
@@ -43,7 +45,7 @@ pub enum Align {
     Contact,
 }
 
-impl Align {
+impl TimeAlignment {
     /// In words, after "s since".
     #[must_use]
     pub const fn word(self) -> &'static str {
@@ -86,7 +88,7 @@ impl Traces {
 
     /// The traces of a session within a window of time.
     #[must_use]
-    pub fn of(name: &str, session: &Session, window: Window) -> Self {
+    pub fn of(name: &str, session: &Session, window: TimeWindow) -> Self {
         let first = session.rows.first().map_or(0, |row| row.tick);
         let time = |index: usize| {
             let ticks = session.rows[index].tick.saturating_sub(first);
@@ -157,10 +159,10 @@ impl Traces {
     }
 
     /// Time that counts as 0 in an overlay, if the session has it.
-    pub fn origin(&self, align: Align) -> Option<f64> {
+    pub fn origin(&self, align: TimeAlignment) -> Option<f64> {
         match align {
-            Align::Ramp => self.ramp,
-            Align::Contact => self.contact,
+            TimeAlignment::Ramp => self.ramp,
+            TimeAlignment::Contact => self.contact,
         }
     }
 }
@@ -181,7 +183,7 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
     let (x, y) = (ends(0), ends(1));
     let scale = |[low, high]: [f64; 2], px: f64| px / (high - low).max(1e-9);
     let (across, up) = (scale(x, RIGHT - LEFT), scale(y, BOTTOM - TOP));
-    let mut reducer = Reducer::new(RIGHT - LEFT, BOTTOM - TOP);
+    let mut reducer = PolylineReducer::new(RIGHT - LEFT, BOTTOM - TOP);
     for [depth, force] in points() {
         reducer.push((depth - x[0]) * across, (force - y[0]) * up);
     }
@@ -205,9 +207,9 @@ fn limit_in_reach(traces: &Traces) -> Option<f64> {
 }
 
 /// Phases from their starts in s, every other one shaded; the last one ends at `end`.
-pub(super) fn phase_stretches(starts: &[(f64, Phase)], end: f64) -> Vec<Stretch> {
+pub(super) fn phase_stretches(starts: &[(f64, Phase)], end: f64) -> Vec<PlotStretch> {
     let until = |i: usize| starts.get(i + 1).map_or(end, |(next, _)| *next);
-    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| Stretch {
+    let stretch = |(i, (start, phase)): (usize, &(f64, Phase))| PlotStretch {
         name: phase.name().to_owned(),
         ends: [*start, until(i)],
         ink: (i % 2 == 1).then_some(Ink::Line),
@@ -216,9 +218,9 @@ pub(super) fn phase_stretches(starts: &[(f64, Phase)], end: f64) -> Vec<Stretch>
 }
 
 /// The interlock's limit as a dashed level.
-pub(super) fn interlock(limit: Newtons) -> Level {
+pub(super) fn interlock(limit: Newtons) -> PlotLevel {
     let name = format!("interlock at {limit:.1}");
-    Level { name, is_dashed: true, ..Level::plain(limit.0, Ink::Limit) }
+    PlotLevel { name, is_dashed: true, ..PlotLevel::plain(limit.0, Ink::Limit) }
 }
 
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
@@ -226,20 +228,20 @@ pub(super) fn interlock(limit: Newtons) -> Level {
 pub fn force_time(traces: &Traces) -> Drawing {
     let [first, last] = traces.ends;
     let phases = phase_stretches(&traces.phases, last).into_iter();
-    let left_out = traces.left_out_s.iter().map(|[from, until]| Stretch {
+    let left_out = traces.left_out_s.iter().map(|[from, until]| PlotStretch {
         name: "left out".to_owned(),
         ends: [from.max(first), until.min(last)],
         ink: Some(Ink::Notice),
     });
     let limit = limit_in_reach(traces).map(|at| interlock(Newtons(at)));
-    let time = Axis::linear("time since the first sample (s)").over(traces.ends);
+    let time = PlotAxis::linear("time since the first sample (s)").with_range(traces.ends);
     let mut plot = Plot {
         stretches: phases.chain(left_out.filter(|one| one.ends[0] < one.ends[1])).collect(),
         levels: limit.into_iter().collect(),
         ..force_plot(time, lines(&traces.force_time, Ink::Series, 0.0).collect())
     };
     // Room above the limit for the names of the phases.
-    plot.y.seen = plot.levels.iter().map(|level| 1.06 * level.at).collect();
+    plot.y.visible_values = plot.levels.iter().map(|level| 1.06 * level.at).collect();
     drawing([&traces.name, "force over time"], &plot, &[])
 }
 
@@ -249,21 +251,21 @@ pub fn force_depth(traces: &Traces) -> Drawing {
     drawing([&traces.name, "force over depth"], &force_plot(depth_axis(&[traces]), lines), &[])
 }
 
-fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = Series> {
-    let shape = Shape::Line { width: 1.4, dash };
-    of.iter().map(move |line| Series { shape, ..Series::line("", ink, 1.4, line.clone()) })
+fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = PlotSeries> {
+    let shape = SeriesShape::Line { width: 1.4, dash };
+    of.iter().map(move |line| PlotSeries { shape, ..PlotSeries::line("", ink, 1.4, line.clone()) })
 }
 
-fn force_plot(x: Axis, series: Vec<Series>) -> Plot {
+fn force_plot(x: PlotAxis, series: Vec<PlotSeries>) -> Plot {
     let remark = series.is_empty().then(|| "no force is known here".to_owned());
-    Plot { remark, ..Plot::new("", x, Axis::linear("force (N)")).with(series) }
+    Plot { remark, ..Plot::new("", x, PlotAxis::linear("force (N)")).with(series) }
 }
 
-fn depth_axis(all: &[&Traces]) -> Axis {
+fn depth_axis(all: &[&Traces]) -> PlotAxis {
     let depths = all.iter().flat_map(|one| one.force_depth.iter().flatten()).map(|point| point[0]);
     let low = depths.clone().fold(0.0f64, f64::min);
     let high = depths.fold(low, f64::max);
-    Axis::linear("depth (mm)").over(if high > low { [low, high] } else { [0.0, 1.0] })
+    PlotAxis::linear("depth (mm)").with_range(if high > low { [low, high] } else { [0.0, 1.0] })
 }
 
 /// Ink and dashes of one of several.
@@ -274,7 +276,7 @@ fn look_of(index: usize) -> (Ink, f64) {
 /// Several sessions over each other: force over time from where they are aligned, then force over depth. Those without
 /// that beginning are left out of the first, and named.
 #[must_use]
-pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
+pub fn overlays(all: &[&Traces], align: TimeAlignment) -> ([Drawing; 2], Vec<String>) {
     let without_origin: Vec<String> =
         all.iter().filter(|one| one.origin(align).is_none()).map(|one| one.name.clone()).collect();
     let (mut over_time, mut over_depth) = (Vec::new(), Vec::new());
@@ -290,7 +292,8 @@ pub fn overlays(all: &[&Traces], align: Align) -> ([Drawing; 2], Vec<String>) {
     }
     let times = over_time.iter().flat_map(|line| &line.points).map(|point| point[0]);
     let last = times.fold(1.0, f64::max);
-    let time = Axis::linear(&format!("time since {} (s)", align.word())).over([-LEAD_S, last]);
+    let time =
+        PlotAxis::linear(&format!("time since {} (s)", align.word())).with_range([-LEAD_S, last]);
     let since = format!("from when {}", align.word());
     let over_depth = force_plot(depth_axis(all), over_depth);
     let drawings = [

@@ -9,7 +9,7 @@ fn recorded() -> Session {
 #[test]
 fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
     let session = recorded();
-    let traces = Traces::of("one", &session, Window::WHOLE);
+    let traces = Traces::of("one", &session, TimeWindow::WHOLE);
     let peak = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::MIN, f64::max);
     let drawn = peak(&mut traces.force_time.iter().flatten().map(|point| point[1]));
     assert_eq!(drawn, peak(&mut session.rows.iter().filter_map(|row| row.force)));
@@ -32,19 +32,19 @@ fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
 #[test]
 fn a_window_leaves_the_rest_out() {
     let session = recorded();
-    let ramp = Traces::of("one", &session, Window::WHOLE).ramp.unwrap();
-    let window = Window { from: ramp, until: ramp + 1.0 };
+    let ramp = Traces::of("one", &session, TimeWindow::WHOLE).ramp.unwrap();
+    let window = TimeWindow { from: ramp, until: ramp + 1.0 };
     let part = Traces::of("one", &session, window);
     assert!(part.ends[0] >= ramp && part.ends[1] <= ramp + 1.0);
     assert!(part.samples[0] > 900 && part.samples[0] < 1100, "{:?}", part.samples);
-    let none = Traces::of("one", &session, Window { from: 1e9, until: 2e9 });
+    let none = Traces::of("one", &session, TimeWindow { from: 1e9, until: 2e9 });
     assert!(none.is_empty() && force_time(&none).svg().contains("no force is known"));
 }
 
 #[test]
 fn sessions_over_each_other_begin_together() {
     let session = recorded();
-    let one = Traces::of("one", &session, Window::WHOLE);
+    let one = Traces::of("one", &session, TimeWindow::WHOLE);
     let mut later = one.clone();
     later.name = "later".into();
     for point in later.force_time.iter_mut().flatten() {
@@ -52,7 +52,7 @@ fn sessions_over_each_other_begin_together() {
     }
     later.ramp = later.ramp.map(|ramp| ramp + 100.0);
     later.contact = None;
-    let ([time, _], without_origin) = overlays(&[&one, &later], Align::Ramp);
+    let ([time, _], without_origin) = overlays(&[&one, &later], TimeAlignment::Ramp);
     assert!(without_origin.is_empty());
     let svg = time.svg();
     let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
@@ -63,6 +63,6 @@ fn sessions_over_each_other_begin_together() {
     };
     assert!(!points(LIGHT.sessions[0]).is_empty());
     assert_eq!(points(LIGHT.sessions[0]), points(LIGHT.sessions[1]));
-    let (_, without_origin) = overlays(&[&one, &later], Align::Contact);
+    let (_, without_origin) = overlays(&[&one, &later], TimeAlignment::Contact);
     assert_eq!(without_origin, ["later"]);
 }

@@ -1,16 +1,16 @@
 //! A fit as machines read it: what `palpate fit --json` prints and what an analysis keeps.
 
-use crate::compliance::Correction;
-use crate::fit::Intervals;
+use crate::compliance::ComplianceCorrection;
+use crate::fit::FitIntervals;
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
 use palpate_rheology::families::Family;
-use palpate_rheology::fit::{FitReport, FitSample, JointReport, Systematic};
+use palpate_rheology::fit::{FitReport, FitSample, JointReport, SystematicUncertainty};
 use serde::Serialize;
 
 /// The modelled force along a record, and what it says beside the measured one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Overlay {
+pub struct FitOverlay {
     /// At every sample.
     #[serde(skip)]
     pub forces: Vec<Newtons>,
@@ -22,7 +22,7 @@ pub struct Overlay {
     pub work_fitted_n_mm: f64,
 }
 
-impl Overlay {
+impl FitOverlay {
     /// Of a report along the samples that were fitted; energies over those whose force counts.
     #[must_use]
     pub fn of(report: &FitReport, samples: &[FitSample]) -> Self {
@@ -58,31 +58,31 @@ pub struct FitObject<'a> {
     #[serde(flatten)]
     family_text: FamilyText,
     #[serde(flatten)]
-    details: Beside<'a>,
+    details: FitDetails<'a>,
     /// The fit alone, without reading.
     seconds: f64,
 }
 
 /// Parts of a fit beside its report.
 #[derive(Clone, Copy, Serialize)]
-pub struct Beside<'a> {
+pub struct FitDetails<'a> {
     #[serde(flatten)]
-    pub overlay: &'a Overlay,
+    pub overlay: &'a FitOverlay,
     #[serde(flatten)]
-    pub intervals: &'a Intervals,
+    pub intervals: &'a FitIntervals,
     /// What calibration and compliance add; absent for tables and where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub systematic: Option<&'a Systematic>,
+    pub systematic: Option<&'a SystematicUncertainty>,
     /// What the rig's compliance did to the depths, or would; absent where none is known.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub compliance: Option<&'a Correction>,
+    pub compliance: Option<&'a ComplianceCorrection>,
 }
 
 impl<'a> FitObject<'a> {
     pub fn of(
         family: &dyn Family,
         report: &'a FitReport,
-        details: Beside<'a>,
+        details: FitDetails<'a>,
         seconds: f64,
     ) -> Self {
         Self { report, family_text: FamilyText::of(family), details, seconds }
@@ -101,10 +101,10 @@ pub struct JointObject<'a> {
     rmse_n: f64,
     effective_samples: f64,
     /// What the rig's compliance did to the depths of each record, or would; null where none is known.
-    compliances: Vec<Option<&'a Correction>>,
+    compliances: Vec<Option<&'a ComplianceCorrection>>,
     /// What calibrations and compliances add, for each record; absent for tables and where it was not asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
-    systematic: Option<&'a [Systematic]>,
+    systematic: Option<&'a [SystematicUncertainty]>,
     seconds: f64,
 }
 
@@ -113,7 +113,7 @@ struct RecordObject<'a> {
     record: &'a str,
     report: &'a FitReport,
     #[serde(flatten)]
-    details: Beside<'a>,
+    details: FitDetails<'a>,
 }
 
 impl<'a> JointObject<'a> {
@@ -121,8 +121,8 @@ impl<'a> JointObject<'a> {
     pub fn of(
         family: &dyn Family,
         report: &'a JointReport,
-        details: &[Beside<'a>],
-        systematic: Option<&'a [Systematic]>,
+        details: &[FitDetails<'a>],
+        systematic: Option<&'a [SystematicUncertainty]>,
         seconds: f64,
     ) -> Self {
         let records = report.records.iter().zip(details);
@@ -134,7 +134,7 @@ impl<'a> JointObject<'a> {
                 .map(|(named, details)| RecordObject {
                     record: &named.record,
                     report: &named.report,
-                    details: Beside { systematic: None, compliance: None, ..*details },
+                    details: FitDetails { systematic: None, compliance: None, ..*details },
                 })
                 .collect(),
             samples: report.samples,

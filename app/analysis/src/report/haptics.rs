@@ -2,22 +2,22 @@
 
 use super::picture::{COLUMNS, LEFT, RIGHT, titled};
 use super::text::{ParameterText, table};
-use crate::haptics::{Checked, Followed, Paced, Tried};
-use palpate_figures::figure::{self, Axis, AxisNames, Ink, Plot, Series};
+use crate::haptics::{FeedbackCheck, HapticCheck, LoopMeasurement, SimulatedTrial};
+use palpate_figures::figure::{self, AxisNames, Ink, Plot, PlotAxis, PlotSeries};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_figures::uncertain::plain;
 use palpate_haptics::Flags;
-use palpate_haptics::check::CheckSample;
+use palpate_haptics::check::FeedbackCheckSample;
 use palpate_haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::FitReport;
-use palpate_runner::haptics::slave::{Difference, MasterLoop, Slaved};
-use palpate_runner::haptics::timing::Spread;
+use palpate_runner::haptics::slave::{ForceDifference, MasterLoop, SlaveReport};
+use palpate_runner::haptics::timing::DurationPercentiles;
 
 #[must_use]
-pub fn check_text(checked: &Checked) -> String {
+pub fn check_text(checked: &HapticCheck) -> String {
     let body = &checked.body;
     let [tau_eps, mu1, mu2, mu3, tau_sig] =
         [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig].map(plain);
@@ -29,7 +29,7 @@ pub fn check_text(checked: &Checked) -> String {
     lines.push(
         "Simulated: a firm hand of little damping presses to the end of the stroke and holds there.".to_owned(),
     );
-    for tried in &checked.tried {
+    for tried in &checked.trials {
         lines.push(tried_text(tried));
         lines.extend(tried.flags.iter().map(|flag| format!("  {flag}")));
     }
@@ -37,7 +37,7 @@ pub fn check_text(checked: &Checked) -> String {
 }
 
 #[must_use]
-pub fn tried_text(tried: &Tried) -> String {
+pub fn tried_text(tried: &SimulatedTrial) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
     let buzz = match (tried.buzz, tried.buzz_until_s) {
         (Some((frequency, amplitude)), Some(until)) => format!(
@@ -59,7 +59,7 @@ pub fn tried_text(tried: &Tried) -> String {
 /// Why less force is felt than the model has, one sentence for each cause, the loop's own lateness last; empty if
 /// nothing takes any away. `missed` counts ticks that were lately due while the loop was away.
 #[must_use]
-pub fn why_less(flags: Flags, missed: u64) -> Vec<String> {
+pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
     let bounds = [Flags::FORCE_MAX, Flags::SLEW].map(|bound| bound.when(flags.has(bound)));
     let causes = std::iter::once(flags.less_force()).chain(bounds);
     let mut causes: Vec<String> =
@@ -88,14 +88,15 @@ pub fn margin_text(margin: &Margin) -> String {
 }
 
 #[must_use]
-pub fn run_text(paced: &Paced) -> String {
+pub fn run_text(paced: &LoopMeasurement) -> String {
     let recorded = paced.recorded.map(|recorded| format!("\n{}", recorded.words()));
     bench_text(std::slice::from_ref(paced)) + &recorded.unwrap_or_default()
 }
 
 #[must_use]
-pub fn slave_text(slaved: &Slaved) -> String {
-    let less = |one: &Difference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
+pub fn slave_text(slaved: &SlaveReport) -> String {
+    let less =
+        |one: &ForceDifference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
     let mut lines = vec![
         format!(
             "slave: down to {:.3} mm; contact changed {} times",
@@ -129,12 +130,12 @@ pub fn slave_text(slaved: &Slaved) -> String {
             slaved.damping_needed.max(0.0)
         ));
     }
-    if let Some(MasterLoop { priority, kept }) = &slaved.master_loop {
+    if let Some(MasterLoop { priority, timing }) = &slaved.master_loop {
         lines.push(format!(
             "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
-            kept.late.count,
-            1e3 * kept.late.p99_9.0,
-            kept.missed
+            timing.late.count,
+            1e3 * timing.late.p99_9.0,
+            timing.missed
         ));
     }
     lines.join("\n")
@@ -142,7 +143,7 @@ pub fn slave_text(slaved: &Slaved) -> String {
 
 /// Loops at several rates, as a table.
 #[must_use]
-pub fn bench_text(loops: &[Paced]) -> String {
+pub fn bench_text(loops: &[LoopMeasurement]) -> String {
     let priority = loops.first().map(|first| format!("priority: {}", first.priority));
     let mut lines: Vec<String> = priority.into_iter().collect();
     lines.push(format!(
@@ -152,7 +153,7 @@ pub fn bench_text(loops: &[Paced]) -> String {
     let heads = "p50    p99   p99.9  max";
     lines.push(format!("{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}", "Hz", ""));
     for one in loops {
-        let statistics = &one.kept;
+        let statistics = &one.statistics;
         lines.push(format!(
             "{:>6.0} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
             one.rate_hz,
@@ -167,14 +168,14 @@ pub fn bench_text(loops: &[Paced]) -> String {
     lines.join("\n")
 }
 
-fn spread(spread: &Spread) -> String {
+fn spread(spread: &DurationPercentiles) -> String {
     let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
     let [p50, p99, p99_9, max] = [spread.p50, spread.p99, spread.p99_9, spread.max].map(micros);
     format!("{p50:<6} {p99:<5} {p99_9:<6} {max:<8}")
 }
 
 #[must_use]
-pub fn follow_text(followed: &Followed) -> String {
+pub fn follow_text(followed: &FeedbackCheck) -> String {
     let mut lines = vec![
         format!(
             "peak       commanded {:.3} N, measured {:.3} N",
@@ -205,7 +206,7 @@ pub fn follow_text(followed: &Followed) -> String {
 }
 
 /// Why the fit of the measured force is not that of the commanded.
-fn difference(followed: &Followed) -> &'static str {
+fn difference(followed: &FeedbackCheck) -> &'static str {
     if followed.settings.friction_share > 0.0 {
         "the drive compensates friction only while the rack moves: the measured force steps as the hold begins, and its fit interprets the step as relaxation"
     } else {
@@ -214,7 +215,7 @@ fn difference(followed: &Followed) -> &'static str {
 }
 
 /// What fits of both forces find, beside the body that was rendered.
-fn fits_beside_the_body(followed: &Followed) -> String {
+fn fits_beside_the_body(followed: &FeedbackCheck) -> String {
     let body = &followed.body;
     let [mu1, mu2, mu3] = body.mu;
     let cell = |report: &Option<FitReport>, name: &str| {
@@ -239,8 +240,9 @@ fn fits_beside_the_body(followed: &Followed) -> String {
 
 /// A check of the feedback as a picture: forces over time, and one over the other.
 #[must_use]
-pub fn follow_plot(source: &str, followed: &Followed) -> String {
-    let series = |of: fn(&CheckSample) -> [f64; 2]| thin(followed.samples.iter().map(of), COLUMNS);
+pub fn follow_plot(source: &str, followed: &FeedbackCheck) -> String {
+    let series =
+        |of: fn(&FeedbackCheckSample) -> [f64; 2]| thin(followed.samples.iter().map(of), COLUMNS);
     let commanded = series(|one| [one.t.0, one.commanded.0]);
     let measured = series(|one| [one.t.0, one.measured.0]);
     let torque = series(|one| [one.t.0, one.torque]);
@@ -250,25 +252,25 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
         followed.peak_commanded_n, followed.peak_measured_n
     );
     let mut svg = titled(source, &line);
-    let time = || Axis::linear("time (s)").over([0.0, last]);
-    let force = Plot::new("", time(), Axis::linear("force (N)")).with([
+    let time = || PlotAxis::linear("time (s)").with_range([0.0, last]);
+    let force = Plot::new("", time(), PlotAxis::linear("force (N)")).with([
         // Wide under narrow, so that both are seen where they agree.
-        Series::line("measured", Ink::Series, 2.6, measured),
-        Series::line("commanded", Ink::Limit, 1.4, commanded),
+        PlotSeries::line("measured", Ink::Series, 2.6, measured),
+        PlotSeries::line("commanded", Ink::Limit, 1.4, commanded),
     ]);
     figure::legend(&mut svg, [RIGHT, 46.0], &force);
     force.draw(&mut svg, [LEFT, 66.0, RIGHT, 360.0], AxisNames::Upright);
-    let torque = Series::line("torque", Ink::Limit, 1.4, torque);
-    let torque = Plot::new("", time(), Axis::linear("torque (N mm)")).with([torque]);
+    let torque = PlotSeries::line("torque", Ink::Limit, 1.4, torque);
+    let torque = Plot::new("", time(), PlotAxis::linear("torque (N mm)")).with([torque]);
     torque.draw(&mut svg, [LEFT, 396.0, RIGHT, 510.0], AxisNames::Both);
     svg.finish(556.0, LIGHT.canvas, &format!("Feedback of {source}"))
 }
 
 /// The check as a table that palpate fits and imports.
 #[must_use]
-pub fn follow_table(followed: &Followed) -> String {
+pub fn follow_table(followed: &FeedbackCheck) -> String {
     let mut table = "time_s,depth_mm,force_n,commanded_n,torque_nmm,bias_v,phase\n".to_owned();
-    let ramp = followed.settings.ramp();
+    let ramp = followed.settings.ramp_end();
     for one in &followed.samples {
         let numbers =
             [one.t.0, one.depth.0, one.measured.0, one.commanded.0, one.torque, one.bias.0];
@@ -282,15 +284,15 @@ pub fn follow_table(followed: &Followed) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_haptics::margin::Cause;
+    use palpate_haptics::margin::MarginCause;
     use palpate_model::units::{Depth, Newtons};
 
     #[test]
     fn only_flags_that_take_force_away_are_listed() {
-        assert!(why_less(Flags::NONE, 0).is_empty());
+        assert!(force_loss_reasons(Flags::NONE, 0).is_empty());
         // These appear elsewhere: they take no force.
-        assert!(why_less(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
-        let all = why_less(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
+        assert!(force_loss_reasons(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
+        let all = force_loss_reasons(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
         assert_eq!(all.len(), 4);
         for words in ["no contact", "after the start", "at its limit", "1 tick passed"] {
             assert!(all.iter().any(|one| one.contains(words)), "{words}: {all:?}");
@@ -303,7 +305,7 @@ mod tests {
             depth: Depth(10.0),
             needed,
             has,
-            cause: Cause::Tick,
+            cause: MarginCause::Tick,
             friction_needed: Newtons(0.0),
             friction: Newtons(0.0),
         };

@@ -3,9 +3,9 @@
 
 use super::figures::{interlock, phase_stretches};
 use super::picture::band;
-use crate::daily::Deviation;
-use palpate_figures::figure::{Axis, Ink, Level, Plot, Series};
-use palpate_model::calibration::{Curve, Direction, ForceUncertainty, newtons_of};
+use crate::daily::DailyCheckDeviation;
+use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries};
+use palpate_model::calibration::{CalibrationCurve, Direction, ForceUncertainty, newtons_of};
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
 use palpate_model::units::Newtons;
@@ -27,7 +27,7 @@ const DEPTH: &str = "depth from contact (mm)";
 const FORCE: &str = "force above tare (N)";
 
 #[derive(Clone, Copy, Debug)]
-pub struct Cycle {
+pub struct LiveCycle {
     /// Its number, from 1.
     pub cycle: u32,
     /// Its highest force and where it was; `None` before there is one.
@@ -42,7 +42,7 @@ pub struct RunPlots {
     /// Force over depth, from the moment contact is known; in a series every cycle is a loop, older ones faded.
     pub force_depth: Plot,
     /// The repeats so far, oldest first; empty where nothing is repeated.
-    pub cycles: Vec<Cycle>,
+    pub cycles: Vec<LiveCycle>,
     /// What a reader must know: that lines are thinned or cut. `None` if they are whole.
     pub remark: Option<String>,
 }
@@ -61,8 +61,9 @@ impl RunPlots {
         let (over_depth, is_depth_cut) = known(&points, over_depth);
         let banded = |title: &str, x: &str, lines: Vec<Vec<[f64; 2]>>| Plot {
             bands: lines.iter().flat_map(|line| band(line, uncertainty)).collect(),
-            ..Plot::new(title, Axis::linear(x), Axis::linear(FORCE))
-                .with(lines.into_iter().map(|line| Series::line("force", Ink::Series, WIDTH, line)))
+            ..Plot::new(title, PlotAxis::linear(x), PlotAxis::linear(FORCE)).with(
+                lines.into_iter().map(|line| PlotSeries::line("force", Ink::Series, WIDTH, line)),
+            )
         };
         let newest = over_depth.last().and_then(|line| line.last()).copied();
         let mut force_depth = banded("Force over depth", DEPTH, over_depth);
@@ -72,7 +73,7 @@ impl RunPlots {
             force_depth.bands.clear();
             (force_depth.series, cycles) = loops(&points, starts);
         }
-        let now = newest.map(|at| Series::dots("", Ink::Text, 4.0, vec![at]));
+        let now = newest.map(|at| PlotSeries::dots("", Ink::Text, 4.0, vec![at]));
         force_depth.series.extend(now);
         let of_each = trace.samples_per_bucket();
         let remark = match () {
@@ -107,7 +108,7 @@ fn known(
 }
 
 /// The newest loops with their peaks, and every cycle.
-fn loops(points: &[TracePoint], starts: &[(f64, u32)]) -> (Vec<Series>, Vec<Cycle>) {
+fn loops(points: &[TracePoint], starts: &[(f64, u32)]) -> (Vec<PlotSeries>, Vec<LiveCycle>) {
     let place = |t: f64| points.partition_point(|point| point.t < t);
     let (mut series, mut cycles) = (Vec::new(), Vec::new());
     for (i, (start, cycle)) in starts.iter().enumerate() {
@@ -115,7 +116,7 @@ fn loops(points: &[TracePoint], starts: &[(f64, u32)]) -> (Vec<Series>, Vec<Cycl
         let own = &points[place(*start).min(end)..end];
         let forces = own.iter().filter(|point| point.force.is_finite());
         let peak = forces.copied().max_by(|a, b| a.force.total_cmp(&b.force));
-        cycles.push(Cycle { cycle: *cycle, peak });
+        cycles.push(LiveCycle { cycle: *cycle, peak });
         let age = starts.len() - 1 - i;
         if age >= LOOPS_MAX {
             continue;
@@ -125,9 +126,9 @@ fn loops(points: &[TracePoint], starts: &[(f64, u32)]) -> (Vec<Series>, Vec<Cycl
             _ => (Ink::Text, faded(age)),
         };
         let lines = known(own, over_depth).0;
-        let lines = lines.into_iter().map(|line| Series::line("force", ink, WIDTH, line));
-        let peak = peak.map(|peak| Series::dots("peak", ink, 2.5, vec![over_depth(&peak)]));
-        series.extend(lines.chain(peak).map(|one| Series { opacity, ..one }));
+        let lines = lines.into_iter().map(|line| PlotSeries::line("force", ink, WIDTH, line));
+        let peak = peak.map(|peak| PlotSeries::dots("peak", ink, 2.5, vec![over_depth(&peak)]));
+        series.extend(lines.chain(peak).map(|one| PlotSeries { opacity, ..one }));
     }
     (series, cycles)
 }
@@ -145,52 +146,48 @@ pub fn set_course(plot: &mut Plot, run: Option<&RunView>, force_max: Newtons, is
     let from = ramp.filter(|_| is_from_ramp).map(|(start, _)| *start);
     plot.stretches = phase_stretches(phases, now);
     plot.x.range = from.map(|start| [start - LEAD_S, now.max(start + 1.0)]);
-    plot.x.seen = vec![0.0, now];
+    plot.x.visible_values = vec![0.0, now];
     // Room above the limit for the names of the phases.
-    plot.y.seen = vec![-0.5, 1.12 * force_max.0];
+    plot.y.visible_values = vec![-0.5, 1.12 * force_max.0];
     plot.levels = vec![interlock(force_max)];
 }
 
 /// Force over position while the surface is searched.
 #[must_use]
-pub fn approach(trace: &LiveTrace) -> Plot {
+pub fn approach_plot(trace: &LiveTrace) -> Plot {
     let points: Vec<[f64; 2]> = known(&trace.points(), over_depth).0.concat();
-    let position = Axis::linear("position from home (mm)");
+    let position = PlotAxis::linear("position from home (mm)");
     Plot::new(
         "Force over position while the surface is searched",
         position,
-        Axis::linear(FORCE).seeing(&[0.1]),
+        PlotAxis::linear(FORCE).with_visible_values(&[0.1]),
     )
-    .with([Series::line("force", Ink::Series, WIDTH, points)])
+    .with([PlotSeries::line("force", Ink::Series, WIDTH, points)])
 }
 
 /// Positions and forces of the contact passes and the contact point, drawn over the search; its x axis has the range to show.
 #[must_use]
-pub fn touches(run: &RunView, search: &Plot) -> Plot {
+pub fn contact_search_plot(run: &RunView, search: &Plot) -> Plot {
     let passes: Vec<[f64; 2]> =
-        run.touches.iter().map(|touch| [touch.position.0, touch.force.0]).collect();
-    let contact = run.contact.map(|contact| Level::plain(contact.position.0, Ink::Limit));
+        run.contact_triggers.iter().map(|touch| [touch.position.0, touch.force.0]).collect();
+    let contact = run.contact.map(|contact| PlotLevel::plain(contact.position.0, Ink::Limit));
     let from = passes.iter().map(|touch| touch[0]).reduce(f64::min);
     let points = search.series.iter().flat_map(|one| &one.points);
     let end = points.map(|point| point[0]).fold(f64::NEG_INFINITY, f64::max);
     let range = from.map(|from| [from - LEAD_MM, end.max(from) + 0.5]);
     Plot {
-        moments: contact.into_iter().collect(),
-        ..Plot::new("", Axis { range, ..Axis::default() }, Axis::default()).with([Series::dots(
-            "contact pass",
-            Ink::Limit,
-            5.0,
-            passes,
-        )])
+        x_levels: contact.into_iter().collect(),
+        ..Plot::new("", PlotAxis { range, ..PlotAxis::default() }, PlotAxis::default())
+            .with([PlotSeries::dots("contact pass", Ink::Limit, 5.0, passes)])
     }
 }
 
 /// Force by the calibration in use minus the weight, in N, over each weight that was read.
 #[must_use]
-pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
-    let heaviest = run.to_weigh.iter().map(|one| one.mass_g).fold(0.0, f64::max);
+pub fn weighing_plot(run: &RunView, curve: &CalibrationCurve) -> Plot {
+    let heaviest = run.planned_weights.iter().map(|one| one.mass_g).fold(0.0, f64::max);
     let deviations = |wanted: Direction| -> Vec<[f64; 2]> {
-        let own = run.weighed.iter().filter(|one| one.direction == wanted);
+        let own = run.weight_readings.iter().filter(|one| one.direction == wanted);
         own.map(|one| {
             let weight = newtons_of(one.mass_g()).0;
             [weight, curve.newtons_from_volts(one.volts()).0 - weight]
@@ -198,24 +195,26 @@ pub fn weighing(run: &RunView, curve: &Curve) -> Plot {
         .collect()
     };
     Plot {
-        levels: vec![Level::plain(0.0, Ink::Line)],
+        levels: vec![PlotLevel::plain(0.0, Ink::Line)],
         ..Plot::new(
             "",
-            Axis::linear("weight (N)").seeing(&[0.0, newtons_of(heaviest).0]),
-            Axis::linear("deviation (N)"),
+            PlotAxis::linear("weight (N)").with_visible_values(&[0.0, newtons_of(heaviest).0]),
+            PlotAxis::linear("deviation (N)"),
         )
         .with([
-            Series::dots("loading", Ink::Series, 3.6, deviations(Direction::Loading)),
+            PlotSeries::dots("loading", Ink::Series, 3.6, deviations(Direction::Loading)),
             // Hollow, so that colour is not needed to distinguish the two.
-            Series::rings("unloading", Ink::Limit, 4.6, deviations(Direction::Unloading)),
+            PlotSeries::rings("unloading", Ink::Limit, 4.6, deviations(Direction::Unloading)),
         ])
     }
 }
 
 /// Deviation of one reading of each daily check in N over days, between its limits.
 #[must_use]
-pub fn deviations(title: &str, known: &[(f64, Deviation)]) -> Plot {
-    let line = |of: fn(&Deviation) -> f64| known.iter().map(|(at, one)| [*at, of(one)]).collect();
+pub fn deviation_plot(title: &str, known: &[(f64, DailyCheckDeviation)]) -> Plot {
+    let line = |of: fn(&DailyCheckDeviation) -> f64| {
+        known.iter().map(|(at, one)| [*at, of(one)]).collect()
+    };
     let dots = |is_within: bool| {
         let own = known.iter().filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
         own.map(|(at, one)| [*at, one.newtons]).collect()
@@ -225,14 +224,18 @@ pub fn deviations(title: &str, known: &[(f64, Deviation)]) -> Plot {
         [(at, _)] => vec![at - 1.0, at + 1.0],
         _ => Vec::new(),
     };
-    Plot::new(title, Axis::default().seeing(&seen), Axis::linear("deviation (N)").seeing(&[0.0]))
-        .with([
-            Series::dashed("limit", Ink::Limit, 1.5, line(|one| one.limit)),
-            Series::dashed("limit", Ink::Limit, 1.5, line(|one| -one.limit)),
-            Series::line("deviation", Ink::Line, 1.0, line(|one| one.newtons)),
-            Series::dots("within the limit", Ink::Series, 4.0, dots(true)),
-            Series::rings("beyond the limit", Ink::Alarm, 4.0, dots(false)),
-        ])
+    Plot::new(
+        title,
+        PlotAxis::default().with_visible_values(&seen),
+        PlotAxis::linear("deviation (N)").with_visible_values(&[0.0]),
+    )
+    .with([
+        PlotSeries::dashed("limit", Ink::Limit, 1.5, line(|one| one.limit)),
+        PlotSeries::dashed("limit", Ink::Limit, 1.5, line(|one| -one.limit)),
+        PlotSeries::line("deviation", Ink::Line, 1.0, line(|one| one.newtons)),
+        PlotSeries::dots("within the limit", Ink::Series, 4.0, dots(true)),
+        PlotSeries::rings("beyond the limit", Ink::Alarm, 4.0, dots(false)),
+    ])
 }
 
 #[cfg(test)]

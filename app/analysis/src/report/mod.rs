@@ -12,19 +12,19 @@ pub mod figures;
 pub mod fit_json;
 #[cfg(feature = "haptics")]
 pub mod haptics;
-pub mod kept;
 pub mod live;
 pub mod picture;
 pub mod plan_picture;
 pub mod plan_plot;
 pub mod programme;
-pub mod said;
 pub mod scatter;
 #[cfg(feature = "haptics")]
 pub mod scene;
 pub mod selection;
 pub mod selection_plot;
 pub mod session;
+pub mod session_text;
+pub mod stored_analysis;
 pub mod text;
 
 pub use selection_plot::of_selection;

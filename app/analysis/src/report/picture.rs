@@ -1,10 +1,12 @@
 //! A fit as one picture: measured and fitted force over time, what is left over beneath, the
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
-use super::fit_json::Overlay;
+use super::fit_json::FitOverlay;
 use super::text::{ParameterText, energy, equation, limit, quality};
-use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink as TextInk, Look, Svg};
-use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Level, Plot, Series};
+use palpate_figures::drawing::{Anchor, AxisColours, Drawing, FONT, Svg, TextStyle as TextInk};
+use palpate_figures::figure::{
+    self, AxisNames, Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries,
+};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
@@ -30,7 +32,10 @@ const SIGMAS: f64 = 2.0;
 const BAND_NAME: &str = "calibration, ± 2u";
 
 /// The band around points whose ordinates are forces in N; `None` where no uncertainty is stated.
-pub(super) fn band(forces: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) -> Option<Band> {
+pub(super) fn band(
+    forces: &[[f64; 2]],
+    uncertainty: Option<&ForceUncertainty>,
+) -> Option<PlotBand> {
     let edge = |sigmas: f64| {
         let at = |&[x, force]: &[f64; 2]| {
             let sigma = uncertainty?.sigma(Newtons(force))?;
@@ -40,7 +45,7 @@ pub(super) fn band(forces: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) 
     };
     let edges = [edge(-SIGMAS), edge(SIGMAS)];
     let is_stated = !edges[0].is_empty();
-    is_stated.then(|| Band { name: BAND_NAME.to_owned(), ink: Ink::Series, edges })
+    is_stated.then(|| PlotBand { name: BAND_NAME.to_owned(), ink: Ink::Series, edges })
 }
 
 /// The picture of a fit that was made: force over time, what is left over, force over depth, parameters and sentences.
@@ -49,7 +54,7 @@ pub(super) fn band(forces: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) 
 #[must_use]
 pub fn of_report(
     source: &str,
-    (samples, overlay): (&[FitSample], &Overlay),
+    (samples, overlay): (&[FitSample], &FitOverlay),
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
@@ -60,7 +65,7 @@ pub fn of_report(
     let measured = thin(known().map(|(one, _)| [one.depth.0, one.force.0]), COLUMNS);
     let fitted = thin(known().map(|(one, fit)| [one.depth.0, fit.0]), COLUMNS);
     let deepest = known().fold(0.0f64, |deepest, (one, _)| deepest.max(one.depth.0));
-    let depth = Axis::linear("depth (mm)").over([0.0, deepest]);
+    let depth = PlotAxis::linear("depth (mm)").with_range([0.0, deepest]);
     let over_depth = force_plot(depth, [measured, fitted], uncertainty);
     over_depth.draw(&mut svg, [LEFT, 576.0, RIGHT, 790.0], AxisNames::Both);
     let mut y = 860.0;
@@ -131,29 +136,29 @@ fn plots_over_time(
     let measured = thin(known().map(|(one, _)| [one.t.0 + shift, one.force.0]), columns);
     let fitted = thin(pairs().map(|(one, fit)| [one.t.0 + shift, fit.0]), columns);
     let residuals = known().map(|(one, fit)| [one.t.0 + shift, (one.force.0 - fit.0) * 1e3]);
-    let residual = Series::line("residual", Ink::Series, 1.0, thin(residuals, columns));
-    let time = || Axis::linear("time (s)");
+    let residual = PlotSeries::line("residual", Ink::Series, 1.0, thin(residuals, columns));
+    let time = || PlotAxis::linear("time (s)");
     [
         force_plot(time(), [measured, fitted], uncertainty),
         Plot {
-            levels: vec![Level::plain(0.0, Ink::Quiet)],
-            ..Plot::new("", time(), Axis::linear("residual (mN)")).with([residual])
+            levels: vec![PlotLevel::plain(0.0, Ink::Quiet)],
+            ..Plot::new("", time(), PlotAxis::linear("residual (mN)")).with([residual])
         },
     ]
 }
 
 /// Measured and fitted force over something, the band of the force's calibration around the fitted.
 pub(super) fn force_plot(
-    x: Axis,
+    x: PlotAxis,
     [measured, fitted]: [Vec<[f64; 2]>; 2],
     uncertainty: Option<&ForceUncertainty>,
 ) -> Plot {
     Plot {
         bands: band(&fitted, uncertainty).into_iter().collect(),
-        ..Plot::new("", x, Axis::linear("force (N)")).with([
+        ..Plot::new("", x, PlotAxis::linear("force (N)")).with([
             // Wide under narrow, so that both are seen where they agree.
-            Series::line("measured", Ink::Series, 2.6, measured),
-            Series::line("fitted", Ink::Limit, 1.4, fitted),
+            PlotSeries::line("measured", Ink::Series, 2.6, measured),
+            PlotSeries::line("fitted", Ink::Limit, 1.4, fitted),
         ])
     }
 }
@@ -164,9 +169,12 @@ pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let depth = thin(samples.iter().map(|one| [one.t.0 - start, one.depth.0]), COLUMNS);
     let mut svg = titled(source, "not fitted");
-    let plot =
-        Plot::new("", Axis::linear("time (s)").over(span(samples)), Axis::linear("depth (mm)"));
-    plot.with([Series::line("", Ink::Series, 1.6, depth)]).draw(
+    let plot = Plot::new(
+        "",
+        PlotAxis::linear("time (s)").with_range(span(samples)),
+        PlotAxis::linear("depth (mm)"),
+    );
+    plot.with([PlotSeries::line("", Ink::Series, 1.6, depth)]).draw(
         &mut svg,
         [LEFT, 66.0, RIGHT, 360.0],
         AxisNames::Both,
@@ -183,8 +191,8 @@ fn span(samples: &[FitSample]) -> [f64; 2] {
     [0.0, if last > 0.0 { last } else { 1.0 }]
 }
 
-pub(super) fn look() -> Look {
-    Look { text: LIGHT.text_quiet, grid: LIGHT.line }
+pub(super) fn look() -> AxisColours {
+    AxisColours { text: LIGHT.text_quiet, grid: LIGHT.line }
 }
 
 /// An empty picture with a title and a line beneath it.
@@ -271,7 +279,7 @@ mod tests {
         let samples = record(|i, force| force + 0.05 * (i as f64 * 0.01).sin());
         let report = fit(&samples, &FitOptions::default()).unwrap();
         assert!(report.sentences().count() > 0);
-        let overlay = Overlay::of(&report, &samples);
+        let overlay = FitOverlay::of(&report, &samples);
         let picture = of_report("S & T <1>", (&samples, &overlay), &report, None);
         assert!(picture.contains("S &amp; T &lt;1&gt;"));
         for parameter in &report.parameters {

@@ -2,8 +2,8 @@
 //! plan that presses on nothing, what it does when.
 
 use super::picture::{LEFT, LINE, RIGHT, look, titled};
-use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel};
-use palpate_figures::figure::{Axis, AxisNames, Band, Ink, Level, Plot, Series};
+use palpate_figures::drawing::{Anchor, AxisColours, PlotPanel, TextStyle as TextInk};
+use palpate_figures::figure::{AxisNames, Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::units::{MmPerS, Newtons};
 use palpate_protocols::preview::{OutlinePoint, StepPreview};
@@ -39,10 +39,10 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
         levels: limit.map(level).into_iter().collect(),
         ..Plot::new(
             title,
-            Axis::linear(axis).over([0.0, end / unit]),
-            Axis::linear(y).seeing(&[0.0]),
+            PlotAxis::linear(axis).with_range([0.0, end / unit]),
+            PlotAxis::linear(y).with_visible_values(&[0.0]),
         )
-        .with([Series::line("", ink, 1.6, points)])
+        .with([PlotSeries::line("", ink, 1.6, points)])
     };
     let depth = series(&|point| point.depth.0);
     let force = series(&|point| point.force.0);
@@ -50,21 +50,21 @@ pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 
         plot("Depth as planned", "depth (mm)", Ink::Series, depth, None),
         plot("Speed as planned", "speed (mm/s)", Ink::Series, speed, fastest),
         Plot {
-            bands: vec![Band { name: String::new(), ink: Ink::Limit, edges }],
+            bands: vec![PlotBand { name: String::new(), ink: Ink::Limit, edges }],
             ..plot("Force as expected", "force (N)", Ink::Limit, force, strongest)
         },
     ]
 }
 
-fn level(at: f64) -> Level {
-    Level { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
+fn level(at: f64) -> PlotLevel {
+    PlotLevel { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
-pub const EXPECTED: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
+pub const PLAN_CAPTION: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
 
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
-    let mut svg = titled(name, EXPECTED);
+    let mut svg = titled(name, PLAN_CAPTION);
     let [depth, speed, force] = course(outline, None);
     let place = |top: f64| [LEFT, top, RIGHT, top + 194.0];
     depth.draw(&mut svg, place(66.0), AxisNames::Upright);
@@ -102,10 +102,11 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     }
     let mut svg =
         titled(name, "expected: moves and waits are known, searches and people take their time");
-    let (top, look): (f64, Look) = (66.0, look());
+    let (top, look): (f64, AxisColours) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;
     // The rows are drawn here; the panel has the time.
-    let panel = Panel::around([BARS_LEFT, top, RIGHT, bottom], [0.0, end.max(1e-3) / unit], &[]);
+    let panel =
+        PlotPanel::around([BARS_LEFT, top, RIGHT, bottom], [0.0, end.max(1e-3) / unit], &[]);
     panel.time_axis(&mut svg, axis, look);
     for (row, phase) in phases.iter().enumerate() {
         let above = top + ROW * row as f64;

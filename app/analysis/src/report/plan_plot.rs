@@ -1,11 +1,11 @@
 //! The plan as a picture: intervals against hold, cycles and sampling rate, three plots side by side.
 
 use crate::plan::PlanReport;
-use palpate_figures::drawing::{Ink as TextInk, Svg};
-use palpate_figures::figure::{Axis, AxisNames, Ink, Labels, Level, Plot, Series};
+use palpate_figures::drawing::{Svg, TextStyle as TextInk};
+use palpate_figures::figure::{AxisNames, Ink, Plot, PlotAxis, PlotLevel, PlotSeries, PointLabels};
 use palpate_figures::tokens::LIGHT;
 use palpate_figures::uncertain::{shortest as plain, significant as digits};
-use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES};
+use palpate_rheology::expected::{PARAMETER_NAMES, PrecisionCurve, ProtocolFamily};
 
 /// Pixels of a plot, of the picture and of the space around plots.
 const PLOT: [f64; 2] = [300.0, 300.0];
@@ -57,7 +57,7 @@ pub fn plots(report: &PlanReport) -> [Plot; 3] {
     let proposed = report.proposals.iter().find_map(|offer| {
         let percent = offer.proposal.expected.parameters[k].percent?;
         match offer.proposal.family {
-            Family::RampHold { hold, .. } => Some([hold.0, percent]),
+            ProtocolFamily::RampHold { hold, .. } => Some([hold.0, percent]),
             _ => None,
         }
     });
@@ -88,29 +88,30 @@ pub fn plots(report: &PlanReport) -> [Plot; 3] {
     let highest = percents(target.percent, f64::max);
     for plot in &mut plots {
         plot.y.range = Some([0.8 * lowest, 1.25 * highest]);
-        let level = Level::plain(target.percent, Ink::Limit);
-        plot.levels.push(Level { is_dashed: true, ..level });
+        let level = PlotLevel::plain(target.percent, Ink::Limit);
+        plot.levels.push(PlotLevel { is_dashed: true, ..level });
     }
     plots
 }
 
 /// A curve for each speed, the fastest strongest, and the proposal of this kind.
-fn plot(title: &str, x: &str, curves: &[Curve], k: usize, mark: Option<[f64; 2]>) -> Plot {
+fn plot(title: &str, x: &str, curves: &[PrecisionCurve], k: usize, mark: Option<[f64; 2]>) -> Plot {
     let lines = curves.iter().enumerate().map(|(index, curve)| {
         let name = format!("{} mm/s", plain(curve.speed.0));
-        Series {
+        PlotSeries {
             opacity: 1.0 - 0.2 * index as f64,
-            ..Series::line(&name, Ink::Series, 2.5, points(curve, k)).labelled(Labels::AtEnd)
+            ..PlotSeries::line(&name, Ink::Series, 2.5, points(curve, k))
+                .labelled(PointLabels::AtEnd)
         }
     });
-    let mark = mark.map(|at| Series::dots("proposed", Ink::Limit, 6.0, vec![at]));
-    let y = Axis::logarithmic("95 % interval (%)");
-    let plot = Plot::new(title, Axis::logarithmic(x), y).with(lines.chain(mark));
+    let mark = mark.map(|at| PlotSeries::dots("proposed", Ink::Limit, 6.0, vec![at]));
+    let y = PlotAxis::logarithmic("95 % interval (%)");
+    let plot = Plot::new(title, PlotAxis::logarithmic(x), y).with(lines.chain(mark));
     let is_known = plot.series.iter().any(|one| !one.points.is_empty());
     Plot { remark: (!is_known).then(|| "not identifiable".to_owned()), ..plot }
 }
 
-fn points(curve: &Curve, k: usize) -> Vec<[f64; 2]> {
+fn points(curve: &PrecisionCurve, k: usize) -> Vec<[f64; 2]> {
     let pairs = curve.x.iter().zip(&curve.percent);
     pairs
         .filter_map(|(&x, percent)| Some([x, percent[k]?]))

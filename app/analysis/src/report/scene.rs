@@ -1,12 +1,12 @@
 //! Texts on the run, the plan and the curves of a scene.
 
 use super::haptics::run_text;
-use crate::scene::Played;
-use crate::scene_bench::Bench;
+use crate::scene::SceneRun;
+use crate::scene_bench::SceneBench;
 use palpate_haptics::surface::ScenePlan;
 
 #[must_use]
-pub fn played_text(played: &Played) -> String {
+pub fn played_text(played: &SceneRun) -> String {
     let mut lines = vec![format!(
         "scene '{}', {} x {} nodes, path {}: {} ticks, as deep as {:.2} mm, up to {:.2} N",
         played.name,
@@ -21,7 +21,7 @@ pub fn played_text(played: &Played) -> String {
         lines.push(format!("{:>4.0} %  {why}", 100.0 * share));
     }
     lines.push(run_text(&played.paced));
-    let work = 1e6 * played.paced.kept.work.p99_9.0;
+    let work = 1e6 * played.paced.statistics.work.p99_9.0;
     lines.push(if played.is_within_budget {
         format!(
             "999 ticks in a thousand take {work:.0} us or less, within the budget of {} us",
@@ -44,7 +44,7 @@ pub fn plan_text(plan: &ScenePlan) -> String {
         "plan: {0} x {0} nodes, {1}, cut {2}: shape within {3:.3} mm, force within {4:.4} N, {5:.1} us a tick",
         plan.mesh.nodes,
         plan.step.scheme.name(),
-        if plan.cut.threshold_mm > 0.0 { plan.cut.words() } else { "nowhere".to_owned() },
+        if plan.cut.threshold_mm > 0.0 { plan.cut.description() } else { "nowhere".to_owned() },
         plan.shape_error_mm,
         plan.force_error_n,
         plan.cost_us
@@ -63,7 +63,7 @@ pub fn plan_text(plan: &ScenePlan) -> String {
 
 /// Measured curves in words; a star marks what nothing beats in both error and time.
 #[must_use]
-pub fn bench_text(bench: &Bench) -> String {
+pub fn bench_text(bench: &SceneBench) -> String {
     let star = |is_on: &bool| if *is_on { "*" } else { " " };
     let machine = &bench.machine;
     let mut lines =
@@ -83,7 +83,7 @@ pub fn bench_text(bench: &Bench) -> String {
     for cut in &bench.curves.cuts {
         let words = match (cut.range, cut.threshold_mm > 0.0) {
             (None, false) => "none".to_owned(),
-            _ => cut.words(),
+            _ => cut.description(),
         };
         lines.push(format!(
             "  {words:<28}  {:>8.4} mm  {:>5.0} %",
@@ -110,6 +110,6 @@ pub fn bench_text(bench: &Bench) -> String {
         ));
     }
     lines.extend(bench.plan.as_ref().map(plan_text));
-    lines.extend(bench.no_plan.as_ref().map(|none| none.why.clone()));
+    lines.extend(bench.no_plan.as_ref().map(|none| none.reason.clone()));
     lines.join("\n")
 }

@@ -1,11 +1,11 @@
 //! A selection in words: the table, the ladder and the verdict.
 
 use super::text::{head, in_columns};
-use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
+use palpate_rheology::select::{HeldOutKind, ModelCandidate, ModelSelection, SelectionOutcome};
 
 /// The whole selection, the verdict last.
 #[must_use]
-pub fn whole(selection: &Selection) -> String {
+pub fn selection_text(selection: &ModelSelection) -> String {
     let mut parts = vec![records(selection), in_columns(&table(selection))];
     let refused = selection.refused.iter();
     let refused: Vec<String> =
@@ -13,7 +13,7 @@ pub fn whole(selection: &Selection) -> String {
     if !refused.is_empty() {
         parts.push(refused.join("\n"));
     }
-    let unpredicted = |one: &Candidate| {
+    let unpredicted = |one: &ModelCandidate| {
         let reason = one.prediction_refused.as_ref()?;
         Some(format!("{} predicts nothing: {reason}", one.family))
     };
@@ -32,7 +32,7 @@ pub fn whole(selection: &Selection) -> String {
 
 /// The records, one line each.
 #[must_use]
-pub fn records(selection: &Selection) -> String {
+pub fn records(selection: &ModelSelection) -> String {
     let lines = selection.records.iter().map(|one| {
         format!(
             "{}: {:.4} mm deep at {:.3} mm/s, peak {:.3} N, {} samples",
@@ -44,7 +44,7 @@ pub fn records(selection: &Selection) -> String {
 
 /// Rows of the comparison, the head first.
 #[must_use]
-pub fn table(selection: &Selection) -> Vec<Vec<String>> {
+pub fn table(selection: &ModelSelection) -> Vec<Vec<String>> {
     let mut names = head(
         "family | free | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | states | ops",
     );
@@ -52,7 +52,7 @@ pub fn table(selection: &Selection) -> Vec<Vec<String>> {
     std::iter::once(names).chain(selection.candidates.iter().map(row)).collect()
 }
 
-fn row(one: &Candidate) -> Vec<String> {
+fn row(one: &ModelCandidate) -> Vec<String> {
     let milli = |newtons: f64| digits(1e3 * newtons);
     let none = || "-".to_owned();
     let prediction = one.prediction.as_ref();
@@ -77,7 +77,7 @@ fn row(one: &Candidate) -> Vec<String> {
 
 /// Rows of the ladder, the head first.
 #[must_use]
-pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
+pub fn ladder(selection: &ModelSelection) -> Vec<Vec<String>> {
     let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | ops")];
     let change =
         |[before, after]: [f64; 2]| format!("{} > {}", digits(1e3 * before), digits(1e3 * after));
@@ -96,16 +96,16 @@ pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
 
 /// Held-out records, and the sample counts of the criteria.
 #[must_use]
-pub fn tested(selection: &Selection) -> String {
+pub fn tested(selection: &ModelSelection) -> String {
     let known = selection.candidates.iter().find_map(|one| one.prediction.as_ref());
     let what = known.map_or_else(
         || "Nothing was held out: errors are those of the fit itself.".to_owned(),
         |prediction| {
-            let has = |unseen: Unseen| prediction.records.iter().any(|one| one.unseen == unseen);
-            if has(Unseen::Rest) {
+            let has = |unseen: HeldOutKind| prediction.records.iter().any(|one| one.unseen == unseen);
+            if has(HeldOutKind::Rest) {
                 return "One record: the body of its ramp and a third of what follows predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
             }
-            let kinds = [Unseen::Speed, Unseen::Depth, Unseen::SpeedAndDepth, Unseen::Specimen];
+            let kinds = [HeldOutKind::Speed, HeldOutKind::Depth, HeldOutKind::SpeedAndDepth, HeldOutKind::Specimen];
             let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {
                 let count = prediction.records.iter().filter(|one| one.unseen == kind).count();
                 format!("{} in {count}", kind.name())
@@ -138,8 +138,8 @@ pub(super) fn digits(value: f64) -> String {
     }
 }
 
-pub(super) fn is_chosen(selection: &Selection, family: &str) -> bool {
-    selection.verdict.outcome != Outcome::NoneWithin
+pub(super) fn is_chosen(selection: &ModelSelection, family: &str) -> bool {
+    selection.verdict.outcome != SelectionOutcome::NoneWithin
         && selection.verdict.family.as_deref() == Some(family)
 }
 

@@ -1,12 +1,12 @@
 //! A selection as a figure: error over cost, both by their logarithm, the tolerance and the front.
 
 use super::picture::wrap;
-use super::scatter::{Mark, Scatter};
+use super::scatter::{ScatterPlot, ScatterPoint};
 use super::selection::is_chosen;
-use palpate_figures::drawing::{Ink, Svg};
+use palpate_figures::drawing::{Svg, TextStyle};
 use palpate_figures::figure::{AxisNames, Plot};
 use palpate_figures::tokens::LIGHT;
-use palpate_rheology::select::{Candidate, Selection};
+use palpate_rheology::select::{ModelCandidate, ModelSelection};
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 560.0;
@@ -17,16 +17,16 @@ const LETTERS: usize = 118;
 
 /// Every family over its cost.
 #[must_use]
-pub fn plot(selection: &Selection) -> Plot {
-    let error = |one: &Candidate| match selection.is_predicted {
+pub fn plot(selection: &ModelSelection) -> Plot {
+    let error = |one: &ModelCandidate| match selection.is_predicted {
         true => one.prediction.as_ref().map(|known| known.rms_n),
         false => Some(one.rms_n),
     };
-    let drawn: Vec<(&Candidate, f64)> =
+    let drawn: Vec<(&ModelCandidate, f64)> =
         selection.candidates.iter().filter_map(|one| Some((one, 1e3 * error(one)?))).collect();
-    let marks: Vec<Mark> = drawn
+    let marks: Vec<ScatterPoint> = drawn
         .iter()
-        .map(|(one, error)| Mark {
+        .map(|(one, error)| ScatterPoint {
             at: [one.cost.operations as f64, *error],
             label: [
                 one.family.clone(),
@@ -38,7 +38,7 @@ pub fn plot(selection: &Selection) -> Plot {
         true => "error of prediction, rms (mN)",
         false => "error of the fit, rms (mN)",
     };
-    let scatter = Scatter {
+    let scatter = ScatterPlot {
         axes: ["operations an evaluation", name],
         marks: &marks,
         has_front: true,
@@ -54,12 +54,12 @@ pub fn plot(selection: &Selection) -> Plot {
 
 /// The same as SVG, under the verdict.
 #[must_use]
-pub fn of_selection(selection: &Selection) -> String {
+pub fn of_selection(selection: &ModelSelection) -> String {
     let mut svg = Svg::new(WIDTH);
     let title = selection.verdict.sentences.first().map_or("", String::as_str);
     for (index, line) in wrap(title, LETTERS).iter().take(2).enumerate() {
         let at = [20.0, 24.0 + 18.0 * index as f64];
-        svg.text(at, Ink::plain(LIGHT.text), line);
+        svg.text(at, TextStyle::plain(LIGHT.text), line);
     }
     plot(selection).draw(&mut svg, PLACE, AxisNames::Both);
     svg.finish(HEIGHT, LIGHT.canvas, "Error of model families over their cost")

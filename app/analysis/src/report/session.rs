@@ -1,8 +1,8 @@
 //! A run as text: its ending, data quality, samples, time use and targets.
 
 use super::text::table;
-use palpate_runner::fidelity::{Achieved, Fidelity};
-use palpate_sessions::{EndRecord, Verdict};
+use palpate_runner::fidelity::{Fidelity, TargetResult};
+use palpate_sessions::{DataQuality, EndRecord};
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
@@ -11,7 +11,7 @@ const GAP_USUAL_S: f64 = 1.1e-3;
 pub fn fidelity_text(
     found: &Fidelity,
     end: Option<&EndRecord>,
-    verdict: Option<(Verdict, &str)>,
+    verdict: Option<(DataQuality, &str)>,
 ) -> String {
     let mut lines = vec![match end {
         Some(end) => format!("ending     {}: {}", end.outcome, end.reason),
@@ -40,7 +40,7 @@ pub fn fidelity_text(
         parts.map(|(name, secs)| format!("{name} {secs:.1} s ({:.0} %)", 100.0 * secs / whole));
     lines.push(format!("time       {}", parts.join(", ")));
     lines.extend(found.remarks.iter().map(|remark| format!("remark     {remark}")));
-    let missed = found.missed().count();
+    let missed = found.missed_targets().count();
     lines.push(match (found.targets.len(), missed) {
         (0, _) => "targets    none: no step with a target was completed".into(),
         (count, 0) => format!("targets    {count}, all met"),
@@ -53,7 +53,7 @@ pub fn fidelity_text(
 }
 
 /// Cycle, quantity, target, achieved value and error of a target.
-pub(super) fn target_cells(one: &Achieved) -> [String; 5] {
+pub(super) fn target_cells(one: &TargetResult) -> [String; 5] {
     let cycle = if one.cycle == 0 { String::new() } else { one.cycle.to_string() };
     let error = one.error_percent.map_or_else(
         || format!("{:+.4} {}", one.achieved - one.target, one.unit),
@@ -70,7 +70,7 @@ pub(super) fn lateness(found: &Fidelity) -> String {
     }
 }
 
-fn targets(targets: &[Achieved]) -> String {
+fn targets(targets: &[TargetResult]) -> String {
     let rows = targets.iter().map(|one| {
         let mut row = vec![(one.step_index + 1).to_string(), one.step.into()];
         row.extend(target_cells(one));

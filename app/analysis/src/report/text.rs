@@ -1,11 +1,11 @@
 //! The strings of a fit. Window, command line and picture print these and no others, so that a
 //! number never reads differently in two places.
 
-use super::fit_json::{Beside, Overlay};
-use crate::fit::{Intervals, Together};
+use super::fit_json::{FitDetails, FitOverlay};
+use crate::fit::{FitIntervals, JointFit};
 use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_interval};
-use palpate_rheology::families::by_key;
-use palpate_rheology::fit::{FitReport, NamedReport, Parameter};
+use palpate_rheology::families::find_family;
+use palpate_rheology::fit::{FitReport, FittedParameter, NamedReport};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterText {
@@ -20,7 +20,7 @@ pub struct ParameterText {
 
 impl ParameterText {
     #[must_use]
-    pub fn of(parameter: &Parameter) -> Self {
+    pub fn of(parameter: &FittedParameter) -> Self {
         let value = match parameter.std_error {
             Some(error) => with_error(parameter.value, error),
             None if parameter.is_fixed => format!("{} fixed", plain(parameter.value)),
@@ -51,7 +51,7 @@ pub fn systematic(error: Option<f64>) -> String {
 /// A parameter in one cell of a table: `value [low, high]`, or the value and why it has no
 /// interval.
 #[must_use]
-pub fn cell(parameter: &Parameter) -> String {
+pub fn cell(parameter: &FittedParameter) -> String {
     match (parameter.std_error, parameter.ci95) {
         (Some(error), Some(ends)) => {
             let words = with_interval(parameter.value, error, ends);
@@ -75,7 +75,7 @@ pub fn quality(report: &FitReport) -> String {
 
 /// Work along the path and the largest residual.
 #[must_use]
-pub fn energy(overlay: &Overlay) -> String {
+pub fn energy(overlay: &FitOverlay) -> String {
     format!(
         "energy {:.3} N·mm measured, {:.3} fitted; largest residual {:.1} mN",
         overlay.work_measured_n_mm,
@@ -86,17 +86,17 @@ pub fn energy(overlay: &Overlay) -> String {
 
 /// What the family of a report is, as an equation; none of an unknown one.
 pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
-    Some(by_key(&report.body.family).ok()?.equation())
+    Some(find_family(&report.body.family).ok()?.equation())
 }
 
 pub(super) fn limit(report: &FitReport) -> Option<String> {
-    let family = by_key(&report.body.family).ok()?;
+    let family = find_family(&report.body.family).ok()?;
     Some(format!("it cannot represent {}", family.cannot_represent()))
 }
 
 /// A whole fit, of every family the same: model, equation, parameters, how good it is, every sentence, further intervals.
 #[must_use]
-pub fn whole(report: &FitReport, details: Beside<'_>) -> String {
+pub fn fit_text(report: &FitReport, details: FitDetails<'_>) -> String {
     let mut lines = vec![report.model.clone()];
     lines.extend(equation(report).map(|text| format!("  {text}")));
     lines.extend(parameter_lines(&report.parameters));
@@ -109,7 +109,7 @@ pub fn whole(report: &FitReport, details: Beside<'_>) -> String {
 
 /// A fit of several recordings: what is shared once, then every recording with what is its own.
 #[must_use]
-pub fn together(fitted: &Together, details: &[Beside<'_>]) -> String {
+pub fn joint_fit_text(fitted: &JointFit, details: &[FitDetails<'_>]) -> String {
     let (shared, records) = (&fitted.report.shared, &fitted.report.records);
     let part = |named: &NamedReport, is_shared: bool| {
         let mut chosen = named.report.parameters.clone();
@@ -138,7 +138,7 @@ pub fn together(fitted: &Together, details: &[Beside<'_>]) -> String {
 }
 
 /// Intervals that take more than one pass, in the digits of the report.
-fn interval_lines(found: &Intervals, report: &FitReport) -> Vec<String> {
+fn interval_lines(found: &FitIntervals, report: &FitReport) -> Vec<String> {
     let line = |name: &str, ends: [Option<f64>; 2]| {
         let known = report.parameter(name).and_then(|known| Some((known.value, known.std_error?)));
         let text = match (ends, known) {
@@ -163,7 +163,7 @@ fn interval_lines(found: &Intervals, report: &FitReport) -> Vec<String> {
 
 /// One line per parameter, in columns.
 #[must_use]
-pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
+pub fn parameter_lines(parameters: &[FittedParameter]) -> Vec<String> {
     let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
     let width = texts.iter().map(|text| text.value.chars().count()).max().unwrap_or(0);
     let line = |text: &ParameterText| {
@@ -219,8 +219,8 @@ pub fn in_columns(lines: &[Vec<String>]) -> String {
 mod tests {
     use super::*;
 
-    fn parameter(std_error: Option<f64>, is_fixed: bool) -> Parameter {
-        Parameter {
+    fn parameter(std_error: Option<f64>, is_fixed: bool) -> FittedParameter {
+        FittedParameter {
             name: "tau_sig".into(),
             value: 1.5,
             unit: "N*s/mm^2".into(),
@@ -273,9 +273,14 @@ mod tests {
             ..FitReport::default()
         };
         report.body.family = "maxwell".into();
-        let (overlay, intervals) = (Overlay::of(&FitReport::default(), &[]), Intervals::default());
-        let details =
-            Beside { overlay: &overlay, intervals: &intervals, systematic: None, compliance: None };
+        let (overlay, intervals) =
+            (FitOverlay::of(&FitReport::default(), &[]), FitIntervals::default());
+        let details = FitDetails {
+            overlay: &overlay,
+            intervals: &intervals,
+            systematic: None,
+            compliance: None,
+        };
         let lines = [
             "a model",
             "  F + tau F' = k tau x'",
@@ -287,7 +292,7 @@ mod tests {
             "- found",
             "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",
         ];
-        assert_eq!(whole(&report, details), lines.join("\n"));
+        assert_eq!(fit_text(&report, details), lines.join("\n"));
     }
 
     #[test]

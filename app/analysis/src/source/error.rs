@@ -1,6 +1,6 @@
 //! Reasons why a source cannot be fitted or analysed.
 
-use crate::compliance::CorrectionError;
+use crate::compliance::ComplianceCorrectionError;
 use palpate_sessions::{AnalysisError, EditError, ReadError};
 use palpate_tables::import::TableError;
 use thiserror::Error;
@@ -40,7 +40,7 @@ pub enum SourceError {
     )]
     Plan { detail: String },
     #[error(transparent)]
-    Correction(#[from] CorrectionError),
+    Correction(#[from] ComplianceCorrectionError),
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration { detail: String },
 }

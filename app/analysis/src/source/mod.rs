@@ -4,16 +4,16 @@ mod error;
 
 pub use error::SourceError;
 
-use palpate_model::calibration::{Calibration, Curve};
+use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 use palpate_rheology::fit::FitSample;
-use palpate_sessions::{Entry, EntryKind, Row, Session};
-use palpate_tables::import::{ColumnNames, Table, read_table};
+use palpate_sessions::{EntryKind, LogEntry, SampleRow, Session};
+use palpate_tables::import::{ColumnNames, MeasurementTable, read_table};
 use std::path::Path;
 
-use crate::analysed::{self, Opened};
-use crate::sources::is_session;
+use crate::analysed_session::{self, AnalysedSession};
+use crate::recordings::is_session;
 use palpate_protocols::engine::{Effect, Record};
 
 /// Samples for a fit, with remarks on them.
@@ -35,7 +35,7 @@ pub struct FitSource {
 
 /// Part of an indentation that is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stretch {
+pub enum RecordStretch {
     /// Ramp and hold: what the fit of the modified Kelvin body takes, which knows no unloading.
     #[default]
     RampHold,
@@ -44,20 +44,20 @@ pub enum Stretch {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wanted {
-    pub stretch: Stretch,
+pub struct SourceSelection {
+    pub stretch: RecordStretch,
     pub is_rejected_included: bool,
 }
 
-impl Stretch {
+impl RecordStretch {
     #[must_use]
     pub fn with_unload(is_wanted: bool) -> Self {
         if is_wanted { Self::WithUnload } else { Self::RampHold }
     }
 }
 
-impl From<Stretch> for Wanted {
-    fn from(stretch: Stretch) -> Self {
+impl From<RecordStretch> for SourceSelection {
+    fn from(stretch: RecordStretch) -> Self {
         Self { stretch, is_rejected_included: false }
     }
 }
@@ -95,7 +95,7 @@ fn turn(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
 
 /// Ramp and hold of a session folder, a session file or a table.
 pub fn read(path: &Path) -> Result<FitSource, SourceError> {
-    read_stretch(path, None, Stretch::RampHold)
+    read_stretch(path, None, RecordStretch::RampHold)
 }
 
 /// The chosen part of a session or a table; `columns` names the columns of a table that has no header. A table without
@@ -103,7 +103,7 @@ pub fn read(path: &Path) -> Result<FitSource, SourceError> {
 pub fn read_stretch(
     path: &Path,
     columns: Option<&ColumnNames>,
-    wanted: impl Into<Wanted>,
+    wanted: impl Into<SourceSelection>,
 ) -> Result<FitSource, SourceError> {
     read_analysed(path, columns, wanted, None)
 }
@@ -112,10 +112,10 @@ pub fn read_stretch(
 pub fn read_analysed(
     path: &Path,
     columns: Option<&ColumnNames>,
-    wanted: impl Into<Wanted>,
+    wanted: impl Into<SourceSelection>,
     analysis: Option<&str>,
 ) -> Result<FitSource, SourceError> {
-    let Wanted { stretch, is_rejected_included } = wanted.into();
+    let SourceSelection { stretch, is_rejected_included } = wanted.into();
     if !is_session(path) {
         if let Some(name) = analysis {
             return Err(SourceError::TableAnalysis { name: name.to_owned() });
@@ -124,7 +124,7 @@ pub fn read_analysed(
         let samples = samples_of_table(&table, stretch);
         return Ok(FitSource { samples, notes: table.notes, ..FitSource::default() });
     }
-    let Opened { edited, left_out_s, .. } = analysed::open(path, analysis)?;
+    let AnalysedSession { edited, left_out_s, .. } = analysed_session::open(path, analysis)?;
     if let (Some(reason), false) = (edited.rejection(), is_rejected_included) {
         return Err(SourceError::Rejected { reason: reason.to_owned() });
     }
@@ -135,7 +135,7 @@ pub fn read_analysed(
 /// first sample.
 pub fn of_session(
     session: Session,
-    stretch: Stretch,
+    stretch: RecordStretch,
     left_out_s: &[[f64; 2]],
 ) -> Result<FitSource, SourceError> {
     let specimen = session.manifest.specimen.trim();
@@ -146,7 +146,7 @@ pub fn of_session(
         leave_out(left_out_s, Seconds(0.0), &mut samples);
         return Ok(FitSource { samples, specimen, notes: session.notes, ..FitSource::default() });
     }
-    let mut samples = samples_of(&session, stretch)?;
+    let mut samples = fit_samples(&session, stretch)?;
     leave_out(left_out_s, since_first(&session, stretch), &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
@@ -162,8 +162,8 @@ pub fn of_session(
 }
 
 /// The samples of an imported session, its time from the first one.
-pub(super) fn table_of_imported(session: &Session) -> Table {
-    let mut table = Table::default();
+pub(super) fn table_of_imported(session: &Session) -> MeasurementTable {
+    let mut table = MeasurementTable::default();
     for row in &session.rows {
         let is_taken =
             matches!(row.phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
@@ -183,7 +183,7 @@ pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
 }
 
 /// The curve of that calibration.
-pub(super) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
+pub(super) fn curve_of(session: &Session) -> Result<CalibrationCurve, SourceError> {
     let curve = calibration_of(session)?.curve();
     curve.map_err(|err| SourceError::Calibration { detail: err.to_string() })
 }
@@ -192,7 +192,10 @@ pub(super) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
 /// one at an end of the converter's range, every one after an interlock, and every one after the probe
 /// has left the tissue on the way back.
-pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
+pub fn fit_samples(
+    session: &Session,
+    stretch: RecordStretch,
+) -> Result<Vec<FitSample>, SourceError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
@@ -221,14 +224,14 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
     if samples.is_empty() { Err(SourceError::Empty) } else { Ok(samples) }
 }
 
-fn is_fitted(row: &Row, stretch: Stretch) -> bool {
+fn is_fitted(row: &SampleRow, stretch: RecordStretch) -> bool {
     let is_wanted = matches!(row.phase, Phase::Ramp | Phase::Hold | Phase::Follow)
-        || row.phase == Phase::Unload && stretch == Stretch::WithUnload;
+        || row.phase == Phase::Unload && stretch == RecordStretch::WithUnload;
     is_wanted && row.force.is_some() && row.depth.is_some()
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
-pub(super) fn is_saturated(session: &Session, row: &Row) -> bool {
+pub(super) fn is_saturated(session: &Session, row: &SampleRow) -> bool {
     let ends = session.manifest.rig.as_ref().and_then(|rig| rig.adc);
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
@@ -247,7 +250,7 @@ pub(super) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceE
 }
 
 /// The decisions among a session's entries, each after so many samples.
-pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, SourceError> {
+pub(super) fn decisions_among(entries: &[LogEntry]) -> Result<Vec<(u64, Effect)>, SourceError> {
     entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Decision)
@@ -281,17 +284,17 @@ fn leave_out(left_out_s: &[[f64; 2]], offset: Seconds, samples: &mut [FitSample]
 }
 
 /// Time from the session's first sample to the first one that a fit takes.
-fn since_first(session: &Session, stretch: Stretch) -> Seconds {
+fn since_first(session: &Session, stretch: RecordStretch) -> Seconds {
     let first = session.rows.iter().find(|row| is_fitted(row, stretch));
     match (session.rows.first(), first) {
-        (Some(origin), Some(first)) => analysed::time_between(session, origin, first),
+        (Some(origin), Some(first)) => analysed_session::time_between(session, origin, first),
         _ => Seconds(0.0),
     }
 }
 
 /// Session time of the first sample that a fit takes.
 fn start_of(session: &Session) -> Seconds {
-    let first = session.rows.iter().find(|row| is_fitted(row, Stretch::RampHold));
+    let first = session.rows.iter().find(|row| is_fitted(row, RecordStretch::RampHold));
     first.map_or(Seconds(0.0), |row| row.host.seconds())
 }
 
@@ -304,9 +307,9 @@ pub(super) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
 }
 
 /// The noise of a table is unknown, so every sample has the same weight.
-fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
+fn samples_of_table(table: &MeasurementTable, stretch: RecordStretch) -> Vec<FitSample> {
     (0..table.t.len())
-        .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])
+        .filter(|&i| stretch == RecordStretch::WithUnload || !table.is_unload[i])
         .map(|i| FitSample {
             t: Seconds(table.t[i]),
             depth: Depth(table.depth[i]),
@@ -330,7 +333,8 @@ mod tests {
     fn a_saturated_converter_does_not_bend_the_fit() {
         let mut session = recorded("ramp-hold-lab");
         let options = FitOptions::default();
-        let whole = fit(&samples_of(&session, Stretch::RampHold).unwrap(), &options).unwrap();
+        let whole =
+            fit(&fit_samples(&session, RecordStretch::RampHold).unwrap(), &options).unwrap();
         assert_eq!(whole.censored, 0);
         let adc = session.manifest.rig.as_ref().unwrap().adc.unwrap();
         let hold = session.rows.iter_mut().filter(|row| row.phase == Phase::Hold);
@@ -342,7 +346,7 @@ mod tests {
             row.force = Some(if is_low { -9.0 } else { 90.0 });
             expected += 1;
         }
-        let samples = samples_of(&session, Stretch::RampHold).unwrap();
+        let samples = fit_samples(&session, RecordStretch::RampHold).unwrap();
         let report = fit(&samples, &options).unwrap();
         assert!(expected > 0 && report.censored == expected);
         for (one, other) in whole.parameters.iter().zip(&report.parameters) {
@@ -378,20 +382,21 @@ mod tests {
     #[test]
     fn forces_after_an_interlock_do_not_count() {
         let mut session = recorded("ramp-hold-lab");
-        let samples = samples_of(&session, Stretch::RampHold).unwrap();
-        let first = session.rows.iter().position(|row| is_fitted(row, Stretch::RampHold)).unwrap();
+        let samples = fit_samples(&session, RecordStretch::RampHold).unwrap();
+        let first =
+            session.rows.iter().position(|row| is_fitted(row, RecordStretch::RampHold)).unwrap();
         let tripped = Effect::Record(Record::InterlockTripped {
             interlock: palpate_protocols::engine::Interlock::Signal,
             reason: "on purpose".into(),
         });
-        session.entries.push(Entry {
+        session.entries.push(LogEntry {
             kind: EntryKind::Decision,
             order: u64::MAX,
             after_sample: (first + 100) as u64,
             now: palpate_model::Nanos::ZERO,
             body: serde_json::to_value(&tripped).unwrap(),
         });
-        let censored = samples_of(&session, Stretch::RampHold).unwrap();
+        let censored = fit_samples(&session, RecordStretch::RampHold).unwrap();
         assert_eq!(censored.len(), samples.len());
         let measured = censored.iter().take_while(|one| one.is_measured()).count();
         assert_eq!(measured, 100);

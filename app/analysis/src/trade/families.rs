@@ -2,9 +2,9 @@
 
 use super::paths::{ReferencePaths, difference, peak};
 use super::timing::Job;
-use super::{Extent, UNMEASURED};
+use super::{TradeExtent, UNMEASURED};
 use palpate_model::units::{Depth, Newtons, Seconds};
-use palpate_rheology::families::{Model, by_key};
+use palpate_rheology::families::{Model, find_family};
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_rheology::trade::FamilyRow;
 use std::hint::black_box;
@@ -96,10 +96,13 @@ fn come_back(path: &mut Vec<(Seconds, Depth)>) {
 }
 
 fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
-    by_key(key).map_err(|err| err.to_string())?.model(outer, linear).map_err(|err| err.to_string())
+    find_family(key)
+        .map_err(|err| err.to_string())?
+        .model(outer, linear)
+        .map_err(|err| err.to_string())
 }
 
-pub(super) fn rows(extent: Extent, paths: &ReferencePaths) -> Result<Vec<FamilyRow>, String> {
+pub(super) fn rows(extent: TradeExtent, paths: &ReferencePaths) -> Result<Vec<FamilyRow>, String> {
     let mut rows = Vec::new();
     for target in &TARGETS {
         let mut path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();
@@ -155,7 +158,7 @@ pub(super) fn jobs<'a>(rows: &[FamilyRow]) -> Result<Vec<Job<'a>>, String> {
 }
 
 fn job<'a>(key: &str) -> Result<Job<'a>, String> {
-    let family = by_key(key).map_err(|err| err.to_string())?;
+    let family = find_family(key).map_err(|err| err.to_string())?;
     // A decade between relaxation times, a few newtons over 30 mm.
     let outer = family.outer();
     let outer = outer.iter().enumerate().map(|(i, one)| match one.unit {

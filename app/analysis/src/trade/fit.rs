@@ -2,7 +2,7 @@
 
 use super::paths::{ReferencePaths, TICKS, difference};
 use super::timing::Job;
-use super::{Extent, UNMEASURED};
+use super::{TradeExtent, UNMEASURED};
 use palpate_model::random::SplitMix;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -20,7 +20,7 @@ const THINNED_QUICK: [usize; 2] = [10, 100];
 const RATE: f64 = 1000.0;
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: TradeExtent,
     [first, count]: [u64; 2],
     paths: &ReferencePaths,
 ) -> Result<Vec<FitRow>, String> {

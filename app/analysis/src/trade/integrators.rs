@@ -2,7 +2,7 @@
 
 use super::paths::{DepthPath, ReferencePaths, TICKS, body};
 use super::timing::Job;
-use super::{Extent, UNMEASURED};
+use super::{TradeExtent, UNMEASURED};
 use palpate_rheology::integrators::{IntegratorError, Precision, Real, Scheme};
 use palpate_rheology::trade::{ForceError, IntegratorRow};
 use std::hint::black_box;
@@ -16,7 +16,10 @@ const RUN: usize = 1024;
 /// One job for every integrator and precision: a step costs the same whatever its length.
 pub(super) const JOBS: usize = 2 * Scheme::ALL.len();
 
-pub(super) fn rows(extent: Extent, paths: &ReferencePaths) -> Result<Vec<IntegratorRow>, String> {
+pub(super) fn rows(
+    extent: TradeExtent,
+    paths: &ReferencePaths,
+) -> Result<Vec<IntegratorRow>, String> {
     let steps = extent.choose(&STEPS[..], &STEPS_QUICK);
     let mut rows = Vec::new();
     for scheme in Scheme::ALL {

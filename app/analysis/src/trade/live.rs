@@ -9,7 +9,7 @@ use palpate_rheology::fit::{FitSample, LiveFit};
 use palpate_rheology::trade::LiveRow;
 use std::hint::black_box;
 
-/// Relaxation times in the bank.
+/// StressRelaxation times in the bank.
 const NODES: [usize; 5] = [16, 32, 64, 128, 256];
 
 /// A live fit with so many relaxation times after all samples; none that a bank cannot have.
@@ -25,7 +25,8 @@ pub(super) fn rows(paths: &ReferencePaths) -> Result<Vec<LiveRow>, String> {
     let recording = fit::recording(0, 0.0, paths)?;
     let row = |&nodes: &usize| {
         let answer = pushed(nodes, &recording).and_then(|live| live.estimate());
-        let tau = answer.and_then(|answer| answer.identified("tau_eps").map(|tau| tau.value));
+        let tau =
+            answer.and_then(|answer| answer.identified_parameter("tau_eps").map(|tau| tau.value));
         LiveRow {
             nodes,
             tau_error: tau.map(|tau| (tau / ModifiedKelvin::THESIS.tau_eps - 1.0).abs()),

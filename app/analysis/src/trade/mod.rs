@@ -22,20 +22,20 @@ pub use text::text;
 
 use crate::progress::Progress;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_rheology::trade::{Cost, Machine, TRADE_FORMAT, TradeCurves};
+use palpate_rheology::trade::{Machine, MeasuredCost, TRADE_FORMAT, TradeCurves};
 use palpate_runner::wall_now;
 use std::ops::ControlFlow;
 use timing::Job;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum TradeExtent {
     /// Every row, long enough for times that can be repeated.
     Full,
     /// A few rows, briefly.
     Quick,
 }
 
-impl Extent {
+impl TradeExtent {
     fn choose<T>(self, full: T, quick: T) -> T {
         if self == Self::Full { full } else { quick }
     }
@@ -44,27 +44,30 @@ impl Extent {
 /// Tables whose errors [`errors`] computes.
 const TABLES: usize = 4;
 /// What stands for a time that is not measured yet.
-const UNMEASURED: Cost = Cost { ns: 0.0, spread: 0.0, halves: 0.0 };
+const UNMEASURED: MeasuredCost = MeasuredCost { ns: 0.0, spread: 0.0, halves: 0.0 };
 
 /// All rows, computed, timed and marked; none if `progress` ended it.
-pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
+pub fn measure(
+    extent: TradeExtent,
+    progress: &dyn Progress,
+) -> Result<Option<TradeCurves>, String> {
     let total = TABLES + timing::rounds(extent);
-    let of_errors = |done: usize, _: usize, what: &str| progress.tell(done, total, what);
+    let of_errors = |done: usize, _: usize, what: &str| progress.report(done, total, what);
     let Some(curves) = errors(extent, &of_errors)? else { return Ok(None) };
     let mut done = TABLES;
     times(curves, extent, &mut || {
         done += 1;
-        progress.tell(done, total, "times")
+        progress.report(done, total, "times")
     })
 }
 
 /// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
 /// `progress` ended it.
-pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
+pub fn errors(extent: TradeExtent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let paths = paths::ReferencePaths::new()?;
     // Seeds of the noise in the fits: the first, and how many.
     let seeds = extent.choose([1, 8], [1, 2]);
-    let next = |done: usize, what: &str| progress.tell(done, TABLES, what).continue_value();
+    let next = |done: usize, what: &str| progress.report(done, TABLES, what).continue_value();
     let Some(()) = next(0, "errors of the integrators") else { return Ok(None) };
     let integrators = integrators::rows(extent, &paths)?;
     let Some(()) = next(1, "errors of the families") else { return Ok(None) };
@@ -79,7 +82,7 @@ pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCur
         version: version().into(),
         machine: this_machine(),
         measured_at: now.to_rfc3339_opts(SecondsFormat::Secs, true),
-        quick: extent == Extent::Quick,
+        quick: extent == TradeExtent::Quick,
         peak: paths.peak(),
         seeds,
         integrators,
@@ -92,7 +95,7 @@ pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCur
 /// Measures the times of all rows; `step` hears of each round done and may end the whole.
 fn times(
     mut curves: TradeCurves,
-    extent: Extent,
+    extent: TradeExtent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
 ) -> Result<Option<TradeCurves>, String> {
     let paths = paths::ReferencePaths::new()?;
@@ -103,7 +106,7 @@ fn times(
     jobs.extend(live::jobs(&curves.live, &paths)?);
     let Some(costs) = timing::measure(&mut jobs, extent, step) else { return Ok(None) };
     let mut costs = costs.into_iter();
-    let by_scheme: Vec<Cost> = costs.by_ref().take(integrators::JOBS).collect();
+    let by_scheme: Vec<MeasuredCost> = costs.by_ref().take(integrators::JOBS).collect();
     for row in &mut curves.integrators {
         row.cost = by_scheme[integrators::job_of(row)];
         row.second_ns = row.cost.ns / row.step_s;

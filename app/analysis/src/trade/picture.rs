@@ -1,8 +1,8 @@
 //! The trade as a picture: error over time, both by powers of ten, a panel for each table.
 
 use super::text::plain;
-use palpate_figures::drawing::{Ink as TextInk, Svg};
-use palpate_figures::figure::{Axis, AxisNames, Ink, Labels, Plot, Series};
+use palpate_figures::drawing::{Svg, TextStyle as TextInk};
+use palpate_figures::figure::{AxisNames, Ink, Plot, PlotAxis, PlotSeries, PointLabels};
 use palpate_figures::tokens::LIGHT;
 use palpate_rheology::integrators::{Precision, Scheme};
 use palpate_rheology::trade::{FamilyRow, FitRow, TradeCurves};
@@ -43,7 +43,7 @@ impl Group {
     }
 
     /// Its name at the end of a thin line through all, a line through what nothing undercuts, and the points.
-    fn series(&self) -> [Series; 4] {
+    fn series(&self) -> [PlotSeries; 4] {
         let points = |is_taken: &dyn Fn(&Point) -> bool| {
             let taken = self.points.iter().filter(|one| is_taken(one));
             let mut points: Vec<[f64; 2]> = taken.map(|one| one.at).collect();
@@ -51,12 +51,12 @@ impl Group {
             points
         };
         let front = points(&|one| one.front);
-        let labels = if self.name.is_empty() { Labels::None } else { Labels::AtEnd };
+        let labels = if self.name.is_empty() { PointLabels::None } else { PointLabels::AtEnd };
         [
-            Series::line(&self.name, Ink::Line, 1.0, points(&|_| true)).labelled(labels),
-            Series::line("", self.ink, 2.0, front.clone()),
-            Series::dots("", self.ink, 4.0, front),
-            Series::dots("", self.ink, 2.5, points(&|one| !one.front)),
+            PlotSeries::line(&self.name, Ink::Line, 1.0, points(&|_| true)).labelled(labels),
+            PlotSeries::line("", self.ink, 2.0, front.clone()),
+            PlotSeries::dots("", self.ink, 4.0, front),
+            PlotSeries::dots("", self.ink, 2.5, points(&|one| !one.front)),
         ]
     }
 }
@@ -83,7 +83,7 @@ pub fn svg(curves: &TradeCurves) -> String {
     for (title, axes, series) in tables {
         let place = [LEFT, top, WIDTH - RIGHT, top + PANEL_HEIGHT];
         svg.text([LEFT, top - 10.0], TextInk::plain(LIGHT.text), title);
-        let [x, y] = axes.map(Axis::logarithmic);
+        let [x, y] = axes.map(PlotAxis::logarithmic);
         let plot = Plot::new(title, x, y).with(series.iter().flat_map(Group::series));
         plot.draw(&mut svg, place, AxisNames::Both);
         top += PANEL_HEIGHT + BELOW + ABOVE;

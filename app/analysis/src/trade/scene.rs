@@ -1,16 +1,16 @@
 //! The cost of accuracy in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
 
 use super::timing::{self, Job};
-use super::{Extent, families, integrators, paths};
+use super::{TradeExtent, families, integrators, paths};
 use crate::progress::Progress;
 use palpate_haptics::surface::{
-    Contact, Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Method, PokeScene, REFERENCE_NODES,
-    Recovery, SceneCurves, Side, StepPoint, Surface,
+    ContactSide, Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, PokeScene, REFERENCE_NODES,
+    SceneCurves, StepPoint, Surface, SurfaceContact, SurfaceMethod, SurfaceRecovery,
 };
 use palpate_model::units::{Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::Scheme;
-use palpate_rheology::trade::{Cost, FamilyRow};
+use palpate_rheology::trade::{FamilyRow, MeasuredCost};
 use std::hint::black_box;
 
 /// Tick of the scene in s.
@@ -66,13 +66,13 @@ fn pokes() -> PokeScene {
 fn job<'a>(scene: &PokeScene, nodes: usize, cut: Cut) -> Result<Job<'a>, String> {
     let field = scene.field(nodes).map_err(|err| err.to_string())?;
     let tau = Seconds(ModifiedKelvin::THESIS.tau_eps);
-    let recovery = Recovery::new(tau, Seconds(TICK)).map_err(|err| err.to_string())?;
-    let mut surface = Surface::new(field, Method::Envelope, recovery, cut);
-    let contact = [Contact {
+    let recovery = SurfaceRecovery::new(tau, Seconds(TICK)).map_err(|err| err.to_string())?;
+    let mut surface = Surface::new(field, SurfaceMethod::Envelope, recovery, cut);
+    let contact = [SurfaceContact {
         x: 0.5 * scene.extent,
         y: 0.5 * scene.extent,
         z: -scene.depth,
-        side: Side::Push,
+        side: ContactSide::Push,
     }];
     Ok(Job {
         per_call: 1.0,
@@ -84,7 +84,7 @@ fn job<'a>(scene: &PokeScene, nodes: usize, cut: Cut) -> Result<Job<'a>, String>
 
 /// The curves of this machine; none if `progress` ended it.
 pub fn measure_scene(
-    extent: Extent,
+    extent: TradeExtent,
     progress: &dyn Progress,
 ) -> Result<Option<SceneCurves>, String> {
     let meshes = extent.choose(&MESHES[..], &MESHES_QUICK);
@@ -93,7 +93,7 @@ pub fn measure_scene(
     let mut done = 0;
     let mut next = |what: &str| {
         done += 1;
-        progress.tell(done - 1, total, what).continue_value()
+        progress.report(done - 1, total, what).continue_value()
     };
     let scene = pokes();
     let mut curves = SceneCurves::default();
@@ -136,7 +136,7 @@ pub fn measure_scene(
     jobs.extend(families::jobs(&rows)?);
     let costs = timing::measure(&mut jobs, extent, &mut || {
         done += 1;
-        progress.tell(done - 1, total, "times")
+        progress.report(done - 1, total, "times")
     });
     let Some(costs) = costs else { return Ok(None) };
     with_times(&mut curves, &costs, &rows);
@@ -144,8 +144,8 @@ pub fn measure_scene(
 }
 
 /// Gives every point its time; `costs` are those of meshes, cuts, integrators and families in turn.
-fn with_times(curves: &mut SceneCurves, costs: &[Cost], rows: &[FamilyRow]) {
-    let mut micros = costs.iter().map(|cost: &Cost| 1e-3 * cost.ns);
+fn with_times(curves: &mut SceneCurves, costs: &[MeasuredCost], rows: &[FamilyRow]) {
+    let mut micros = costs.iter().map(|cost: &MeasuredCost| 1e-3 * cost.ns);
     let of_meshes = micros.by_ref().take(curves.meshes.len());
     let slots = curves.meshes.iter_mut().map(|point| &mut point.cost_us);
     slots.zip(of_meshes).for_each(|(slot, cost)| *slot = cost);
@@ -171,14 +171,14 @@ fn with_times(curves: &mut SceneCurves, costs: &[Cost], rows: &[FamilyRow]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_haptics::surface::{Needs, plan};
+    use palpate_haptics::surface::{SceneRequirements, plan};
     use palpate_rheology::tolerance::Tolerance;
     use std::ops::ControlFlow;
 
     #[test]
     fn what_is_measured_can_be_planned_from_and_finer_is_more_exact() {
         let go_on = |_: usize, _: usize, _: &str| ControlFlow::Continue(());
-        let curves = measure_scene(Extent::Quick, &go_on).unwrap().unwrap();
+        let curves = measure_scene(TradeExtent::Quick, &go_on).unwrap().unwrap();
         for pair in curves.meshes.windows(2) {
             assert!(pair[1].error_mm < pair[0].error_mm, "{pair:?}");
             assert!(pair[1].cost_us > 0.0, "{pair:?}");
@@ -192,7 +192,7 @@ mod tests {
         let body = ModifiedKelvin::THESIS.into();
         let [_, peak] = POKE.force_error::<3>(&body, Scheme::Exact, 1e-3).unwrap();
         assert!((peak - SCENE_PEAK.0).abs() < 0.01, "{peak}");
-        let needs = Needs {
+        let needs = SceneRequirements {
             force: Tolerance::PercentOfPeak(50.0),
             peak: SCENE_PEAK,
             shape_mm: 10.0,
@@ -201,7 +201,10 @@ mod tests {
         let chosen = plan(&needs, &curves, 1.0).unwrap();
         assert_eq!(chosen.mesh.nodes, 51);
         let ended =
-            measure_scene(Extent::Quick, &|_: usize, _: usize, _: &str| ControlFlow::Break(()));
+            measure_scene(
+                TradeExtent::Quick,
+                &|_: usize, _: usize, _: &str| ControlFlow::Break(()),
+            );
         assert!(ended.unwrap().is_none());
     }
 }

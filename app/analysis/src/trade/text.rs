@@ -1,7 +1,7 @@
 //! The trade as text.
 
 use palpate_rheology::integrators::Scheme;
-use palpate_rheology::trade::{Advice, Cost, Recommendation, TradeCurves};
+use palpate_rheology::trade::{Advice, MeasuredCost, Recommendation, TradeCurves};
 use std::fmt::Write;
 
 #[must_use]
@@ -59,7 +59,7 @@ pub fn time(ns: f64) -> String {
     }
 }
 
-fn cost(cost: &Cost) -> String {
+fn cost(cost: &MeasuredCost) -> String {
     format!("{:>10}  {:>7}", time(cost.ns), percent(cost.spread))
 }
 
@@ -209,7 +209,7 @@ mod tests {
     fn numbers_have_two_digits() {
         let texts = [0.0, 0.0123, 1.0, 12.3, 999.0, 1e-9].map(digits);
         assert_eq!(texts, ["0", "0.012", "1.0", "12", "999", "1.0e-9"]);
-        let half = Cost { ns: 1500.0, spread: 0.5, halves: 0.0 };
+        let half = MeasuredCost { ns: 1500.0, spread: 0.5, halves: 0.0 };
         assert_eq!(cost(&half), "   1.50 us     50 %");
     }
 }

@@ -4,8 +4,8 @@
 //! job's rounds counts, since other work only adds. Even and odd rounds are two measurements of the
 //! same, and their difference says how far a time can be repeated.
 
-use super::Extent;
-use palpate_rheology::trade::Cost;
+use super::TradeExtent;
+use palpate_rheology::trade::MeasuredCost;
 use palpate_runner::Stopwatch;
 use std::ops::ControlFlow;
 
@@ -20,16 +20,16 @@ const BATCH: f64 = 5e-3;
 const BATCH_QUICK: f64 = 1e-3;
 
 /// Rounds, even in number.
-pub(super) fn rounds(extent: Extent) -> usize {
+pub(super) fn rounds(extent: TradeExtent) -> usize {
     extent.choose(24, 4)
 }
 
 /// The cost of an evaluation of each job; none if a step breaks it off.
 pub(super) fn measure(
     jobs: &mut [Job],
-    extent: Extent,
+    extent: TradeExtent,
     step: &mut dyn FnMut() -> ControlFlow<()>,
-) -> Option<Vec<Cost>> {
+) -> Option<Vec<MeasuredCost>> {
     let batch = extent.choose(BATCH, BATCH_QUICK);
     let timed = |job: &mut Job, calls: usize| {
         let watch = Stopwatch::start();
@@ -62,14 +62,18 @@ pub(super) fn measure(
 }
 
 /// The cost that rounds of measured ns amount to.
-fn cost(rounds: &[f64]) -> Cost {
+fn cost(rounds: &[f64]) -> MeasuredCost {
     let least_of =
         |first: usize| rounds.iter().skip(first).step_by(2).copied().fold(f64::INFINITY, f64::min);
     let (even, odd) = (least_of(0), least_of(1));
     let ns = even.min(odd);
     let mut sorted = rounds.to_vec();
     sorted.sort_by(f64::total_cmp);
-    Cost { ns, spread: sorted[sorted.len() / 2] / ns - 1.0, halves: even.max(odd) / ns - 1.0 }
+    MeasuredCost {
+        ns,
+        spread: sorted[sorted.len() / 2] / ns - 1.0,
+        halves: even.max(odd) / ns - 1.0,
+    }
 }
 
 #[cfg(test)]
@@ -78,7 +82,7 @@ mod tests {
 
     #[test]
     fn the_least_counts_and_the_halves_are_compared() {
-        let Cost { ns, spread, halves } = cost(&[20.0, 12.0, 10.0, 30.0]);
+        let MeasuredCost { ns, spread, halves } = cost(&[20.0, 12.0, 10.0, 30.0]);
         assert_eq!(ns, 10.0);
         assert!((spread - 1.0).abs() < 1e-12);
         assert!((halves - 0.2).abs() < 1e-12);
@@ -103,12 +107,12 @@ mod tests {
             steps += 1;
             ControlFlow::Continue(())
         };
-        let costs = measure(&mut jobs, Extent::Quick, &mut step).unwrap();
-        assert_eq!((costs.len(), steps), (2, rounds(Extent::Quick)));
+        let costs = measure(&mut jobs, TradeExtent::Quick, &mut step).unwrap();
+        assert_eq!((costs.len(), steps), (2, rounds(TradeExtent::Quick)));
         drop(jobs);
         for (cost, count) in costs.iter().zip(&counts) {
             assert!(cost.ns > 0.0 && cost.ns.is_finite());
-            assert!(count.get() >= 1000 * rounds(Extent::Quick) as u64);
+            assert!(count.get() >= 1000 * rounds(TradeExtent::Quick) as u64);
         }
     }
 }

@@ -8,11 +8,11 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use clap::Args;
 use palpate_model::calibration::{Calibration, CurveKind};
 use palpate_model::units::Volts;
-use palpate_runner::programme::calibration_of;
+use palpate_runner::programme::calibration_from_session;
 use palpate_runner::wall_now;
 use palpate_sessions::Session;
 use palpate_sessions::library_folder;
-use palpate_sessions::{read_calibration, shelf};
+use palpate_sessions::{document_store, read_calibration};
 use palpate_tables::import::read_weights;
 use std::path::PathBuf;
 
@@ -110,7 +110,7 @@ impl std::str::FromStr for CurveChoice {
 pub(super) fn import(args: &CalibrationImportArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
-    let saved = shelf::save(&library, &document(args)?).map_err(failure)?;
+    let saved = document_store::save_document(&library, &document(args)?).map_err(failure)?;
     let source = CalibrationSource::from_library(&saved);
     super::report_calibration("calibration import", &source, args.picture.as_deref(), output)
 }
@@ -119,7 +119,7 @@ pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Fai
     new_file::check("picture", args.new.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
     let new = document(&args.new)?;
-    let saved = shelf::supersede(&library, &args.old, &new).map_err(failure)?;
+    let saved = document_store::supersede_document(&library, &args.old, &new).map_err(failure)?;
     let (source, picture) = (CalibrationSource::from_library(&saved), args.new.picture.as_deref());
     super::report_calibration("calibration supersede", &source, picture, output)
 }
@@ -132,7 +132,7 @@ fn document(args: &CalibrationImportArgs) -> Result<Calibration, Failure> {
     let is_document = args.file.extension().is_some_and(|ending| ending == "json");
     let mut new = if args.file.is_dir() {
         let session = Session::open(&args.file).map_err(Failure::usage)?;
-        calibration_of(&session, args.name.as_deref().unwrap_or("load cell"))
+        calibration_from_session(&session, args.name.as_deref().unwrap_or("load cell"))
             .map_err(Failure::usage)?
     } else if is_document {
         read_calibration(&args.file).map_err(failure)?

@@ -8,9 +8,9 @@ use super::new_file;
 use super::output::Output;
 use clap::{Args, Subcommand};
 use palpate_analysis::report::calibration as report;
-use palpate_model::calibration::{Bench, Calibration, KnownWeight};
+use palpate_model::calibration::{Calibration, CalibrationUse, KnownWeight};
 use palpate_model::units::Volts;
-use palpate_sessions::calibrations::Shelf;
+use palpate_sessions::calibrations::CalibrationStore;
 use palpate_sessions::library_folder;
 use serde::Serialize;
 use source::CalibrationSource;
@@ -78,19 +78,19 @@ pub(super) fn run(command: &CalibrationCommand, output: &Output) -> Result<(), F
 #[derive(Serialize)]
 struct ListReport {
     folder: PathBuf,
-    calibrations: Vec<report::Entry>,
+    calibrations: Vec<report::CalibrationEntry>,
     unreadable: Vec<String>,
 }
 
 fn list(output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
-    let shelf = Shelf::open(&library);
+    let shelf = CalibrationStore::open(&library);
     let unreadable: Vec<String> = shelf.unreadable.iter().map(ToString::to_string).collect();
     unreadable.iter().for_each(|reason| output.note(reason));
-    let entry = |saved| report::Entry::of(&shelf, saved, source::age_days(saved));
+    let entry = |saved| report::CalibrationEntry::of(&shelf, saved, source::age_days(saved));
     let found = ListReport {
         folder: library.join("calibrations"),
-        calibrations: shelf.kept.iter().map(entry).collect(),
+        calibrations: shelf.documents.iter().map(entry).collect(),
         unreadable,
     };
     output.answer("calibration list", &found, || match found.calibrations.is_empty() {
@@ -109,7 +109,7 @@ struct ShowReport<'a> {
     id: Option<&'a str>,
     file: Option<&'a PathBuf>,
     #[serde(flatten)]
-    content: &'a report::Told,
+    content: &'a report::CalibrationDetails,
     doubts: &'a [String],
     document: &'a Calibration,
 }
@@ -127,11 +127,11 @@ fn report_calibration(
     picture: Option<&std::path::Path>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let content = report::Told::of(&source.calibration).map_err(Failure::failed)?;
-    let doubts = source.calibration.doubts(&Bench {
+    let content = report::CalibrationDetails::of(&source.calibration).map_err(Failure::failed)?;
+    let doubts = source.calibration.validity_warnings(&CalibrationUse {
         rig: &source.calibration.rig,
         age_days: source.age_days,
-        ..Bench::default()
+        ..CalibrationUse::default()
     });
     new_file::write("picture", picture, || report::picture(&source.calibration, &content))?;
     let object = ShowReport {
@@ -142,7 +142,7 @@ fn report_calibration(
         document: &source.calibration,
     };
     output.answer(command, &object, || {
-        report::whole(&source.calibration, source.id.as_deref(), &content, &doubts)
+        report::calibration_page(&source.calibration, source.id.as_deref(), &content, &doubts)
     });
     Ok(())
 }

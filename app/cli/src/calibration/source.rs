@@ -1,11 +1,11 @@
 //! Where a calibration comes from: the library, a file, or the source thesis.
 
 use super::super::Failure;
-use palpate_model::calibration::{Bench, Calibration};
+use palpate_model::calibration::{Calibration, CalibrationUse};
 use palpate_runner::wall_now;
-use palpate_sessions::calibrations::{Kept, Shelf, read_calibration};
+use palpate_sessions::calibrations::{CalibrationStore, StoredCalibration, read_calibration};
+use palpate_sessions::document_store::{self, LibraryError};
 use palpate_sessions::library_folder;
-use palpate_sessions::shelf::{self, LibraryError};
 use std::path::{Path, PathBuf};
 
 /// What names the table of the source thesis.
@@ -27,7 +27,7 @@ impl CalibrationSource {
             return Ok(Self::new(None, Some(path.into()), calibration));
         }
         let library = library_folder().map_err(Failure::usage)?;
-        let shelf = Shelf::open(&library);
+        let shelf = CalibrationStore::open(&library);
         match shelf.find(name) {
             Ok(saved) => Ok(Self::from_library(saved)),
             Err(_) if name == THESIS => Ok(Self::new(None, None, Calibration::thesis())),
@@ -35,24 +35,33 @@ impl CalibrationSource {
         }
     }
 
-    pub fn from_library(saved: &Kept) -> Self {
+    pub fn from_library(saved: &StoredCalibration) -> Self {
         let (id, path) = (saved.id.clone(), saved.path.clone());
         Self::new(Some(id), Some(path), saved.document.clone())
     }
 
     fn new(id: Option<String>, file: Option<PathBuf>, calibration: Calibration) -> Self {
-        Self { age_days: shelf::age_days(&calibration, wall_now().into()), id, file, calibration }
+        Self {
+            age_days: document_store::age_days(&calibration, wall_now().into()),
+            id,
+            file,
+            calibration,
+        }
     }
 
     /// Reasons against using it on a rig.
     pub fn doubts(&self, rig: &str) -> Vec<String> {
-        self.calibration.doubts(&Bench { rig, age_days: self.age_days, ..Bench::default() })
+        self.calibration.validity_warnings(&CalibrationUse {
+            rig,
+            age_days: self.age_days,
+            ..CalibrationUse::default()
+        })
     }
 }
 
 /// Days since one of the library was taken.
-pub(super) fn age_days(saved: &Kept) -> Option<i64> {
-    shelf::age_days(&saved.document, wall_now().into())
+pub(super) fn age_days(saved: &StoredCalibration) -> Option<i64> {
+    document_store::age_days(&saved.document, wall_now().into())
 }
 
 /// A wrong name or document is wrong use, an unreadable disk is a failure.

@@ -2,19 +2,19 @@
 
 use super::super::{Failure, output::Output, sources_failure};
 use super::export_failure;
-use palpate_analysis::exports::{into_lake, sweep_lake};
-use palpate_analysis::sources;
+use palpate_analysis::exports::{add_to_lake, sweep_lake};
+use palpate_analysis::recordings;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(), Failure> {
-    let found = sources::find_sessions(named).map_err(sources_failure)?;
+    let found = recordings::find_sessions(named).map_err(sources_failure)?;
     found.note().iter().for_each(|note| output.note(note));
     let found = found.paths;
     sweep_lake(lake);
     let bar = output.count_bar(found.len() as u64);
     let (mut was_there, mut failed) = (0, Vec::new());
     for session in &found {
-        match into_lake(lake, session).map_err(export_failure) {
+        match add_to_lake(lake, session).map_err(export_failure) {
             Ok(added) => was_there += usize::from(added.was_there),
             Err(failure) => {
                 let sentence = format!("{}: {}", session.display(), failure.sentence());

@@ -6,12 +6,14 @@ use super::arguments::parse_number;
 use super::output::Output;
 use super::{Failure, compliance, read_failure, source_failure};
 use clap::{Args, ValueEnum};
-use palpate_analysis::analysed;
-use palpate_analysis::compliance::columns;
-use palpate_analysis::exports::{self, ExportFailure, Target};
+use palpate_analysis::analysed_session;
+use palpate_analysis::compliance::corrected_depth_columns;
+use palpate_analysis::exports::{self, ExportFailure, ExportTarget};
 use palpate_model::rig::Phase;
 use palpate_sessions::log::Session;
-use palpate_tables::export::{Beside, ExportError, Format, Selection, Table, dictionary_path};
+use palpate_tables::export::{
+    ExportError, ExtraColumns, SampleSelection, TableExport, TableFormat, dictionary_path,
+};
 use std::path::PathBuf;
 
 /// Write a session's samples as a table, or add sessions to a lake
@@ -96,23 +98,23 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 impl ExportArgs {
-    fn format(&self) -> Format {
+    fn format(&self) -> TableFormat {
         match self.format {
             // Without a lake there is always a format.
-            Some(Kind::Csv) | None => Format::Csv(self.delimiter),
-            Some(Kind::Parquet) => Format::Parquet,
-            Some(Kind::Arrow) => Format::Arrow,
+            Some(Kind::Csv) | None => TableFormat::Csv(self.delimiter),
+            Some(Kind::Parquet) => TableFormat::Parquet,
+            Some(Kind::Arrow) => TableFormat::Arrow,
         }
     }
 
-    fn target(&self) -> Target {
+    fn target(&self) -> ExportTarget {
         match &self.mcap_full {
-            Some(path) => Target::Messages(path.clone()),
-            None => Target::Table(self.format(), self.to.clone()),
+            Some(path) => ExportTarget::Messages(path.clone()),
+            None => ExportTarget::Table(self.format(), self.to.clone()),
         }
     }
 
-    fn selection(&self) -> Result<Selection, Failure> {
+    fn selection(&self) -> Result<SampleSelection, Failure> {
         if let (Some(from), Some(until)) = (self.from, self.until)
             && from > until
         {
@@ -120,7 +122,7 @@ impl ExportArgs {
                 "--from {from} is after --until {until}; give the earlier time first"
             )));
         }
-        Ok(Selection {
+        Ok(SampleSelection {
             phases: self.phase.clone(),
             cycles: self.cycle.clone(),
             columns: self.columns.clone(),
@@ -145,16 +147,16 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     target.sweep();
     let mut compliance = None;
     let written = if args.analysis.is_some() || args.compliance.is_some() {
-        let opened = analysed::open(session, args.analysis.as_deref());
+        let opened = analysed_session::open(session, args.analysis.as_deref());
         let mut opened = opened.map_err(source_failure)?;
         opened.blank();
         let read = opened.edited.session;
         let extra;
         (compliance, extra) = extra_columns(args, &read)?;
-        let table = Table {
+        let table = TableExport {
             manifest: &read.manifest,
             notes: &read.notes,
-            beside: &extra,
+            extra: &extra,
             selection: &selection,
         };
         let mut feed = |visit: &mut dyn FnMut(&[_])| {
@@ -179,7 +181,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         None => (args.format().ending(), Some(dictionary_path(&written.path))),
     };
     let object = serde_json::json!({ "file": written.path, "rows": written.rows, "format": format,
-        "dictionary": dictionary, "is_part": selection.is_part(),
+        "dictionary": dictionary, "is_part": selection.is_partial(),
         "every": selection.every.unwrap_or(1), "compliance": compliance,
     });
     output.answer("export", &object, || {
@@ -217,17 +219,17 @@ pub(super) fn failure(err: ExportError) -> Failure {
 fn extra_columns(
     args: &ExportArgs,
     session: &Session,
-) -> Result<(Option<String>, Beside), Failure> {
+) -> Result<(Option<String>, ExtraColumns), Failure> {
     let Some(name) = &args.compliance else {
-        return Ok((None, Beside::default()));
+        return Ok((None, ExtraColumns::default()));
     };
     let corrections = compliance::corrections(Some(name))?;
     let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
     let saved = corrections.of_rig(rig);
     let saved = saved.map_err(|err| source_failure(err.into()))?;
     let Some((saved, _)) = saved else {
-        return Ok((None, Beside::default()));
+        return Ok((None, ExtraColumns::default()));
     };
-    let columns = columns(session, saved).map_err(source_failure)?;
+    let columns = corrected_depth_columns(session, saved).map_err(source_failure)?;
     Ok((Some(saved.id.clone()), columns))
 }

@@ -1,12 +1,12 @@
 //! Fits many sources on several threads; results come in the order of the sources.
 
 use super::super::{Failure, output::Output, source_failure, terminal::on_ctrl_c};
-use palpate_analysis::compliance::Correction;
-use palpate_analysis::fit::{Fitted, NotFitted, Recipe, each};
-use palpate_analysis::pool::News;
+use palpate_analysis::compliance::ComplianceCorrection;
+use palpate_analysis::fit::{FitRecipe, SourceFit, SourceFitError, fit_each};
+use palpate_analysis::pool::WorkEvent;
 use palpate_analysis::report::text;
 use palpate_analysis::source::SourceError;
-use palpate_rheology::fit::{FitReport, Parameter};
+use palpate_rheology::fit::{FitReport, FittedParameter};
 use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ enum SourceFailure {
     Failed(Failure),
 }
 
-impl From<NotFitted> for SourceFailure {
-    fn from(none: NotFitted) -> Self {
+impl From<SourceFitError> for SourceFailure {
+    fn from(none: SourceFitError) -> Self {
         match none {
-            NotFitted::Source(SourceError::Rejected { reason }) => Self::Rejected(reason),
-            NotFitted::Source(err) => Self::Failed(source_failure(err)),
+            SourceFitError::Source(SourceError::Rejected { reason }) => Self::Rejected(reason),
+            SourceFitError::Source(err) => Self::Failed(source_failure(err)),
             none => Self::Failed(Failure::failed(none)),
         }
     }
@@ -38,13 +38,13 @@ struct Line<'a> {
     report: &'a FitReport,
     notes: &'a [String],
     #[serde(skip_serializing_if = "Option::is_none")]
-    compliance: Option<&'a Correction>,
+    compliance: Option<&'a ComplianceCorrection>,
 }
 
 pub(super) fn run(
     sources: &[PathBuf],
     jobs: usize,
-    recipe: &Recipe,
+    recipe: &FitRecipe,
     output: &Output,
 ) -> Result<(), Failure> {
     let is_ending = Arc::new(AtomicBool::new(false));
@@ -52,17 +52,17 @@ pub(super) fn run(
     let bar = output.count_bar(sources.len() as u64);
     let mut rows = Vec::with_capacity(sources.len());
     let (mut failed, mut rejected) = (0, 0);
-    each(sources, jobs, recipe, &is_ending, |event| match event {
-        News::Done(count) => {
+    fit_each(sources, jobs, recipe, &is_ending, |event| match event {
+        WorkEvent::Done(count) => {
             bar.set_position(count as u64);
             if is_ending.load(Ordering::Relaxed) {
                 bar.set_message("ending after unfitted under way");
             }
         }
-        News::Next(answer) => {
+        WorkEvent::Next(answer) => {
             let source = sources[rows.len()].as_path();
             let path = source.display().to_string();
-            let answer = answer.map_err(NotFitted::from);
+            let answer = answer.map_err(SourceFitError::from);
             let (notes, compliance, result) = split_answer(answer.and_then(|read| Ok(read?)));
             match &result {
                 Err(SourceFailure::Failed(_)) => failed += 1,
@@ -123,22 +123,25 @@ pub(super) fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure>
 
 /// Notes, the correction of depths, and the fit or its failure.
 fn split_answer(
-    answer: Result<Fitted, NotFitted>,
-) -> (Vec<String>, Option<Correction>, SourceResult) {
+    answer: Result<SourceFit, SourceFitError>,
+) -> (Vec<String>, Option<ComplianceCorrection>, SourceResult) {
     match answer {
         Ok(fitted) => (
             with_correction(fitted.notes, fitted.compliance.as_ref()),
             fitted.compliance,
-            fitted.result.map_err(|err| NotFitted::Fit(err).into()),
+            fitted.result.map_err(|err| SourceFitError::Fit(err).into()),
         ),
         Err(none) => (Vec::new(), None, Err(none.into())),
     }
 }
 
 /// Adds a note on a correction that was applied.
-fn with_correction(mut notes: Vec<String>, correction: Option<&Correction>) -> Vec<String> {
+fn with_correction(
+    mut notes: Vec<String>,
+    correction: Option<&ComplianceCorrection>,
+) -> Vec<String> {
     let applied = correction.filter(|correction| correction.is_applied);
-    notes.extend(applied.map(Correction::sentence));
+    notes.extend(applied.map(ComplianceCorrection::sentence));
     notes
 }
 
@@ -147,12 +150,12 @@ fn with_correction(mut notes: Vec<String>, correction: Option<&Correction>) -> V
 fn table(sources: &[PathBuf], rows: &[SourceResult]) -> String {
     let reports = || rows.iter().flatten();
     let known = reports().next().map_or(&[][..], |first| &first.parameters);
-    let is_shown = |one: &&Parameter| {
+    let is_shown = |one: &&FittedParameter| {
         let is_found =
             |report: &FitReport| report.parameter(&one.name).is_some_and(|own| !own.is_fixed);
         reports().any(is_found)
     };
-    let shown: Vec<&Parameter> = known.iter().filter(is_shown).collect();
+    let shown: Vec<&FittedParameter> = known.iter().filter(is_shown).collect();
     let mut head = vec!["source".to_owned()];
     head.extend(shown.iter().map(|one| match one.unit.as_str() {
         "" => one.name.clone(),

@@ -3,7 +3,7 @@
 use super::super::Failure;
 use super::super::output::{Bar, Output};
 use super::FitArgs;
-use palpate_analysis::fit::IntervalsWanted;
+use palpate_analysis::fit::IntervalRequest;
 use palpate_rheology::fit::Bootstrap;
 
 /// Fewer repeats do not determine the ends of a 95 % interval.
@@ -21,9 +21,9 @@ pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     }
 }
 
-pub(super) fn wanted(args: &FitArgs) -> IntervalsWanted {
+pub(super) fn wanted(args: &FitArgs) -> IntervalRequest {
     let seed = args.seed.unwrap_or(1);
-    IntervalsWanted {
+    IntervalRequest {
         with_profile: args.profile,
         bootstrap: args.bootstrap.map(|repeats| Bootstrap { seed, repeats }),
     }

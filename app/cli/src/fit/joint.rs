@@ -2,34 +2,34 @@
 
 use super::super::{Failure, output::Output, sources_failure};
 use super::{FitArgs, intervals};
-use palpate_analysis::fit::{Recipe, TogetherRequest, fit_together};
+use palpate_analysis::fit::{FitRecipe, JointFitRequest, fit_together};
+use palpate_analysis::recordings::{self, RecordingNames, RecordingOptions};
 use palpate_analysis::report::text;
-use palpate_analysis::sources::{self, Naming, Reading};
 use palpate_rheology::fit::FitError;
 
 /// `shared` is a list of names with commas, the whole model without it.
 pub(super) fn run(
     args: &FitArgs,
     shared: Option<&str>,
-    recipe: &Recipe,
+    recipe: &FitRecipe,
     output: &Output,
 ) -> Result<(), Failure> {
-    let found = sources::find(&args.sources).map_err(sources_failure)?;
+    let found = recordings::find(&args.sources).map_err(sources_failure)?;
     found.note().iter().for_each(|note| output.note(note));
     if shared.is_some() && found.paths.len() < 2 {
         return Err(Failure::usage(
             "--share needs at least two recordings; name them all, or a folder of them",
         ));
     }
-    let reading = Reading {
+    let reading = RecordingOptions {
         columns: recipe.columns.as_ref(),
-        wanted: recipe.wanted,
+        wanted: recipe.selection,
         corrections: &recipe.corrections,
-        naming: Naming::Path,
+        naming: RecordingNames::Path,
     };
-    let records = sources::read(&found.paths, reading).map_err(sources_failure)?;
+    let records = recordings::read(&found.paths, reading).map_err(sources_failure)?;
     records.notes.iter().for_each(|note| output.note(note));
-    let request = TogetherRequest {
+    let request = JointFitRequest {
         options: &recipe.options,
         shared: shared.unwrap_or("body").split(',').map(str::trim).collect(),
         is_systematic: recipe.is_systematic,
@@ -43,8 +43,8 @@ pub(super) fn run(
         _ => Failure::failed(err),
     })?;
     fitted.notes.iter().for_each(|note| output.note(note));
-    let extras = fitted.beside(&records);
+    let extras = fitted.details(&records);
     let object = fitted.object(&recipe.options, &extras);
-    output.result(&object, || text::together(&fitted, &extras));
+    output.result(&object, || text::joint_fit_text(&fitted, &extras));
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::super::{Failure, export, output::Output, source_failure};
 use super::{FitArgs, batch, jobs};
 use palpate_analysis::fit::{
-    LakeFailure, LakeFit, LakeRequest, NotFitted, Outcome, Recipe, fit_lake,
+    FitRecipe, LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, SourceFitError, fit_lake,
 };
 use palpate_analysis::progress::Progress;
 use palpate_sessions::text::sha256_of_file;
@@ -16,11 +16,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(super) fn run(
     lake: &Path,
     args: &FitArgs,
-    recipe: &Recipe,
+    recipe: &FitRecipe,
     output: &Output,
 ) -> Result<(), Failure> {
     check(args)?;
-    let request = LakeRequest {
+    let request = LakeFitRequest {
         lake,
         shard: args.shard.unwrap_or(Shard::WHOLE),
         recipe,
@@ -34,13 +34,16 @@ pub(super) fn run(
     let bar = output.count_bar(0);
     let mut failed = Vec::new();
     let tally = fit_lake(&request, &is_ending, |event| match event {
-        LakeFit::Note(note) => output.note(&note),
-        LakeFit::Done(count, of) => {
+        LakeFitEvent::Note(note) => output.note(&note),
+        LakeFitEvent::Done(count, of) => {
             // The sessions under way are waited for in any case.
-            let _ = bar.tell(count, of, "");
+            let _ = bar.report(count, of, "");
         }
-        LakeFit::Next(_, Ok(Outcome::Made | Outcome::There | Outcome::Rejected)) => {}
-        LakeFit::Next(id, Err(err)) => {
+        LakeFitEvent::Next(
+            _,
+            Ok(LakeFitOutcome::Fitted | LakeFitOutcome::AlreadyFitted | LakeFitOutcome::Rejected),
+        ) => {}
+        LakeFitEvent::Next(id, Err(err)) => {
             let reason = failure(err).sentence().to_owned();
             bar.suspend(|| output.note(&format!("{id}: {reason}")));
             failed.push(json!({ "session_id": id, "error": reason }));
@@ -102,13 +105,13 @@ fn hash_file(file: &str) -> Result<String, Failure> {
     })
 }
 
-fn failure(err: LakeFailure) -> Failure {
+fn failure(err: LakeFitError) -> Failure {
     match err {
-        LakeFailure::Lake(LakeError::NoLake { .. } | LakeError::Newer { .. }) => {
+        LakeFitError::Lake(LakeError::NoLake { .. } | LakeError::Newer { .. }) => {
             Failure::usage(err)
         }
-        LakeFailure::Keep(err) => export::failure(err),
-        LakeFailure::NotFitted(NotFitted::Source(err)) => source_failure(err),
+        LakeFitError::Keep(err) => export::failure(err),
+        LakeFitError::NotFitted(SourceFitError::Source(err)) => source_failure(err),
         _ => Failure::failed(err),
     }
 }

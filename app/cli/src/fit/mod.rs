@@ -12,12 +12,12 @@ use super::output::Output;
 use super::recalibrate::AuthorArgs;
 use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
-use palpate_analysis::compliance::Corrections;
-use palpate_analysis::fit::{Recipe, remember};
-use palpate_analysis::report::fit_json::{FitObject, Overlay};
+use palpate_analysis::compliance::ComplianceCorrections;
+use palpate_analysis::fit::{FitRecipe, remember};
+use palpate_analysis::recordings::{self, is_collection};
+use palpate_analysis::report::fit_json::{FitObject, FitOverlay};
 use palpate_analysis::report::{picture, text};
-use palpate_analysis::source::{Stretch, Wanted};
-use palpate_analysis::sources::{self, is_collection};
+use palpate_analysis::source::{RecordStretch, SourceSelection};
 use palpate_model::calibration::ForceUncertainty;
 use palpate_rheology::fit::FitOptions;
 use palpate_tables::lake::{Shard, is_lake};
@@ -93,14 +93,14 @@ pub struct FitArgs {
 }
 
 impl FitArgs {
-    fn wanted(&self) -> Wanted {
-        Wanted {
-            stretch: Stretch::with_unload(self.unload),
+    fn wanted(&self) -> SourceSelection {
+        SourceSelection {
+            stretch: RecordStretch::with_unload(self.unload),
             is_rejected_included: self.include_rejected,
         }
     }
 
-    fn corrections(&self) -> Result<Corrections, Failure> {
+    fn corrections(&self) -> Result<ComplianceCorrections, Failure> {
         compliance::corrections(self.compliance.as_deref())
     }
 }
@@ -118,11 +118,11 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
             "--unload needs --family: the default model has no unloading; add --family unloading-3",
         ));
     }
-    let recipe = Recipe {
+    let recipe = FitRecipe {
         options: options(args)?,
         columns: parse_columns(args.columns.as_deref())?,
         is_systematic: !args.no_systematic,
-        wanted: args.wanted(),
+        selection: args.wanted(),
         analysis: args.analysis.clone(),
         corrections: args.corrections()?,
     };
@@ -155,12 +155,12 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
             "--profile and --bootstrap are for one fit; name a single session or table, or share parameters",
         ));
     }
-    let found = sources::find(&args.sources).map_err(sources_failure)?;
+    let found = recordings::find(&args.sources).map_err(sources_failure)?;
     found.note().iter().for_each(|note| output.note(note));
     batch::run(&found.paths, jobs(args), &recipe, output)
 }
 
-fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
+fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
     new_file::check("picture", to)?;
     saved::check(args, source)?;
@@ -178,7 +178,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             return Err(Failure::failed(format!("{refusal}, in {name}")));
         }
     };
-    let overlay = Overlay::of(report, &fitted.samples);
+    let overlay = FitOverlay::of(report, &fitted.samples);
     new_file::write("picture", to, || {
         let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
         let band = uncertainty.and_then(Result::ok);
@@ -195,11 +195,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let intervals = fitted.intervals(&recipe.options, wanted, |done| intervals::show(&bar, done));
     drop(bar);
     let intervals = intervals.map_err(Failure::failed)?;
-    let extras = fitted.beside(&overlay, &intervals);
+    let extras = fitted.details(&overlay, &intervals);
     let object = FitObject::of(recipe.options.family(), report, extras, fitted.seconds);
     saved::save(args, source, &object)?;
     output.result(&object, || {
-        let mut lines = vec![text::whole(report, extras)];
+        let mut lines = vec![text::fit_text(report, extras)];
         lines.extend(fitted.compliance.as_ref().map(compliance::correction_sentence));
         let saved = args.save.iter();
         lines.extend(saved.map(|name| format!("saved as analysis '{name}'")));

@@ -2,7 +2,7 @@
 
 use super::super::{Failure, recalibrate};
 use super::FitArgs;
-use palpate_analysis::analyses::{FitSettings, KeptFit, keep_fit};
+use palpate_analysis::session_actions::{FitSettings, FitToStore, store_fit};
 use serde::Serialize;
 use serde_json::to_value;
 use std::path::Path;
@@ -34,13 +34,13 @@ pub(super) fn save(args: &FitArgs, source: &Path, results: &impl Serialize) -> R
         compliance: args.compliance.clone(),
         include_rejected: args.include_rejected,
     };
-    let fit = KeptFit {
+    let fit = FitToStore {
         based_on: args.analysis.as_deref(),
         together_with: &[],
         settings: to_value(settings).map_err(Failure::failed)?,
         results: to_value(results).map_err(Failure::failed)?,
     };
-    keep_fit(source, name, fit, &args.author.author())
+    store_fit(source, name, fit, &args.author.author())
         .map_err(recalibrate::analysis_edit_failure)?;
     Ok(())
 }

@@ -6,7 +6,7 @@ mod panic;
 mod queue;
 
 use palpate_sessions::library_folder;
-use palpate_sessions::rotating::log_folder;
+use palpate_sessions::program_log::log_folder;
 pub(super) use panic::stop_rigs_on_panic;
 pub(super) use queue::Queue;
 use tracing::level_filters::LevelFilter;

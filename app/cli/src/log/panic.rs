@@ -1,8 +1,8 @@
 //! A panic stops every open rig before it is logged or printed.
 
 use super::Queue;
-use palpate_drivers::wire::after_farewell;
-use palpate_model::contained::is_contained;
+use palpate_drivers::wire::run_after_link_stop;
+use palpate_model::panics::is_panic_caught;
 use palpate_runner::panic_stop::halt_open_rigs;
 use std::backtrace::Backtrace;
 use std::panic::{set_hook, take_hook};
@@ -14,7 +14,7 @@ pub fn stop_rigs_on_panic(log: Option<Queue>) {
     set_hook(Box::new(move |panic| {
         let thread = std::thread::current();
         let name = thread.name().unwrap_or("without a name").to_owned();
-        if is_contained() {
+        if is_panic_caught() {
             tracing::warn!("contained: thread {name} {panic}");
             return;
         }
@@ -22,7 +22,7 @@ pub fn stop_rigs_on_panic(log: Option<Queue>) {
         let trace = Backtrace::force_capture();
         let report = format!("thread {name} {panic}\n{trace}");
         let log = log.clone();
-        after_farewell(move || {
+        run_after_link_stop(move || {
             tracing::error!("{report}");
             if let Some(log) = log {
                 log.flush();

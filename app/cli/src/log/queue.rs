@@ -1,6 +1,6 @@
 //! The queue of the log: callers never wait, one thread writes.
 
-use palpate_sessions::rotating::append;
+use palpate_sessions::program_log::append;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -9,17 +9,17 @@
 
 use super::{begin, stop_rigs_on_panic};
 use palpate_drivers::Rig;
-use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
+use palpate_drivers::device::{DeviceRig, OpenError, OpenedDevices, RigDevice};
 use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{self, StandSettings};
-use palpate_drivers::wire::{HostClock, Link, MemoryLink, pair};
+use palpate_drivers::wire::{HostClock, Link, MemoryLink, memory_link_pair};
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position};
 use palpate_runner::{Runner, TimeScale};
-use palpate_sessions::rotating::log_files;
+use palpate_sessions::program_log::log_files;
 use palpate_test_support::wait::until;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -116,7 +116,7 @@ fn settings() -> StandSettings {
 struct OnLink(Option<Box<dyn Link>>);
 
 impl RigDevice for OnLink {
-    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+    fn open(&mut self, clock: &HostClock) -> Result<OpenedDevices, OpenError> {
         let used = || OpenError::Thread("the link was used".into());
         stand::open(self.0.take().ok_or_else(used)?, &settings(), clock)
     }
@@ -128,14 +128,14 @@ fn child(case: &str) {
     stop_rigs_on_panic(log.clone());
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
-    let (ours, theirs) = pair();
+    let (ours, theirs) = memory_link_pair();
     emulate(theirs, Arc::clone(&clock));
     let seen = Arc::new(Seen::default());
     let folder = palpate_sessions::library_folder().unwrap();
     let link = Watched {
         inner: ours,
         seen: Arc::clone(&seen),
-        log: palpate_sessions::rotating::log_folder(&folder),
+        log: palpate_sessions::program_log::log_folder(&folder),
     };
     let mut rig = DeviceRig::open(OnLink(Some(Box::new(link))), clock).unwrap();
     seen.is_watched.store(true, Ordering::SeqCst);
@@ -170,7 +170,7 @@ fn child(case: &str) {
         }
     }
     let log = log.unwrap();
-    let folder = palpate_sessions::rotating::log_folder(&folder);
+    let folder = palpate_sessions::program_log::log_folder(&folder);
     let is_reported = || {
         log.flush();
         speaks_of_panic(&folder).then_some(())

@@ -6,10 +6,10 @@ use super::output::Output;
 use super::rig::RigArgs;
 use super::{Failure, known_fit_failure};
 use clap::Args;
-use palpate_analysis::plan::{Bench, PlanFailure, PlanRequest, assumed, plan};
+use palpate_analysis::plan::{PlanFailure, PlanRequest, PlanningRig, plan, plan_assumptions};
 use palpate_analysis::report::plan_plot;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
-use palpate_rheology::expected::{ExpectedError, Memory, Target, Unknowns};
+use palpate_rheology::expected::{CorrelatedNoise, ExpectedError, FreeOffsets, PrecisionTarget};
 use std::path::PathBuf;
 
 /// Propose the shortest protocol that determines parameters to a target uncertainty
@@ -66,12 +66,12 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
         command: &text::command,
     };
     let bench = super::rig::open(&RigArgs::default())?;
-    let assumed = assumed(args.like.as_deref()).map_err(known_fit_failure)?;
+    let assumed = plan_assumptions(args.like.as_deref()).map_err(known_fit_failure)?;
     assumed.notes.iter().for_each(|note| output.note(note));
     if assumed.is_hardly_known {
         output.note(GUESS);
     }
-    let bench = Bench {
+    let bench = PlanningRig {
         rig: bench.rig.description(),
         limits: &bench.limits,
         curve: &bench.calibration.curve().map_err(Failure::usage)?,
@@ -99,8 +99,8 @@ fn failure(err: PlanFailure) -> Failure {
 }
 
 /// `tau=1%`, with or without the sign.
-fn targets(within: &[String]) -> Result<Vec<Target>, Failure> {
-    let mut targets: Vec<Target> = Vec::new();
+fn targets(within: &[String]) -> Result<Vec<PrecisionTarget>, Failure> {
+    let mut targets: Vec<PrecisionTarget> = Vec::new();
     for pair in within {
         let parsed = pair.split_once('=').and_then(|(name, value)| {
             let value = value.trim().trim_end_matches('%').trim_end();
@@ -111,7 +111,7 @@ fn targets(within: &[String]) -> Result<Vec<Target>, Failure> {
                 "--within {pair} is not NAME=PERCENT, as in --within tau=1%"
             )));
         };
-        let target = Target::new(name, percent).map_err(Failure::usage)?;
+        let target = PrecisionTarget::new(name, percent).map_err(Failure::usage)?;
         if targets.iter().any(|one| one.parameter == target.parameter) {
             return Err(Failure::usage(format!(
                 "{} is given twice; give it once",
@@ -123,8 +123,8 @@ fn targets(within: &[String]) -> Result<Vec<Target>, Failure> {
     Ok(targets)
 }
 
-fn unknowns(known: &[String]) -> Result<Unknowns, Failure> {
-    let mut unknowns = Unknowns::default();
+fn unknowns(known: &[String]) -> Result<FreeOffsets, Failure> {
+    let mut unknowns = FreeOffsets::default();
     for name in known {
         match name.trim() {
             "f0" => unknowns.f0 = false,
@@ -139,7 +139,7 @@ fn unknowns(known: &[String]) -> Result<Unknowns, Failure> {
     Ok(unknowns)
 }
 
-fn memory(text: &str) -> Result<Memory, Failure> {
+fn memory(text: &str) -> Result<CorrelatedNoise, Failure> {
     let parsed = text
         .split_once(',')
         .and_then(|(sd, time)| Some((sd.trim().parse().ok()?, time.trim().parse().ok()?)));
@@ -149,5 +149,5 @@ fn memory(text: &str) -> Result<Memory, Failure> {
         )));
     };
     let sd_mn: f64 = sd_mn;
-    Ok(Memory { sd: Newtons(sd_mn * 1e-3), time: Seconds(secs) })
+    Ok(CorrelatedNoise { sd: Newtons(sd_mn * 1e-3), time: Seconds(secs) })
 }

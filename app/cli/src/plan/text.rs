@@ -1,9 +1,11 @@
 //! The plan as text.
 
-use palpate_analysis::plan::{Offer, PlanReport};
+use palpate_analysis::plan::{PlanOffer, PlanReport};
 use palpate_figures::uncertain::{shortest as plain, significant as digits};
 use palpate_protocols::plans::RampHold;
-use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
+use palpate_rheology::expected::{
+    PARAMETER_NAMES, PARAMETER_UNITS, PrecisionCurve, ProtocolFamily,
+};
 
 /// Of ten points a decade, 1, 2 and 5.
 const SHOWN: [usize; 3] = [0, 3, 7];
@@ -94,7 +96,7 @@ pub(super) fn command(press: &RampHold) -> String {
     )
 }
 
-fn run_instructions(offer: &Offer) -> Vec<String> {
+fn run_instructions(offer: &PlanOffer) -> Vec<String> {
     let Some(secs) = offer.run_s else {
         return vec!["   there is no command for this yet".into()];
     };
@@ -106,18 +108,18 @@ fn run_instructions(offer: &Offer) -> Vec<String> {
     lines
 }
 
-fn title(family: &Family) -> String {
+fn title(family: &ProtocolFamily) -> String {
     match family {
-        Family::RampHold { speed, hold } => {
+        ProtocolFamily::RampHold { speed, hold } => {
             format!("ramp and hold: {} mm/s, {} s", plain(speed.0), plain(hold.0))
         }
-        Family::TwoSpeeds { speeds, hold, .. } => format!(
+        ProtocolFamily::TwoSpeeds { speeds, hold, .. } => format!(
             "two speeds: {} and {} mm/s, {} s each",
             plain(speeds[0].0),
             plain(speeds[1].0),
             plain(hold.0)
         ),
-        Family::Cycles { speed, between, count } => format!(
+        ProtocolFamily::Cycles { speed, between, count } => format!(
             "{count} cycle{}: {} mm/s, {} to {} mm",
             if *count == 1 { "" } else { "s" },
             plain(speed.0),
@@ -131,11 +133,11 @@ fn tables(report: &PlanReport) -> Vec<String> {
     let wanted = report.targets[0].parameter;
     let k = PARAMETER_NAMES.iter().position(|name| *name == wanted).unwrap_or(0);
     let curves = &report.curves;
-    let easy = |curve: &Curve| -> Vec<usize> {
+    let easy = |curve: &PrecisionCurve| -> Vec<usize> {
         let all = 0..curve.x.len();
         all.filter(|i| SHOWN.contains(&(i % 10))).collect()
     };
-    let counts = |_: &Curve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
+    let counts = |_: &PrecisionCurve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
     let mut lines = vec![format!("{wanted} in % (95 % interval), ramp and hold, against the hold")];
     lines.extend(table("hold s", &curves.hold, k, easy));
     let [top, bottom] = curves.between;
@@ -156,9 +158,9 @@ fn tables(report: &PlanReport) -> Vec<String> {
 
 fn table(
     head: &str,
-    curves: &[Curve],
+    curves: &[PrecisionCurve],
     parameter: usize,
-    shown: impl Fn(&Curve) -> Vec<usize>,
+    shown: impl Fn(&PrecisionCurve) -> Vec<usize>,
 ) -> Vec<String> {
     let Some(first) = curves.first() else {
         return Vec::new();

@@ -8,11 +8,14 @@ use super::Failure;
 use super::output::{Output, merged};
 use super::prompts::OperatorPrompts;
 use super::run::SessionArgs;
-use palpate_analysis::report::programme::Page;
-use palpate_protocols::file::Problem;
+use palpate_analysis::report::programme::ProgrammePage;
+use palpate_protocols::file::ProtocolProblem;
 use palpate_protocols::plans::Plan;
-use palpate_runner::programme::{Done, Event, Laboratory, Programme, RunError, run as carry_out};
-use palpate_runner::{Answers, RunView, Runner, wall_now};
+use palpate_runner::programme::{
+    Programme, ProgrammeEvent, ProgrammeResult, ProgrammeRunError, ProgrammeSetup,
+    run_programme as carry_out,
+};
+use palpate_runner::{PromptResponder, RunView, Runner, wall_now};
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
 use preflight::{
@@ -31,7 +34,7 @@ const CALIBRATION_FILE: &str = "calibration.json";
 
 /// Whether a name is the file of a programme.
 pub(super) fn is_programme(name: &str) -> bool {
-    read(Path::new(name)).is_ok_and(|text| Programme::is_meant(&text))
+    read(Path::new(name)).is_ok_and(|text| Programme::is_programme_text(&text))
 }
 
 pub(super) fn run(
@@ -90,7 +93,7 @@ pub(super) fn run(
         }
     };
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
-    let answers = if is_virtual { Answers::Confirm } else { Answers::Operator };
+    let answers = if is_virtual { PromptResponder::Confirm } else { PromptResponder::Operator };
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
         // A full channel holds a wake-up already.
@@ -98,9 +101,9 @@ pub(super) fn run(
     })
     .map_err(Failure::failed)?;
     let is_question_open = super::run::stop_on_signals(&runner)?;
-    let prompts = (answers == Answers::Operator)
+    let prompts = (answers == PromptResponder::Operator)
         .then(|| OperatorPrompts::start(runner.requests(), is_question_open));
-    let laboratory = Laboratory {
+    let laboratory = ProgrammeSetup {
         runner: &runner,
         woken: &woken,
         rig: &description,
@@ -126,7 +129,7 @@ fn check_gates(
         if let Some(plan) = task.plan(1, None) {
             gate(&plan).map_err(|reason| {
                 let message = format!("task '{}': {reason}", task.name);
-                problem_failure(file, &Problem::error(task.line, message))
+                problem_failure(file, &ProtocolProblem::error(task.line, message))
             })?;
         }
     }
@@ -136,31 +139,31 @@ fn check_gates(
 fn run_and_watch(
     programme: &Programme,
     crc32: &str,
-    laboratory: Laboratory<'_>,
+    laboratory: ProgrammeSetup<'_>,
     mut prompts: Option<OperatorPrompts>,
     output: &Output,
-) -> Result<Done, Failure> {
+) -> Result<ProgrammeResult, Failure> {
     let bar = output.bar(1000);
     let mut task_text = String::new();
     let result = carry_out(programme, crc32, laboratory, &mut |event| match event {
-        Event::Begun { place, count } => {
+        ProgrammeEvent::Begun { place, count } => {
             let task = &programme.tasks[place.task].name;
             task_text = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
             bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
         }
-        Event::Running(view, left) => {
+        ProgrammeEvent::Running(view, left) => {
             bar.set_message(format!("{task_text}  {}", progress_text(view, left.0)));
             if let Some(prompts) = &mut prompts {
                 bar.suspend(|| prompts.update(view, output));
             }
         }
-        Event::Finished(..) | Event::Calibrated(_) => {}
+        ProgrammeEvent::Finished(..) | ProgrammeEvent::Calibrated(_) => {}
     });
     drop(bar);
     result.map_err(|err| match err {
-        RunError::Folder(_) | RunError::Progress(_) | RunError::Refused { .. } => {
-            Failure::usage(err)
-        }
+        ProgrammeRunError::Folder(_)
+        | ProgrammeRunError::Progress(_)
+        | ProgrammeRunError::Refused { .. } => Failure::usage(err),
         err => Failure::failed(err),
     })
 }
@@ -180,11 +183,11 @@ fn progress_text(view: &RunView, left: f64) -> String {
 fn write_results(
     programme: &Programme,
     folder: &Path,
-    done: &Done,
+    done: &ProgrammeResult,
     output: &Output,
 ) -> Result<(), Failure> {
     let bar = output.count_bar(programme.tasks.len() as u64);
-    let page = Page::of(programme, folder, &done.progress, &mut |task| {
+    let page = ProgrammePage::of(programme, folder, &done.progress, &mut |task| {
         bar.inc(1);
         bar.set_message(task.to_owned());
     });
@@ -207,5 +210,5 @@ fn write_results(
         lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
         lines.join("\n")
     });
-    page.loss().map_or(Ok(()), |loss| Err(Failure::failed(loss)))
+    page.loss_sentence().map_or(Ok(()), |loss| Err(Failure::failed(loss)))
 }

@@ -5,9 +5,9 @@ use crate::protocol::FileReport;
 use crate::rig::{OpenRig, RigArgs};
 use crate::run::{SessionArgs, USUAL_INDENTER};
 use palpate_analysis::report::text::in_columns;
-use palpate_model::about::pair_of;
-use palpate_protocols::file::Problem;
-use palpate_runner::programme::{Foreseen, Programme, ProgrammeError, foresee};
+use palpate_model::metadata::split_pair;
+use palpate_protocols::file::ProtocolProblem;
+use palpate_runner::programme::{Programme, ProgrammeError, ProgrammeForecast, forecast_programme};
 use palpate_sessions::text::read;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -43,8 +43,8 @@ pub(super) fn parse_failure(file: &Path, err: &ProgrammeError) -> Failure {
 }
 
 /// A problem that a check only reports stops a run.
-pub(super) fn problem_failure(file: &Path, problem: &Problem) -> Failure {
-    let error = Problem::error(problem.line, problem.message.clone());
+pub(super) fn problem_failure(file: &Path, problem: &ProtocolProblem) -> Failure {
+    let error = ProtocolProblem::error(problem.line, problem.message.clone());
     Failure::usage(format!("{}, {error}", file.display()))
 }
 
@@ -53,7 +53,7 @@ pub(super) fn apply_labels(
     programme: &mut Programme,
     options: &SessionArgs,
 ) -> Result<(), Failure> {
-    programme.usual.indenter = USUAL_INDENTER.to_owned();
+    programme.default_labels.indenter = USUAL_INDENTER.to_owned();
     let indenter = options.indenter.as_deref().unwrap_or_default();
     let labels = [
         ("operator", options.operator.as_str()),
@@ -61,12 +61,12 @@ pub(super) fn apply_labels(
         ("indenter", indenter),
     ];
     for (key, value) in labels.into_iter().filter(|(_, value)| !value.is_empty()) {
-        programme.tell(key, value).map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
+        programme.set_label(key, value).map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
     }
     for text in &options.about {
-        pair_of(text)
+        split_pair(text)
             .map_err(|err| err.to_string())
-            .and_then(|(key, value)| programme.tell(key, value))
+            .and_then(|(key, value)| programme.set_label(key, value))
             .map_err(|err| Failure::usage(format!("--about: {err}")))?;
     }
     Ok(())
@@ -74,7 +74,7 @@ pub(super) fn apply_labels(
 
 /// Refuses while labels that protocols ask for are missing.
 pub(super) fn require_labels(file: &Path, programme: &Programme) -> Result<(), Failure> {
-    let questions = programme.questions();
+    let questions = programme.open_questions();
     if questions.is_empty() {
         return Ok(());
     }
@@ -103,11 +103,11 @@ pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> 
     };
     // A wrong setting of the simulated rig is a mistake of the file.
     if let Err(err) = with_settings(&RigArgs::default(), &programme.simulated) {
-        report.problems.push(Problem::error(0, err.sentence()));
+        report.problems.push(ProtocolProblem::error(0, err.sentence()));
     }
-    let questions = programme.questions().into_iter();
+    let questions = programme.open_questions().into_iter();
     report.problems.extend(questions.map(|question| {
-        Problem::warning(question.line, format!("{}; {SUPPLY_HINT}", question.message))
+        ProtocolProblem::warning(question.line, format!("{}; {SUPPLY_HINT}", question.message))
     }));
     match preview_programme(&programme, bench)? {
         Ok(ahead) => {
@@ -125,10 +125,10 @@ pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> 
 pub(super) fn preview_programme(
     programme: &Programme,
     bench: &OpenRig,
-) -> Result<Result<Foreseen, ProgrammeError>, Failure> {
+) -> Result<Result<ProgrammeForecast, ProgrammeError>, Failure> {
     let curve = bench.calibration.curve().map_err(Failure::usage)?;
     let rig = bench.rig.description();
-    Ok(foresee(programme, rig, &bench.limits, &curve))
+    Ok(forecast_programme(programme, rig, &bench.limits, &curve))
 }
 
 /// Settings of the programme for a simulated rig; the command line takes precedence.
@@ -159,7 +159,10 @@ pub(super) fn with_settings(
 }
 
 /// The object of `--preview`.
-pub(super) fn preview_object(programme: &Programme, foreseen: &Foreseen) -> serde_json::Value {
+pub(super) fn preview_object(
+    programme: &Programme,
+    foreseen: &ProgrammeForecast,
+) -> serde_json::Value {
     let tasks = programme.tasks.iter().zip(&foreseen.tasks).map(|(task, ahead)| {
         serde_json::json!({
             "task": task.name, "repeats": task.repeats, "expected_s": ahead.expected.0,
@@ -172,7 +175,7 @@ pub(super) fn preview_object(programme: &Programme, foreseen: &Foreseen) -> serd
     })
 }
 
-pub(super) fn preview_table(programme: &Programme, foreseen: &Foreseen) -> String {
+pub(super) fn preview_table(programme: &Programme, foreseen: &ProgrammeForecast) -> String {
     let mut lines =
         vec![["task", "times", "min", "at most", "peak N", "protocol"].map(str::to_owned).to_vec()];
     for (task, ahead) in programme.tasks.iter().zip(&foreseen.tasks) {

@@ -8,7 +8,7 @@ use super::{Failure, new_file, programme};
 use clap::{Args, Subcommand};
 use palpate_analysis::report::plan_picture;
 use palpate_protocols::file::{
-    BUILT_IN, Checked, Problem, Protocol, check, nearest_built_in, reference,
+    BUILT_IN, Protocol, ProtocolCheck, ProtocolProblem, check, nearest_built_in, reference,
 };
 use palpate_protocols::plans::PlannedStep;
 use palpate_protocols::preview::{Preview, outline};
@@ -149,10 +149,11 @@ pub(super) fn load_checked(
     values: &BTreeMap<String, String>,
     bench: &OpenRig,
     output: &Output,
-) -> Result<(Protocol, palpate_protocols::file::Written, Preview), Failure> {
+) -> Result<(Protocol, palpate_protocols::file::ExpandedProtocol, Preview), Failure> {
     let text = read_protocol_text(name)?;
-    let Checked { plan, problems } = check_on(&text, values, bench)?;
-    let errors: Vec<&Problem> = problems.iter().filter(|problem| problem.is_error()).collect();
+    let ProtocolCheck { plan, problems } = check_on(&text, values, bench)?;
+    let errors: Vec<&ProtocolProblem> =
+        problems.iter().filter(|problem| problem.is_error()).collect();
     if let Some(first) = errors.first() {
         let more = match errors.len() {
             1 => String::new(),
@@ -175,7 +176,7 @@ fn check_on(
     text: &str,
     values: &BTreeMap<String, String>,
     bench: &OpenRig,
-) -> Result<Checked, Failure> {
+) -> Result<ProtocolCheck, Failure> {
     let curve = bench.calibration.curve().map_err(Failure::usage)?;
     let rig = bench.rig.description();
     Ok(check(text, values, rig, &bench.limits, &curve))
@@ -209,7 +210,7 @@ pub(super) struct FileReport {
     pub(super) file: String,
     /// Name in the file; none if it cannot be read.
     pub(super) name: Option<String>,
-    pub(super) problems: Vec<Problem>,
+    pub(super) problems: Vec<ProtocolProblem>,
     pub(super) expected_s: Option<f64>,
 }
 
@@ -223,7 +224,7 @@ fn run_check(args: &ProtocolCheckArgs, output: &Output) -> Result<(), Failure> {
     for file in &args.files {
         if programme::is_programme(file) {
             let report = programme::check(file, &bench)?;
-            wrong += usize::from(report.problems.iter().any(Problem::is_error));
+            wrong += usize::from(report.problems.iter().any(ProtocolProblem::is_error));
             files.push(report);
             continue;
         }

@@ -2,7 +2,7 @@
 
 use super::FileReport;
 use palpate_figures::uncertain::clock;
-use palpate_protocols::file::{Parameter, Problem, Protocol, Written};
+use palpate_protocols::file::{ExpandedProtocol, Protocol, ProtocolParameter, ProtocolProblem};
 use palpate_protocols::preview::Preview;
 
 /// Steps printed one by one; the totals follow in any case.
@@ -15,8 +15,8 @@ pub(super) fn list(protocols: &[Protocol]) -> String {
 }
 
 /// Every problem of a file on a line of its own.
-pub(super) fn sentences(name: &str, problems: &[Problem]) -> String {
-    let line = |problem: &Problem| format!("{name}, {problem}");
+pub(super) fn sentences(name: &str, problems: &[ProtocolProblem]) -> String {
+    let line = |problem: &ProtocolProblem| format!("{name}, {problem}");
     let lines: Vec<String> = problems.iter().map(line).collect();
     lines.join("\n")
 }
@@ -32,7 +32,7 @@ pub(super) fn check(files: &[FileReport]) -> String {
     lines.join("\n")
 }
 
-pub(super) fn steps(written: &Written) -> String {
+pub(super) fn steps(written: &ExpandedProtocol) -> String {
     let mut lines = vec![format!(
         "{:>5} {:>5}  {:<13} {:>5}  {}",
         "step", "line", "what", "cycle", "checkpoint"
@@ -55,7 +55,11 @@ fn cycle(cycle: u32) -> String {
     if cycle > 0 { cycle.to_string() } else { String::new() }
 }
 
-pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview) -> String {
+pub(super) fn preview(
+    protocol: &Protocol,
+    written: &ExpandedProtocol,
+    preview: &Preview,
+) -> String {
     let mut lines = vec![
         format!("{} (version {})", protocol.title, protocol.version),
         String::new(),
@@ -115,6 +119,6 @@ pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview)
     lines.join("\n")
 }
 
-fn parameter_line(parameter: &Parameter, value: &str) -> String {
+fn parameter_line(parameter: &ProtocolParameter, value: &str) -> String {
     format!("  {} = {value}: {}", parameter.name, parameter.about)
 }

@@ -3,9 +3,9 @@
 use super::super::Failure;
 use super::super::output::Output;
 use super::counted;
-use palpate_analysis::report::dossier::{Claim, claims, compare};
+use palpate_analysis::report::dossier::{FileClaim, claims, compare};
 use palpate_analysis::source::SourceError;
-use palpate_sessions::Summary;
+use palpate_sessions::SessionSummary;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
     let text = palpate_sessions::text::read(page).map_err(Failure::usage)?;
     let (found, is_whole) =
         claims(&text).map_err(|err| Failure::usage(format!("{}: {err}", page.display())))?;
-    let mut by_session: BTreeMap<(&str, &str), Vec<&Claim>> = BTreeMap::new();
+    let mut by_session: BTreeMap<(&str, &str), Vec<&FileClaim>> = BTreeMap::new();
     for claim in &found {
         let key = (claim.session_id.as_str(), claim.folder.as_str());
         by_session.entry(key).or_default().push(claim);
@@ -88,7 +88,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
 /// The sessions named, with their ids.
 fn named(sessions: &[PathBuf]) -> Result<Vec<(PathBuf, String)>, Failure> {
     let id = |path: &PathBuf| {
-        let summary = Summary::read(path).map_err(super::super::read_failure)?;
+        let summary = SessionSummary::read(path).map_err(super::super::read_failure)?;
         Ok((path.clone(), summary.manifest.session_id))
     };
     sessions.iter().map(id).collect()
@@ -104,7 +104,7 @@ fn find_near_page(page: &Path, folder: &str, id: &str) -> Result<PathBuf, Failur
     let places = sibling.into_iter().chain([here.to_path_buf()]);
     let is_it = |place: &PathBuf| {
         place.is_dir()
-            && Summary::read(place).is_ok_and(|summary| summary.manifest.session_id == id)
+            && SessionSummary::read(place).is_ok_and(|summary| summary.manifest.session_id == id)
     };
     // A log that has become unreadable is still compared, if it is where it was.
     let mut places = places.collect::<Vec<_>>().into_iter();

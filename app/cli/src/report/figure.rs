@@ -3,8 +3,8 @@
 use super::super::output::Output;
 use super::super::{Failure, new_file};
 use super::ReportArgs;
-use palpate_analysis::report::dossier::{self, Figure, Wanted};
-use palpate_analysis::report::figures::Window;
+use palpate_analysis::report::dossier::{self, SessionFigure, SessionReading};
+use palpate_analysis::report::figures::TimeWindow;
 use std::path::Path;
 
 pub(super) fn run(
@@ -14,9 +14,9 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     new_file::check("figure", Some(to))?;
-    let ending = dossier::Ending::of(to).map_err(Failure::usage)?;
+    let ending = dossier::FigureFormat::of(to).map_err(Failure::usage)?;
     let window = window(args)?;
-    let wanted = Wanted { session: session.to_path_buf(), analysis: args.analysis.clone() };
+    let wanted = SessionReading { session: session.to_path_buf(), analysis: args.analysis.clone() };
     let drawing = dossier::figure(&wanted, args.of, window);
     let drawing = drawing.map_err(super::super::source_failure)?;
     let drawing = drawing.map_err(Failure::failed)?;
@@ -29,18 +29,18 @@ pub(super) fn run(
     Ok(())
 }
 
-fn window(args: &ReportArgs) -> Result<Window, Failure> {
-    let window = Window {
-        from: args.from.unwrap_or(Window::WHOLE.from),
-        until: args.until.unwrap_or(Window::WHOLE.until),
+fn window(args: &ReportArgs) -> Result<TimeWindow, Failure> {
+    let window = TimeWindow {
+        from: args.from.unwrap_or(TimeWindow::WHOLE.from),
+        until: args.until.unwrap_or(TimeWindow::WHOLE.until),
     };
     if window.from >= window.until {
         return Err(Failure::usage(
             "--from is not before --until, so there is nothing to draw; give two times in s, the earlier with --from",
         ));
     }
-    let is_over_samples = matches!(args.of, Figure::ForceTime | Figure::ForceDepth);
-    if window != Window::WHOLE && !is_over_samples {
+    let is_over_samples = matches!(args.of, SessionFigure::ForceTime | SessionFigure::ForceDepth);
+    if window != TimeWindow::WHOLE && !is_over_samples {
         return Err(Failure::usage(
             "--from and --until are for force-time and force-depth; leave them out",
         ));

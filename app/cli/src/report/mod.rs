@@ -8,10 +8,10 @@ use super::arguments::{Choice, choice, parse_number};
 use super::new_file;
 use super::output::{Output, merged};
 use clap::Args;
-use palpate_analysis::edited;
+use palpate_analysis::edited_session;
 use palpate_analysis::fidelity::of_session;
-use palpate_analysis::report::dossier::{self, Figure, ReportError, Wanted};
-use palpate_analysis::report::figures::Align;
+use palpate_analysis::report::dossier::{self, ReportError, SessionFigure, SessionReading};
+use palpate_analysis::report::figures::TimeAlignment;
 use palpate_analysis::report::session::fidelity_text;
 use palpate_runner::base::FoundBase;
 use palpate_runner::wall_now;
@@ -28,13 +28,13 @@ pub struct ReportArgs {
     html: Option<PathBuf>,
     /// With --html, the event at which several sessions are aligned
     #[arg(long, value_parser = choice(&ALIGNMENTS), default_value = "ramp", requires = "html")]
-    align: Align,
+    align: TimeAlignment,
     /// Draw a figure of the session as a new SVG or PNG file
     #[arg(long, value_name = "FILE", conflicts_with = "check")]
     figure: Option<PathBuf>,
     /// With --figure, which one
     #[arg(long, value_parser = choice(&FIGURES), default_value = "force-time", requires = "figure")]
-    of: Figure,
+    of: SessionFigure,
     /// With --figure, draw from here on: s since the first sample
     #[arg(long, value_name = "S", value_parser = parse_number, requires = "figure", allow_negative_numbers = true)]
     from: Option<f64>,
@@ -49,14 +49,16 @@ pub struct ReportArgs {
     check: Option<PathBuf>,
 }
 
-const ALIGNMENTS: [Choice<Align>; 2] =
-    [("ramp", Align::Ramp, "Start of the ramp"), ("contact", Align::Contact, "Contact")];
+const ALIGNMENTS: [Choice<TimeAlignment>; 2] = [
+    ("ramp", TimeAlignment::Ramp, "Start of the ramp"),
+    ("contact", TimeAlignment::Contact, "Contact"),
+];
 
-const FIGURES: [Choice<Figure>; 4] = [
-    ("force-time", Figure::ForceTime, "Force over time"),
-    ("force-depth", Figure::ForceDepth, "Force over depth"),
-    ("residual", Figure::Residual, "The fit and its residuals"),
-    ("calibration", Figure::Calibration, "The calibration with its uncertainty"),
+const FIGURES: [Choice<SessionFigure>; 4] = [
+    ("force-time", SessionFigure::ForceTime, "Force over time"),
+    ("force-depth", SessionFigure::ForceDepth, "Force over depth"),
+    ("residual", SessionFigure::Residual, "The fit and its residuals"),
+    ("calibration", SessionFigure::Calibration, "The calibration with its uncertainty"),
 ];
 
 pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
@@ -86,7 +88,7 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn fidelity(session: &Path, output: &Output) -> Result<(), Failure> {
-    let edited = edited::open(session).map_err(super::source_failure)?;
+    let edited = edited_session::open(session).map_err(super::source_failure)?;
     let session = &edited.session;
     session.notes.iter().for_each(|note| output.note(note));
     let fidelity = of_session(session).map_err(super::source_failure)?;
@@ -114,12 +116,12 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
         return Err(Failure::usage("name the sessions that the page is about"));
     }
     new_file::check("page", Some(to))?;
-    let wanted: Vec<Wanted> = args
+    let wanted: Vec<SessionReading> = args
         .sessions
         .iter()
-        .map(|session| Wanted { session: session.clone(), analysis: args.analysis.clone() })
+        .map(|session| SessionReading { session: session.clone(), analysis: args.analysis.clone() })
         .collect();
-    let made_at = dossier::made(wall_now().into());
+    let made_at = dossier::creation_line(wall_now().into());
     let page = dossier::write(&wanted, args.align, &made_at, &output.count_bar(0));
     let page = page.map_err(|err| match err {
         ReportError::Source(path, err) => {

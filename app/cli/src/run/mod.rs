@@ -11,16 +11,16 @@ use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use super::terminal::on_ctrl_c;
 use clap::Args;
-use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
+use palpate_analysis::daily::{DAILY_CHECK, DAILY_CHECK_COMMAND, DailyCheckGate};
 use palpate_drivers::Rig;
-use palpate_model::about::About;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
+use palpate_model::metadata::SessionMetadata;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
 use palpate_runner::{
-    AfterStop, Answers, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
-    TimeScale, wall_now,
+    AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot,
+    SharedLeadSource, StartError, TimeScale, wall_now,
 };
 use palpate_sessions::library_folder;
 use report::{preview_text, report};
@@ -141,7 +141,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let labels = labels(options)?;
     if written.plan.name == DAILY_CHECK {
         output.note(&format!(
-            "this run does not count as the daily check; only '{HOW}' evaluates and saves one"
+            "this run does not count as the daily check; only '{DAILY_CHECK_COMMAND}' evaluates and saves one"
         ));
     }
     if !options.preview {
@@ -157,7 +157,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
 pub(super) struct RunLeader {
     pub command: &'static str,
     /// Gives a lead for every sample.
-    pub leader: Leader,
+    pub leader: SharedLeadSource,
     pub report: LeaderReport,
 }
 
@@ -168,15 +168,15 @@ pub(super) fn run_plan(
     plan: Plan,
     bench: OpenRig,
     options: &SessionArgs,
-    labels: Labels,
+    labels: SessionLabels,
     leader: Option<RunLeader>,
     output: &Output,
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let (answers, after_stop) = match bench.rig.is_virtual() {
-        true => (Answers::Confirm, AfterStop::Close),
-        false => (Answers::Operator, AfterStop::Ask),
+        true => (PromptResponder::Confirm, AfterStop::Close),
+        false => (PromptResponder::Operator, AfterStop::Ask),
     };
     let request = RunRequest {
         plan,
@@ -199,18 +199,18 @@ pub(super) fn run_plan(
             None => Ok(()),
         };
     }
-    if let Err(reason) = preview.verdict(options.acknowledge) {
+    if let Err(reason) = preview.check_start(options.acknowledge) {
         let hint =
             if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
     match &gate {
-        Gate::Acknowledge(reason) if !options.acknowledge => {
+        DailyCheckGate::Acknowledge(reason) if !options.acknowledge => {
             return Err(Failure::usage(format!(
                 "{reason}; or add --acknowledge to run anyway, which is recorded"
             )));
         }
-        Gate::Note(note) => output.note(note),
+        DailyCheckGate::Note(note) => output.note(note),
         _ => {}
     }
     preview.notes.iter().for_each(|note| output.note(note));
@@ -222,15 +222,16 @@ pub(super) fn run_plan(
 }
 
 /// Whether the daily check of the rig allows a plan.
-pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
+pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<DailyCheckGate, Failure> {
     let name = &bench.rig.description().name;
     gate_of(plan, name, bench.rig.is_virtual()).map_err(Failure::failed)
 }
 
 /// The same for a rig by its name.
-pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<Gate, String> {
+pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<DailyCheckGate, String> {
     let library = library_folder().ok();
-    Gate::of(plan, library.as_deref(), rig, is_virtual, wall_now()).map_err(|err| err.to_string())
+    DailyCheckGate::of(plan, library.as_deref(), rig, is_virtual, wall_now())
+        .map_err(|err| err.to_string())
 }
 
 /// Runs a request with progress; the snapshot is that of the ended run.
@@ -239,11 +240,11 @@ pub(super) fn execute(
     scale: TimeScale,
     request: RunRequest,
     output: &Output,
-) -> Result<Arc<Snapshot>, Failure> {
-    let has_operator = request.answers == Answers::Operator;
+) -> Result<Arc<RunnerSnapshot>, Failure> {
+    let has_operator = request.answers == PromptResponder::Operator;
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
-    let first = Request::Run(Box::new(request), reply);
+    let first = RunnerRequest::Run(Box::new(request), reply);
     let runner = Runner::start(rig, scale, Some(first), move || {
         // A full channel holds a wake-up already.
         let _ = wake.try_send(());
@@ -260,12 +261,12 @@ pub(super) fn execute(
     watch(&runner, &woken, prompts.transpose()?, output)
 }
 
-pub(super) fn labels(args: &SessionArgs) -> Result<Labels, Failure> {
-    let mut labels = Labels {
+pub(super) fn labels(args: &SessionArgs) -> Result<SessionLabels, Failure> {
+    let mut labels = SessionLabels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
         indenter: args.indenter.clone().unwrap_or_else(|| USUAL_INDENTER.to_owned()),
-        about: About::default(),
+        about: SessionMetadata::default(),
     };
     super::add_labels(&mut labels, &args.about)?;
     Ok(labels)
@@ -284,7 +285,7 @@ pub(super) fn stop_on_signals(runner: &Runner) -> Result<Arc<AtomicBool>, Failur
             0 => Operator::Stop,
             _ => Operator::Halt,
         };
-        let _ = requests.try_send(Request::Operator(choice));
+        let _ = requests.try_send(RunnerRequest::Operator(choice));
     })?;
     Ok(is_question_open)
 }
@@ -295,7 +296,7 @@ fn watch(
     woken: &Receiver<()>,
     mut prompts: Option<OperatorPrompts>,
     output: &Output,
-) -> Result<Arc<Snapshot>, Failure> {
+) -> Result<Arc<RunnerSnapshot>, Failure> {
     let bar = output.bar(1000);
     loop {
         let is_alive = woken.recv_timeout(Duration::from_millis(500)).is_ok();

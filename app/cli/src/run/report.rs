@@ -7,7 +7,7 @@ use palpate_analysis::report::text::parameter_lines;
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::preview::Preview;
 use palpate_runner::RunView;
-use palpate_sessions::recover::{Health, Patient, examine};
+use palpate_sessions::recover::{SessionExamination, SessionHealth, examine_session};
 
 pub(super) fn report(
     view: &RunView,
@@ -18,7 +18,7 @@ pub(super) fn report(
         return Err(Failure::failed("the run did not end"));
     };
     // After a failure of the disk, or interference by another program, only the file shows what is left.
-    let remains = view.log_error.as_ref().map(|_| examine(&view.folder));
+    let remains = view.log_error.as_ref().map(|_| examine_session(&view.folder));
     let samples = remains.as_ref().map_or(view.samples, |session| session.samples);
     let missing = view.samples.saturating_sub(samples);
     let (slave, slave_text) = leader.and_then(|leader| (leader.report)(output)).unzip();
@@ -33,8 +33,8 @@ pub(super) fn report(
         "contact_mm": view.contact.map(|contact| contact.position.0),
         "contact_std_error_mm": view.contact.map(|contact| contact.std_error_mm),
         "force_peak_n": view.force_peak.map(|force| force.0),
-        "verdict": view.verdict.as_ref().map(|(verdict, _)| verdict),
-        "verdict_reason": view.verdict.as_ref().map(|(_, reason)| reason),
+        "verdict": view.data_quality.as_ref().map(|(verdict, _)| verdict),
+        "verdict_reason": view.data_quality.as_ref().map(|(_, reason)| reason),
         "late_worst_s": view.lateness.map(|late| late.worst.0),
         "late_given_up_s": view.lateness.map(|late| late.given_up.0),
         "live": view.live,
@@ -54,7 +54,7 @@ pub(super) fn report(
     if let (Some(reason), Some(session)) = (&view.log_error, &remains) {
         return Err(Failure::failed(log_failure(reason, session, missing)));
     }
-    let no_verdict = view.verdict_error.as_ref().map(|reason| {
+    let no_verdict = view.data_quality_error.as_ref().map(|reason| {
         let folder = view.folder.display();
         format!("the recording is complete, but its verdict could not be saved: {reason}; set it with 'palpate verdict {folder}'")
     });
@@ -71,16 +71,18 @@ pub(super) fn report(
 }
 
 /// Missing samples of a session whose log is not as it was written, and the remedy.
-fn log_failure(reason: &str, session: &Patient, missing: u64) -> String {
+fn log_failure(reason: &str, session: &SessionExamination, missing: u64) -> String {
     let (folder, of) = (session.path.display(), session.samples + missing);
     let loss = match session.health {
-        Health::Healthy => format!("all {of} samples are present"),
-        Health::Interrupted => format!("the last {missing} of {of} samples are missing"),
+        SessionHealth::Healthy => format!("all {of} samples are present"),
+        SessionHealth::Interrupted => format!("the last {missing} of {of} samples are missing"),
         _ => format!("{missing} of {of} samples are missing: {}", session.findings.join("; ")),
     };
     let remedy = match session.health {
-        Health::Healthy => format!("check it with 'palpate doctor {folder}' before you use it"),
-        Health::Foreign | Health::Lost => "measure again".to_owned(),
+        SessionHealth::Healthy => {
+            format!("check it with 'palpate doctor {folder}' before you use it")
+        }
+        SessionHealth::Foreign | SessionHealth::Lost => "measure again".to_owned(),
         _ => format!("'palpate recover {folder}' keeps the intact part"),
     };
     format!("the session log is not as it was recorded: {reason}; {loss}; {remedy}")
@@ -101,7 +103,8 @@ fn run_text(view: &RunView, ending: &str, samples: u64, slave: Option<String>) -
     lines.extend(facts.map(|(name, mm, error)| format!("{name} {mm:.3} ± {error:.3} mm")));
     lines.extend(view.force_peak.map(|peak| format!("peak force {:.3} N", peak.0)));
     lines.extend(slave);
-    lines.extend(view.verdict.as_ref().map(|(verdict, reason)| format!("{verdict}: {reason}")));
+    lines
+        .extend(view.data_quality.as_ref().map(|(verdict, reason)| format!("{verdict}: {reason}")));
     if let Some(live) = &view.live {
         lines.push(format!(
             "live fit, statistical component only ('palpate fit {folder}' adds that of the calibration):"

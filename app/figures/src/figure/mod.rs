@@ -54,7 +54,7 @@ impl Ink {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Scale {
+pub enum AxisScale {
     /// Evenly.
     #[default]
     Linear,
@@ -65,7 +65,7 @@ pub enum Scale {
 /// A number at or below zero is drawn here on a logarithmic axis; nothing measured or computed is so small.
 const LEAST: f64 = 1e-18;
 
-impl Scale {
+impl AxisScale {
     /// Position of a number on an axis of this scale.
     #[must_use]
     pub fn place(self, value: f64) -> f64 {
@@ -78,16 +78,16 @@ impl Scale {
 
 /// One axis of a plot.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Axis {
+pub struct PlotAxis {
     pub name: String,
-    pub scale: Scale,
+    pub scale: AxisScale,
     /// Lowest and highest number drawn; without it, all points are.
     pub range: Option<[f64; 2]>,
     /// Numbers that are seen in any case.
-    pub seen: Vec<f64>,
+    pub visible_values: Vec<f64>,
 }
 
-impl Axis {
+impl PlotAxis {
     /// An even axis of this name.
     #[must_use]
     pub fn linear(name: &str) -> Self {
@@ -97,19 +97,19 @@ impl Axis {
     /// A logarithmic axis of this name.
     #[must_use]
     pub fn logarithmic(name: &str) -> Self {
-        Self { scale: Scale::Logarithmic, ..Self::linear(name) }
+        Self { scale: AxisScale::Logarithmic, ..Self::linear(name) }
     }
 
     /// From one number to another.
     #[must_use]
-    pub fn over(self, range: [f64; 2]) -> Self {
+    pub fn with_range(self, range: [f64; 2]) -> Self {
         Self { range: Some(range), ..self }
     }
 
     /// With these numbers seen in any case.
     #[must_use]
-    pub fn seeing(self, seen: &[f64]) -> Self {
-        Self { seen: seen.to_vec(), ..self }
+    pub fn with_visible_values(self, seen: &[f64]) -> Self {
+        Self { visible_values: seen.to_vec(), ..self }
     }
 }
 
@@ -117,7 +117,7 @@ impl Axis {
 const DASH: f64 = 5.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum SeriesShape {
     /// A line of this width in px.
     Line {
         width: f64,
@@ -130,7 +130,7 @@ pub enum Shape {
 
 /// Text at points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Labels {
+pub enum PointLabels {
     /// Nothing; the legend has the name.
     #[default]
     None,
@@ -142,61 +142,61 @@ pub enum Labels {
 
 /// Points that belong together.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub struct PlotSeries {
     /// Empty where no name is needed.
     pub name: String,
     pub ink: Ink,
     /// From 0 to 1.
     pub opacity: f64,
-    pub shape: Shape,
+    pub shape: SeriesShape,
     /// In order along the line.
     pub points: Vec<[f64; 2]>,
-    pub labels: Labels,
+    pub labels: PointLabels,
 }
 
-impl Series {
+impl PlotSeries {
     /// A whole line.
     #[must_use]
     pub fn line(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line { width, dash: 0.0 };
+        let shape = SeriesShape::Line { width, dash: 0.0 };
         Self::new(name, ink, shape, points)
     }
 
     /// A dashed line.
     #[must_use]
     pub fn dashed(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Line { width, dash: DASH };
+        let shape = SeriesShape::Line { width, dash: DASH };
         Self::new(name, ink, shape, points)
     }
 
     /// Filled dots.
     #[must_use]
     pub fn dots(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Dots { radius, is_filled: true };
+        let shape = SeriesShape::Dots { radius, is_filled: true };
         Self::new(name, ink, shape, points)
     }
 
     /// Rings.
     #[must_use]
     pub fn rings(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
-        let shape = Shape::Dots { radius, is_filled: false };
+        let shape = SeriesShape::Dots { radius, is_filled: false };
         Self::new(name, ink, shape, points)
     }
 
-    fn new(name: &str, ink: Ink, shape: Shape, points: Vec<[f64; 2]>) -> Self {
-        Self { name: name.to_owned(), ink, opacity: 1.0, shape, points, labels: Labels::None }
+    fn new(name: &str, ink: Ink, shape: SeriesShape, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.to_owned(), ink, opacity: 1.0, shape, points, labels: PointLabels::None }
     }
 
     /// With something written at its points.
     #[must_use]
-    pub fn labelled(self, labels: Labels) -> Self {
+    pub fn labelled(self, labels: PointLabels) -> Self {
         Self { labels, ..self }
     }
 }
 
 /// The area between two lines over the same abscissas.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Band {
+pub struct PlotBand {
     pub name: String,
     /// Its ink, drawn thinly.
     pub ink: Ink,
@@ -206,7 +206,7 @@ pub struct Band {
 
 /// A shaded stretch of the abscissa.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct PlotStretch {
     pub name: String,
     /// From and to.
     pub ends: [f64; 2],
@@ -216,7 +216,7 @@ pub struct Stretch {
 
 /// A value that is marked across the whole plot, along either axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Level {
+pub struct PlotLevel {
     /// Empty for a zero line.
     pub name: String,
     pub at: f64,
@@ -227,23 +227,23 @@ pub struct Level {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plot {
     pub title: String,
-    pub x: Axis,
+    pub x: PlotAxis,
     /// The upright one.
-    pub y: Axis,
+    pub y: PlotAxis,
     /// Shaded stretches, behind everything.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<PlotStretch>,
     /// Bands, behind the lines.
-    pub bands: Vec<Band>,
-    pub levels: Vec<Level>,
+    pub bands: Vec<PlotBand>,
+    pub levels: Vec<PlotLevel>,
     /// Marked places of the abscissa.
-    pub moments: Vec<Level>,
+    pub x_levels: Vec<PlotLevel>,
     /// Lines and dots, those in front last.
-    pub series: Vec<Series>,
+    pub series: Vec<PlotSeries>,
     /// A sentence in the plot, such as why there is nothing to see.
     pub remark: Option<String>,
 }
 
-impl Level {
+impl PlotLevel {
     /// Length of its dashes in px, 0 for a whole line.
     pub fn dash(&self) -> f64 {
         if self.is_dashed { DASH } else { 0.0 }
@@ -259,13 +259,13 @@ impl Level {
 impl Plot {
     /// An empty plot of two axes.
     #[must_use]
-    pub fn new(title: &str, x: Axis, y: Axis) -> Self {
+    pub fn new(title: &str, x: PlotAxis, y: PlotAxis) -> Self {
         Self { title: title.to_owned(), x, y, ..Self::default() }
     }
 
     /// With these lines and dots.
     #[must_use]
-    pub fn with(self, series: impl IntoIterator<Item = Series>) -> Self {
+    pub fn with(self, series: impl IntoIterator<Item = PlotSeries>) -> Self {
         Self { series: series.into_iter().collect(), ..self }
     }
 
@@ -278,7 +278,7 @@ impl Plot {
     /// Names and inks of what has no name next to it: series, then stretches, each name once.
     pub fn legend(&self) -> Vec<(&str, Ink)> {
         let series = self.series.iter();
-        let series = series.filter(|one| one.labels == Labels::None);
+        let series = series.filter(|one| one.labels == PointLabels::None);
         let series = series.map(|one| (one.name.as_str(), one.ink));
         let bands = self.bands.iter().map(|one| (one.name.as_str(), one.ink));
         let shaded = self.stretches.iter();
@@ -299,9 +299,9 @@ mod tests {
 
     #[test]
     fn a_legend_names_each_thing_once_and_nothing_that_has_its_name_beside_it() {
-        let line = |name: &str| Series::line(name, Ink::Series, 1.0, Vec::new());
+        let line = |name: &str| PlotSeries::line(name, Ink::Series, 1.0, Vec::new());
         let plot = Plot {
-            stretches: vec![Stretch {
+            stretches: vec![PlotStretch {
                 name: "flat".into(),
                 ends: [0.0, 1.0],
                 ink: Some(Ink::Line),
@@ -310,7 +310,7 @@ mod tests {
                 line("one"),
                 line(""),
                 line("one"),
-                line("two").labelled(Labels::AtEnd),
+                line("two").labelled(PointLabels::AtEnd),
             ])
         };
         assert_eq!(plot.legend(), [("one", Ink::Series), ("flat", Ink::Line)]);
@@ -318,8 +318,8 @@ mod tests {
 
     #[test]
     fn what_has_no_logarithm_is_drawn_as_the_least() {
-        assert_eq!(Scale::Logarithmic.place(1000.0), 3.0);
-        assert_eq!(Scale::Logarithmic.place(0.0), -18.0);
-        assert_eq!(Scale::Linear.place(-2.0), -2.0);
+        assert_eq!(AxisScale::Logarithmic.place(1000.0), 3.0);
+        assert_eq!(AxisScale::Logarithmic.place(0.0), -18.0);
+        assert_eq!(AxisScale::Linear.place(-2.0), -2.0);
     }
 }

@@ -1,8 +1,8 @@
 //! A plot drawn into a rectangle of a picture for a file.
 
 use super::labels::{label_position, spread_heights};
-use super::{Ink, Labels, Plot, Scale, Series, Shape, Stretch};
-use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
+use super::{AxisScale, Ink, Plot, PlotSeries, PlotStretch, PointLabels, SeriesShape};
+use crate::drawing::{Anchor, AxisColours, FONT, PlotPanel, Svg, TextStyle as TextInk};
 use crate::panel::range;
 use crate::tokens::LIGHT;
 
@@ -29,8 +29,8 @@ impl Plot {
             AxisNames::Both => self.x.name.as_str(),
             AxisNames::Upright => "",
         };
-        let look = Look { text: LIGHT.text_quiet, grid: LIGHT.line };
-        let scales = [self.x.scale, self.y.scale].map(|scale| scale == Scale::Logarithmic);
+        let look = AxisColours { text: LIGHT.text_quiet, grid: LIGHT.line };
+        let scales = [self.x.scale, self.y.scale].map(|scale| scale == AxisScale::Logarithmic);
         panel.scaled_axes(svg, [x_name, &self.y.name], scales, look);
         for band in &self.bands {
             let [lower, upper] = band.edges.each_ref().map(|edge| self.placed(&panel, edge));
@@ -49,7 +49,7 @@ impl Plot {
         }
     }
 
-    fn panel(&self, place: [f64; 4]) -> Panel {
+    fn panel(&self, place: [f64; 4]) -> PlotPanel {
         let points = self.series.iter().flat_map(|one| &one.points);
         let edges = self.bands.iter().flat_map(|band| band.edges.iter().flatten());
         let placed = points.chain(edges).map(|point| self.place(*point));
@@ -57,30 +57,30 @@ impl Plot {
             placed.filter(|point| point.iter().all(|value| value.is_finite())).collect();
         let [left, right] = match (self.x.range, self.x.scale) {
             (Some(range), scale) => range.map(|x| scale.place(x)),
-            (None, Scale::Logarithmic) => Panel::around_logarithms(place, &placed).x,
-            (None, Scale::Linear) => {
+            (None, AxisScale::Logarithmic) => PlotPanel::around_logarithms(place, &placed).x,
+            (None, AxisScale::Linear) => {
                 let ends = range(placed.iter().map(|point| point[0]));
                 ends.filter(|[low, high]| low < high).unwrap_or([0.0, 1.0])
             }
         };
         let levels = self.levels.iter().map(|level| level.at);
-        let seen = self.y.seen.iter().copied().chain(levels);
+        let seen = self.y.visible_values.iter().copied().chain(levels);
         let seen = seen.map(|y| [left, self.y.scale.place(y)]);
         let all: Vec<[f64; 2]> = placed.iter().copied().chain(seen).collect();
         let y = match (self.y.range, self.y.scale) {
             (Some(range), scale) => range.map(|y| scale.place(y)),
-            (None, Scale::Linear) => Panel::around(place, [left, right], &[&all]).y,
-            (None, Scale::Logarithmic) => Panel::around_logarithms(place, &all).y,
+            (None, AxisScale::Linear) => PlotPanel::around(place, [left, right], &[&all]).y,
+            (None, AxisScale::Logarithmic) => PlotPanel::around_logarithms(place, &all).y,
         };
-        Panel { place, x: [left, right], y }
+        PlotPanel { place, x: [left, right], y }
     }
 
-    fn placed(&self, panel: &Panel, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    fn placed(&self, panel: &PlotPanel, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let places = points.iter().map(|point| panel.at(self.place(*point)));
         places.collect()
     }
 
-    fn draw_stretch(&self, svg: &mut Svg, panel: &Panel, stretch: &Stretch) {
+    fn draw_stretch(&self, svg: &mut Svg, panel: &PlotPanel, stretch: &PlotStretch) {
         let [_, top, _, bottom] = panel.place;
         let ends = stretch.ends.map(|x| self.x.scale.place(x));
         if let Some(ink) = stretch.ink {
@@ -101,7 +101,7 @@ impl Plot {
         }
     }
 
-    fn draw_levels(&self, svg: &mut Svg, panel: &Panel) {
+    fn draw_levels(&self, svg: &mut Svg, panel: &PlotPanel) {
         let [left, top, right, bottom] = panel.place;
         for level in &self.levels {
             let [_, y] = panel.at([panel.x[0], self.y.scale.place(level.at)]);
@@ -115,24 +115,24 @@ impl Plot {
             };
             svg.text(at, TextInk::plain(ink).anchored(anchor), &level.name);
         }
-        for moment in &self.moments {
+        for moment in &self.x_levels {
             let [x, _] = panel.at([self.x.scale.place(moment.at), 0.0]);
             let ink = moment.ink.of(&LIGHT);
             svg.dashed_line(&[[x, top], [x, bottom]], ink, 1.2, moment.dash());
         }
     }
 
-    fn draw_series(&self, svg: &mut Svg, panel: &Panel, one: &Series) {
+    fn draw_series(&self, svg: &mut Svg, panel: &PlotPanel, one: &PlotSeries) {
         let ink = match one.opacity {
             1.0.. => one.ink.of(&LIGHT),
             faint => LIGHT.canvas.lerp_to_gamma(one.ink.of(&LIGHT), faint as f32),
         };
         let places = self.placed(panel, &one.points);
         match one.shape {
-            Shape::Line { width, dash } => {
+            SeriesShape::Line { width, dash } => {
                 svg.dashed_line(&places, ink, width, dash);
             }
-            Shape::Dots { radius, is_filled } => {
+            SeriesShape::Dots { radius, is_filled } => {
                 for at in places {
                     svg.dot(at, ink, radius);
                     if !is_filled {
@@ -143,10 +143,10 @@ impl Plot {
         }
     }
 
-    fn draw_names(&self, svg: &mut Svg, panel: &Panel) {
+    fn draw_names(&self, svg: &mut Svg, panel: &PlotPanel) {
         let [_, top, right, bottom] = panel.place;
         let text = TextInk::plain(LIGHT.text);
-        let named = self.series.iter().filter(|one| one.labels == Labels::AtEnd);
+        let named = self.series.iter().filter(|one| one.labels == PointLabels::AtEnd);
         let ends: Vec<(&str, [f64; 2])> = named
             .filter_map(|one| {
                 let last = one.points.last()?;
@@ -163,7 +163,7 @@ impl Plot {
         let points = self.placed(panel, &all.collect::<Vec<_>>());
         let mut labels: Vec<[f64; 2]> = Vec::new();
         for one in &self.series {
-            let Labels::Each(names) = &one.labels else {
+            let PointLabels::Each(names) = &one.labels else {
                 continue;
             };
             for (place, [name, _]) in self.placed(panel, &one.points).into_iter().zip(names) {
@@ -188,7 +188,7 @@ pub fn legend(svg: &mut Svg, [right, y]: [f64; 2], plot: &Plot) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Axis, Level};
+    use super::super::{PlotAxis, PlotLevel};
     use super::*;
 
     fn drawn(plot: &Plot) -> String {
@@ -199,12 +199,17 @@ mod tests {
 
     #[test]
     fn points_levels_and_names_stand_where_the_axes_say() {
-        let x = Axis::linear("x (mm)").over([0.0, 10.0]);
-        let y = Axis::linear("y (N)");
-        let line = Series::line("rises", Ink::Series, 1.0, vec![[0.0, 0.0], [10.0, 1.0]]);
+        let x = PlotAxis::linear("x (mm)").with_range([0.0, 10.0]);
+        let y = PlotAxis::linear("y (N)");
+        let line = PlotSeries::line("rises", Ink::Series, 1.0, vec![[0.0, 0.0], [10.0, 1.0]]);
         let plot = Plot {
-            levels: vec![Level { name: "most".into(), at: 1.0, ink: Ink::Limit, is_dashed: true }],
-            ..Plot::new("", x, y).with([line.labelled(Labels::AtEnd)])
+            levels: vec![PlotLevel {
+                name: "most".into(),
+                at: 1.0,
+                ink: Ink::Limit,
+                is_dashed: true,
+            }],
+            ..Plot::new("", x, y).with([line.labelled(PointLabels::AtEnd)])
         };
         let text = drawn(&plot);
         // A margin of a twentieth of the height lies above and below.
@@ -218,9 +223,10 @@ mod tests {
     #[test]
     fn a_logarithmic_axis_has_its_marks_at_powers_or_between_them() {
         let axes = |range| {
-            let x = Axis::logarithmic("x").over(range);
-            let line = Series::line("", Ink::Series, 1.0, vec![[range[0], 1.0], [range[1], 2.0]]);
-            drawn(&Plot::new("", x, Axis::linear("y")).with([line]))
+            let x = PlotAxis::logarithmic("x").with_range(range);
+            let line =
+                PlotSeries::line("", Ink::Series, 1.0, vec![[range[0], 1.0], [range[1], 2.0]]);
+            drawn(&Plot::new("", x, PlotAxis::linear("y")).with([line]))
         };
         let wide = axes([0.01, 1000.0]);
         assert!(

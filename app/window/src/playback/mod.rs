@@ -18,10 +18,10 @@ use crate::workers::player::PlayerThread;
 use eframe::egui::{
     Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, Visuals, vec2,
 };
-use palpate_analysis::opening::PlaybackRequest;
+use palpate_analysis::window_requests::PlaybackRequest;
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Seconds};
-use palpate_runner::Snapshot;
+use palpate_runner::RunnerSnapshot;
 use std::sync::Arc;
 use std::time::Duration;
 use transport::Transport;
@@ -39,7 +39,7 @@ pub fn run_playback(options: PlaybackRequest) -> Result<(), String> {
 
 pub struct PlaybackApp {
     thread: PlayerThread,
-    snapshot: Arc<Snapshot>,
+    snapshot: Arc<RunnerSnapshot>,
     end: Nanos,
     transport: Transport,
     name: String,
@@ -70,7 +70,7 @@ impl PlaybackApp {
         })
     }
 
-    pub fn snapshot(&self) -> &Arc<Snapshot> {
+    pub fn snapshot(&self) -> &Arc<RunnerSnapshot> {
         &self.snapshot
     }
 

@@ -4,7 +4,7 @@ use super::figure::{PlotLook, plot_ui};
 use crate::widgets::{heading_ui, quiet_ui};
 use eframe::egui::{Ui, vec2};
 pub use palpate_analysis::report::plan_picture::CourseLimits;
-use palpate_analysis::report::plan_picture::{EXPECTED, course};
+use palpate_analysis::report::plan_picture::{PLAN_CAPTION, course};
 use palpate_protocols::preview::OutlinePoint;
 
 /// Draws the curves in the space there is.
@@ -18,7 +18,7 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
         });
     }
     let words = format!(
-        "{EXPECTED}. A force of {} ends the run; the rig moves at up to {}.",
+        "{PLAN_CAPTION}. A force of {} ends the run; the rig moves at up to {}.",
         limits.force, limits.speed
     );
     quiet_ui(ui, words);

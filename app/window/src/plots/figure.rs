@@ -9,7 +9,9 @@ use egui_plot::{
     PlotUi, Points, Span, Text, VLine,
 };
 use palpate_figures::drawing::BAND_OPACITY;
-use palpate_figures::figure::{Axis, Ink, Labels, Plot, Scale, Series, Shape};
+use palpate_figures::figure::{
+    AxisScale, Ink, Plot, PlotAxis, PlotSeries, PointLabels, SeriesShape,
+};
 
 /// Opacity of a shaded stretch that has an ink of its own.
 const SHADE: f32 = 0.16;
@@ -57,7 +59,7 @@ pub fn plot_ui(ui: &mut Ui, id: &str, plot: &Plot, look: PlotLook<'_>) {
 
 /// The points of each series on the plot's axes.
 fn placed(plot: &Plot) -> Vec<Vec<PlotPoint>> {
-    let place = |one: &Series| one.points.iter().map(|at| plot.place(*at).into()).collect();
+    let place = |one: &PlotSeries| one.points.iter().map(|at| plot.place(*at).into()).collect();
     plot.series.iter().map(place).collect()
 }
 
@@ -85,7 +87,7 @@ fn show(
             }
             HoverPosition::Elsewhere { .. } => None,
         });
-    if plot.x.scale == Scale::Logarithmic {
+    if plot.x.scale == AxisScale::Logarithmic {
         drawn = drawn.x_grid_spacer(decades).x_axis_formatter(|mark, _| decade_text(mark));
     } else if let Some(steps) = look.steps[0] {
         drawn = drawn.x_grid_spacer(move |input| round_marks(input, steps));
@@ -93,7 +95,7 @@ fn show(
     if let Some(text) = look.x_text {
         drawn = drawn.x_axis_formatter(move |mark, _| text(mark.value));
     }
-    if plot.y.scale == Scale::Logarithmic {
+    if plot.y.scale == AxisScale::Logarithmic {
         drawn = drawn
             .y_grid_spacer(decades)
             .y_axis_formatter(|mark, _| decade_text(mark))
@@ -102,10 +104,10 @@ fn show(
     } else if let Some(steps) = look.steps[1] {
         drawn = drawn.y_grid_spacer(move |input| round_marks(input, steps));
     }
-    for &x in &plot.x.seen {
+    for &x in &plot.x.visible_values {
         drawn = drawn.include_x(plot.x.scale.place(x));
     }
-    for &y in &plot.y.seen {
+    for &y in &plot.y.visible_values {
         drawn = drawn.include_y(plot.y.scale.place(y));
     }
     if let Some(link) = look.link {
@@ -125,10 +127,10 @@ fn show(
 }
 
 /// The unit of an even axis, as it stands behind a number.
-fn unit(axis: &Axis) -> String {
+fn unit(axis: &PlotAxis) -> String {
     let unit = axis.name.rsplit_once(" (").and_then(|(_, rest)| rest.strip_suffix(')'));
     match (unit, axis.scale) {
-        (Some(unit), Scale::Linear) => format!(" {unit}"),
+        (Some(unit), AxisScale::Linear) => format!(" {unit}"),
         _ => String::new(),
     }
 }
@@ -156,9 +158,17 @@ pub fn patch_ui(ui: &mut Ui, ink: Ink, words: &str) {
 
 /// Draws what a loop did over time so high in points, live or computed, its names above: nothing along x has a name
 /// where another strip stands below.
-pub fn strip_ui(ui: &mut Ui, [x, y]: [&str; 2], curves: Vec<Series>, shown: [f64; 2], height: f32) {
+pub fn strip_ui(
+    ui: &mut Ui,
+    [x, y]: [&str; 2],
+    curves: Vec<PlotSeries>,
+    shown: [f64; 2],
+    height: f32,
+) {
     // What is at rest is a line at zero and no noise.
-    let plot = Plot::new("", Axis::linear(x), Axis::linear(y).seeing(&[0.0, 0.5])).with(curves);
+    let plot =
+        Plot::new("", PlotAxis::linear(x), PlotAxis::linear(y).with_visible_values(&[0.0, 0.5]))
+            .with(curves);
     legend_ui(ui, &[&plot]);
     ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
         plot_ui(ui, y, &plot, PlotLook { shown: Some(shown), ..PlotLook::default() });
@@ -168,7 +178,7 @@ pub fn strip_ui(ui: &mut Ui, [x, y]: [&str; 2], curves: Vec<Series>, shown: [f64
 /// The label of a point, shown under the pointer.
 fn label_at<'a>(plot: &'a Plot, points: &[Vec<PlotPoint>], at: &PlotPoint) -> Option<&'a str> {
     plot.series.iter().zip(points).find_map(|(one, points)| {
-        let Labels::Each(labels) = &one.labels else { return None };
+        let PointLabels::Each(labels) = &one.labels else { return None };
         let is_it = |point: &PlotPoint| point.x == at.x && point.y == at.y;
         points.iter().position(is_it).map(|index| labels[index][1].as_str())
     })
@@ -206,7 +216,7 @@ fn paint<'a>(
         let width = if level.name.is_empty() { 1.0 } else { 1.5 };
         plot_ui.hline(line.style(style_of(level.dash())).width(width).allow_hover(false));
         // At the left edge as it will be: the text's own place counts in the automatic bounds.
-        let left = plot.x.range.map(|[from, _]| from).or(plot.x.seen.first().copied());
+        let left = plot.x.range.map(|[from, _]| from).or(plot.x.visible_values.first().copied());
         if let Some(left) = left.filter(|_| !level.name.is_empty()) {
             let text = Text::new(
                 "level",
@@ -217,7 +227,7 @@ fn paint<'a>(
             plot_ui.text(text.allow_hover(false));
         }
     }
-    for moment in &plot.moments {
+    for moment in &plot.x_levels {
         let at = plot.x.scale.place(moment.at);
         let line = VLine::new(moment.name.as_str(), at).color(moment.ink.of(tokens));
         plot_ui.vline(line.style(style_of(moment.dash())).width(1.5).allow_hover(false));
@@ -239,7 +249,7 @@ fn style_of(dash: f64) -> LineStyle {
 
 fn paint_series<'a>(
     plot_ui: &mut PlotUi<'a>,
-    one: &'a Series,
+    one: &'a PlotSeries,
     points: &'a [PlotPoint],
     number: usize,
     tokens: &Tokens,
@@ -248,14 +258,14 @@ fn paint_series<'a>(
     let id = (one.name.as_str(), number);
     let points = PlotPoints::Borrowed(points);
     match one.shape {
-        Shape::Line { width, dash } => {
+        SeriesShape::Line { width, dash } => {
             // Bands of points that share a column would be drawn as wedges where there are few.
             let line = Line::new(one.name.as_str(), points).id(id).allow_band(false);
             plot_ui.line(line.color(ink).width(width as f32).style(style_of(dash)));
         }
-        Shape::Dots { radius, is_filled } => {
+        SeriesShape::Dots { radius, is_filled } => {
             let dots = Points::new(one.name.as_str(), points).id(id);
-            let is_hovered = one.labels != Labels::None || !one.name.is_empty();
+            let is_hovered = one.labels != PointLabels::None || !one.name.is_empty();
             plot_ui.points(
                 dots.radius(radius as f32).filled(is_filled).color(ink).allow_hover(is_hovered),
             );

@@ -3,7 +3,7 @@
 use super::figure::{PlotLook, legend_ui, patch_ui, plot_ui};
 use eframe::egui::{Ui, vec2};
 use palpate_analysis::margin::MarginPoint;
-use palpate_figures::figure::{Axis, Band, Ink, Level, Plot, Series, Stretch};
+use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries, PlotStretch};
 use palpate_haptics::margin::DepthBand;
 
 /// The device's damping is in the picture up to so many times the most that is needed; more would flatten the parts.
@@ -77,28 +77,28 @@ fn part(picture: &MarginPicture<'_>, [from, to]: [f64; 2]) -> Plot {
     let mut beneath: Vec<[f64; 2]> = points().map(|one| [one.depth, 0.0]).collect();
     // A body that needs none has a picture all the same.
     let seen = [0.0, if most > 0.0 { most } else { 1.0 }];
-    let damping = Axis::linear("damping needed (N s/m)").seeing(&seen);
-    let mut plot = Plot::new("", Axis::linear("depth (mm)"), damping);
+    let damping = PlotAxis::linear("damping needed (N s/m)").with_visible_values(&seen);
+    let mut plot = Plot::new("", PlotAxis::linear("depth (mm)"), damping);
     for (name, ink, of) in PARTS {
         let edge: Vec<[f64; 2]> = points().map(|one| [one.depth, of(one)]).collect();
-        plot.series.push(Series::line(name, ink, 1.0, edge.clone()));
+        plot.series.push(PlotSeries::line(name, ink, 1.0, edge.clone()));
         let edges = [std::mem::replace(&mut beneath, edge.clone()), edge];
-        plot.bands.push(Band { name: name.to_owned(), ink, edges });
+        plot.bands.push(PlotBand { name: name.to_owned(), ink, edges });
     }
     plot.stretches = picture
         .cycles
         .iter()
-        .map(|band| Stretch {
+        .map(|band| PlotStretch {
             name: "the model itself returns energy".to_owned(),
             ends: [band.from.0, band.to.0],
             ink: Some(Ink::Line),
         })
         .collect();
     if is_in_sight(picture.has, most) {
-        plot.levels.push(Level::plain(picture.has, Ink::Text));
+        plot.levels.push(PlotLevel::plain(picture.has, Ink::Text));
     }
     let now = picture.now.filter(|depth| (from..=to).contains(depth));
-    plot.moments.extend(now.map(|depth| Level::plain(depth, Ink::Quiet)));
+    plot.x_levels.extend(now.map(|depth| PlotLevel::plain(depth, Ink::Quiet)));
     plot
 }
 

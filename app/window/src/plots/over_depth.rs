@@ -8,8 +8,8 @@ use crate::workers::Job;
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions, Ui, vec2};
 use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, Points};
-use palpate_model::signal::polyline::{Coverage, Reducer};
-use palpate_model::signal::track::Track;
+use palpate_model::signal::polyline::{PixelCoverage, PolylineReducer};
+use palpate_model::signal::track::SignalTrack;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -23,7 +23,7 @@ const COLUMNS: [usize; 2] = [Quantity::Depth as usize, Quantity::Force as usize]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthLineKey {
     pub id: u64,
-    /// Changes with the samples.
+    /// CatalogChanges with the samples.
     pub version: u64,
     /// The first sample drawn and the one behind the last.
     pub rows: [usize; 2],
@@ -34,7 +34,7 @@ pub struct DepthLineKey {
 #[derive(Clone, Copy, Debug)]
 pub struct DepthLine<'a> {
     pub name: &'a str,
-    pub track: &'a Track,
+    pub track: &'a SignalTrack,
     pub key: DepthLineKey,
     /// Depth and force at the cursors A and B.
     pub cursors: [Option<[f64; 2]>; 2],
@@ -109,7 +109,7 @@ impl DepthLines {
         }
         self.is_cancelled = Arc::default();
         self.requested = Some(key.clone());
-        let tracks: Vec<Track> = lines.iter().map(|line| line.track.clone()).collect();
+        let tracks: Vec<SignalTrack> = lines.iter().map(|line| line.track.clone()).collect();
         let is_cancelled = Arc::clone(&self.is_cancelled);
         // Without a thread the lines stay as they are, and the next frame tries again.
         let search = move || reduce(key, &tracks, &is_cancelled);
@@ -194,7 +194,7 @@ impl DepthLines {
     }
 }
 
-fn reduce(key: Key, tracks: &[Track], is_cancelled: &AtomicBool) -> Option<DepthPicture> {
+fn reduce(key: Key, tracks: &[SignalTrack], is_cancelled: &AtomicBool) -> Option<DepthPicture> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
@@ -203,7 +203,7 @@ fn reduce(key: Key, tracks: &[Track], is_cancelled: &AtomicBool) -> Option<Depth
     let mut picture = None;
     // The first is in front, so it comes last into the picture.
     for (line, track) in key.lines.iter().zip(tracks).rev() {
-        let mut reducer = Reducer::new(width, height).with_points_max(points_max);
+        let mut reducer = PolylineReducer::new(width, height).with_points_max(points_max);
         let mut before = 0;
         for segment in track.segments() {
             if is_cancelled.load(Ordering::Relaxed) {
@@ -237,7 +237,7 @@ fn reduce(key: Key, tracks: &[Track], is_cancelled: &AtomicBool) -> Option<Depth
 }
 
 /// Lays what a line crosses over the picture.
-fn paint(picture: &mut Option<ColorImage>, coverage: &Coverage, color: Color32) {
+fn paint(picture: &mut Option<ColorImage>, coverage: &PixelCoverage, color: Color32) {
     let picture =
         picture.get_or_insert_with(|| ColorImage::filled(coverage.size, Color32::TRANSPARENT));
     // Pictures begin above.
@@ -252,19 +252,19 @@ fn paint(picture: &mut Option<ColorImage>, coverage: &Coverage, color: Color32) 
 mod tests {
     use super::*;
     use crate::theme::Tokens;
-    use palpate_model::signal::track::Segment;
+    use palpate_model::signal::track::TrackSegment;
 
     const KEY: [f64; 2] = [0.0, 100.0];
 
     /// Depth is the number of the sample, force the same from above, in segments of ten.
-    fn track() -> Track {
-        let mut track = Track::default();
+    fn track() -> SignalTrack {
+        let mut track = SignalTrack::default();
         for begin in [0, 10, 20] {
             let own = || (begin..begin + 10).map(|index| index as f32);
             let times = own().map(f64::from).collect();
             // Force is the first column.
             let columns = [own().map(|index| 90.0 - index).collect(), own().collect()];
-            track.push(Arc::new(Segment::new(times, &columns)));
+            track.push(Arc::new(TrackSegment::new(times, &columns)));
         }
         track
     }
@@ -298,7 +298,7 @@ mod tests {
         let (front, back) = (Tokens::of(false).series, Tokens::of(false).limit);
         let mut picture = None;
         // Two pixels wide and three high; what is given begins below.
-        let coverage = |pixels: [u8; 6]| Coverage { size: [2, 3], pixels: pixels.to_vec() };
+        let coverage = |pixels: [u8; 6]| PixelCoverage { size: [2, 3], pixels: pixels.to_vec() };
         paint(&mut picture, &coverage([255, 255, 0, 0, 0, 0]), back);
         paint(&mut picture, &coverage([255, 0, 0, 0, 0, 255]), front);
         let none = Color32::TRANSPARENT;

@@ -4,7 +4,7 @@ use super::figure::{PlacedPlot, PlotLook};
 use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
-use palpate_analysis::report::live::{Cycle, RunPlots, set_course};
+use palpate_analysis::report::live::{LiveCycle, RunPlots, set_course};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::Newtons;
@@ -21,7 +21,7 @@ pub struct PlotCache {
     force_time: PlacedPlot,
     force_depth: PlacedPlot,
     /// One for each repeat; empty where nothing is repeated.
-    cycles: Vec<Cycle>,
+    cycles: Vec<LiveCycle>,
     remark: Option<String>,
     /// Of the forces drawn; `None` where their calibration cannot tell.
     uncertainty: Option<ForceUncertainty>,
@@ -46,8 +46,8 @@ impl PlotCache {
             self.follow(&run.trace, if run.cycles > 1 { &run.cycle_starts } else { &[] });
         }
         set_course(&mut self.force_time.plot, run, force_max, self.is_from_ramp);
-        self.force_depth.plot.x.seen = vec![0.0, depth_mm];
-        self.force_depth.plot.y.seen = vec![0.0, 0.5];
+        self.force_depth.plot.x.visible_values = vec![0.0, depth_mm];
+        self.force_depth.plot.y.visible_values = vec![0.0, 0.5];
     }
 
     fn follow(&mut self, trace: &Arc<LiveTrace>, starts: &[(f64, u32)]) {
@@ -65,7 +65,7 @@ impl PlotCache {
 
     /// The repeats so far, oldest first; empty where nothing is repeated.
     #[must_use]
-    pub fn cycles(&self) -> &[Cycle] {
+    pub fn cycles(&self) -> &[LiveCycle] {
         &self.cycles
     }
 

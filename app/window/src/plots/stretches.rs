@@ -3,7 +3,7 @@
 
 use eframe::egui::Color32;
 use egui_plot::{Line, PlotPoint, PlotPoints};
-use palpate_model::signal::track::{Drawn, Track};
+use palpate_model::signal::track::{DrawStatistics, SignalTrack};
 use std::ops::Range;
 
 /// What the points of a line depend on.
@@ -15,7 +15,7 @@ pub struct LineWindow {
     pub pixels: f64,
     /// Time of the track at the axis' zero, in s.
     pub shift: f64,
-    /// Changes with the track.
+    /// CatalogChanges with the track.
     pub version: u64,
 }
 
@@ -26,13 +26,13 @@ pub struct Stretches {
     points: Vec<PlotPoint>,
     ranges: Vec<Range<usize>>,
     y: Option<[f64; 2]>,
-    drawn: Drawn,
+    drawn: DrawStatistics,
     found: u64,
 }
 
 impl Stretches {
     /// Finds the points again where something changed.
-    pub fn update(&mut self, track: &Track, column: usize, window: LineWindow) {
+    pub fn update(&mut self, track: &SignalTrack, column: usize, window: LineWindow) {
         if self.key.replace(window) == Some(window) {
             return;
         }
@@ -83,7 +83,7 @@ impl Stretches {
     }
 
     /// How much was drawn, and how far it is thinned.
-    pub fn drawn(&self) -> Drawn {
+    pub fn drawn(&self) -> DrawStatistics {
         self.drawn
     }
 }
@@ -91,7 +91,7 @@ impl Stretches {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::signal::track::Segment;
+    use palpate_model::signal::track::TrackSegment;
     use std::sync::Arc;
 
     #[test]
@@ -102,8 +102,8 @@ mod tests {
             3000 => 9.0,
             _ => 1.0,
         });
-        let mut track = Track::default();
-        track.push(Arc::new(Segment::new(times, &[values.collect()])));
+        let mut track = SignalTrack::default();
+        track.push(Arc::new(TrackSegment::new(times, &[values.collect()])));
         let mut stretches = Stretches::default();
         let mut window = LineWindow { window: [-1.0, 4.0], pixels: 100.0, shift: 1.0, version: 1 };
         for _ in 0..3 {

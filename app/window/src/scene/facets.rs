@@ -4,7 +4,7 @@ use super::camera::{Lens, ProjectedPoint, Vec3, dot};
 use eframe::egui::epaint::{Mesh, Vertex, WHITE_UV};
 use eframe::egui::{Color32, Pos2};
 use palpate_figures::tokens::{dimmed, viridis};
-use palpate_haptics::surface::{Grid, Heights, Node};
+use palpate_haptics::surface::{Grid, GridNode, Heights};
 
 /// Most cells along a side of the drawn surface; one with its lines drawn has half as many.
 pub const CELLS_MAX: usize = 128;
@@ -82,7 +82,7 @@ struct Lattice {
 }
 
 impl Lattice {
-    fn of(grid: &Grid, side_points: f32, tool: Option<Node>, has_lines: bool) -> Self {
+    fn of(grid: &Grid, side_points: f32, tool: Option<GridNode>, has_lines: bool) -> Self {
         let most = if has_lines { CELLS_MAX / 2 } else { CELLS_MAX };
         let seen = (side_points / CELL_POINTS).max(8.0) as usize;
         let tool = tool.unwrap_or_default();
@@ -90,8 +90,8 @@ impl Lattice {
         Self { columns: pick(grid.columns(), tool.column), rows: pick(grid.rows(), tool.row) }
     }
 
-    fn nodes(&self) -> impl Iterator<Item = Node> {
-        let node = |row: usize, column: usize| Node { column: column as u16, row: row as u16 };
+    fn nodes(&self) -> impl Iterator<Item = GridNode> {
+        let node = |row: usize, column: usize| GridNode { column: column as u16, row: row as u16 };
         let columns = &self.columns;
         self.rows.iter().flat_map(move |&row| columns.iter().map(move |&column| node(row, column)))
     }
@@ -106,7 +106,7 @@ pub fn facets(
     lens: &Lens,
     look: SurfaceStyle,
     side_points: f32,
-    tool: Option<Node>,
+    tool: Option<GridNode>,
 ) -> Facets {
     let grid = *now.grid();
     let lattice = Lattice::of(&grid, side_points, tool, look.lines.is_some());
@@ -199,7 +199,7 @@ mod tests {
         let by = 1.25_f64.sqrt();
         let wanted = AMBIENT + (1.0 - AMBIENT) * (0.5 * 0.4 + LIGHT[2]) / by;
         for (column, row) in [(0, 0), (4, 3), (8, 6)] {
-            let normal = heights.normal(Node { column, row });
+            let normal = heights.normal(GridNode { column, row });
             for (part, wanted) in normal.into_iter().zip([-0.5 / by, 0.0, 1.0 / by]) {
                 assert!((part - wanted).abs() < 1e-12);
             }
@@ -283,7 +283,7 @@ mod tests {
         let grid = Grid::new(1001, 1001, 0.1).unwrap();
         let rest = vec![0.0; grid.nodes()];
         let mut heights = rest.clone();
-        let tool = Node { column: 333, row: 501 };
+        let tool = GridNode { column: 333, row: 501 };
         heights[grid.index(tool)] = -3.0;
         let now = Heights::new(grid, &heights).unwrap();
         let lens = Camera::of(grid.extent()).lens(picture());

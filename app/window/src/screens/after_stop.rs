@@ -5,7 +5,7 @@ use crate::command::{Commands, UiCommand};
 use crate::shell::activity::is_planned;
 use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui, tokens_of};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
-use palpate_protocols::engine::Outcome;
+use palpate_protocols::engine::RunOutcome;
 use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
@@ -40,7 +40,7 @@ fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     }
 }
 
-fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
+fn outcome_ui(ui: &mut Ui, outcome: &RunOutcome) {
     let tokens = tokens_of(ui);
     let ink = if is_planned(outcome.ending) { tokens.text } else { tokens.alarm_text };
     let text = format!("{}: {}", outcome.ending, outcome.reason);
@@ -48,7 +48,7 @@ fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
 }
 
 fn log_ui(ui: &mut Ui, run: &RunView) {
-    let alarm = match (&run.log_error, &run.verdict_error) {
+    let alarm = match (&run.log_error, &run.data_quality_error) {
         (Some(reason), _) => Some(format!(
             "The session on disk differs from what was recorded: {reason}; run 'palpate doctor {}' to see what is missing",
             run.folder.display()

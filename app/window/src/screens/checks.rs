@@ -9,8 +9,8 @@ use crate::widgets::{
 use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, Ui, vec2};
-use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
-use palpate_analysis::report::live::deviations;
+use palpate_analysis::daily::{DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, past_checks};
+use palpate_analysis::report::live::deviation_plot;
 use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
@@ -36,7 +36,7 @@ const PLOT_SHARE: f32 = 0.6;
 /// Seconds in a day: the unit of the time axis.
 const DAY_S: f64 = 86_400.0;
 
-type Measured = fn(&PastCheck) -> Option<Deviation>;
+type Measured = fn(&PastCheck) -> Option<DailyCheckDeviation>;
 
 const PLOTS: [(&str, Measured); 2] = [
     ("Known weight: measured - expected (N)", |one| one.weight),
@@ -74,7 +74,7 @@ impl Screen for ChecksScreen {
         ui.add_space(8.0);
         work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);
         section_ui(ui, "New check");
-        quiet_ui(ui, format!("Run '{HOW}' on the command line."));
+        quiet_ui(ui, format!("Run '{DAILY_CHECK_COMMAND}' on the command line."));
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
@@ -83,7 +83,7 @@ impl Screen for ChecksScreen {
         if checks.is_empty() {
             heading_ui(ui, "No daily check of this rig yet");
             ui.label(format!(
-                "Run '{HOW}' once a day before the first specimen; this screen then shows the drift of zero and weight."
+                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows the drift of zero and weight."
             ));
             return;
         }
@@ -91,10 +91,10 @@ impl Screen for ChecksScreen {
         for (head, measured) in PLOTS {
             heading_ui(ui, head);
             ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-                let known: Vec<(f64, Deviation)> =
+                let known: Vec<(f64, DailyCheckDeviation)> =
                     checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
                 let look = PlotLook { x_text: Some(day_text), ..PlotLook::default() };
-                plot_ui(ui, head, &deviations(head, &known), look);
+                plot_ui(ui, head, &deviation_plot(head, &known), look);
             });
         }
         let columns = [
@@ -169,9 +169,12 @@ fn day_text(days: f64) -> String {
 
 fn row(past: &PastCheck) -> TableRow {
     let check = &past.check;
-    let force =
-        |one: Option<Deviation>| one.map_or("-".into(), |one| format!("{:+.4}", one.newtons));
-    let limit = |one: Option<Deviation>| one.map_or("-".into(), |one| format!("{:.4}", one.limit));
+    let force = |one: Option<DailyCheckDeviation>| {
+        one.map_or("-".into(), |one| format!("{:+.4}", one.newtons))
+    };
+    let limit = |one: Option<DailyCheckDeviation>| {
+        one.map_or("-".into(), |one| format!("{:.4}", one.limit))
+    };
     let sentences = check.parts.iter().map(|part| part.sentence.as_str());
     TableRow {
         cells: vec![

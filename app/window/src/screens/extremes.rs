@@ -9,7 +9,7 @@ use crate::workers::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{GroupSummary, summary};
-use palpate_rheology::extremes::{Extent, Row, Verdict};
+use palpate_rheology::extremes::{ExtremesExtent, ExtremesRow, ExtremesVerdict};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
@@ -18,32 +18,37 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     open: |_| Box::new(ExtremesScreen::default()),
 };
 
-const EXTENTS: [(Extent, &str); 2] =
-    [(Extent::Quick, "corners: seconds"), (Extent::Whole, "everything: minutes")];
+const EXTENTS: [(ExtremesExtent, &str); 2] =
+    [(ExtremesExtent::Quick, "corners: seconds"), (ExtremesExtent::Whole, "everything: minutes")];
 
 struct ExtremesResult {
-    rows: Vec<Row>,
+    rows: Vec<ExtremesRow>,
     groups: Vec<GroupSummary>,
 }
 
 pub struct ExtremesScreen {
-    extent: Extent,
+    extent: ExtremesExtent,
     /// All groups if none.
     group: Option<&'static str>,
     /// All verdicts if none.
-    verdict: Option<Verdict>,
+    verdict: Option<ExtremesVerdict>,
     task: BackgroundTask<ExtremesResult>,
 }
 
 impl Default for ExtremesScreen {
     fn default() -> Self {
-        Self { extent: Extent::Quick, group: None, verdict: None, task: BackgroundTask::default() }
+        Self {
+            extent: ExtremesExtent::Quick,
+            group: None,
+            verdict: None,
+            task: BackgroundTask::default(),
+        }
     }
 }
 
 impl ExtremesScreen {
     /// Rows found by the last test.
-    pub fn rows(&self) -> Option<&[Row]> {
+    pub fn rows(&self) -> Option<&[ExtremesRow]> {
         let found = self.task.answer()?.as_ref().ok()?;
         Some(&found.rows)
     }
@@ -66,7 +71,7 @@ impl Screen for ExtremesScreen {
             let groups = found.groups.iter().map(|one| (Some(one.group), one.group));
             let groups: Vec<_> = std::iter::once((None, "all groups")).chain(groups).collect();
             choice_ui(ui, "group", &mut self.group, &groups);
-            let verdicts = Verdict::ALL.iter().map(|one| (Some(*one), one.name()));
+            let verdicts = ExtremesVerdict::ALL.iter().map(|one| (Some(*one), one.name()));
             let verdicts: Vec<_> =
                 std::iter::once((None, "all verdicts")).chain(verdicts).collect();
             choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
@@ -115,7 +120,7 @@ impl Screen for ExtremesScreen {
             let counts: Vec<String> = facts
                 .counts
                 .iter()
-                .zip(Verdict::ALL)
+                .zip(ExtremesVerdict::ALL)
                 .filter(|(count, _)| **count > 0)
                 .map(|(count, verdict)| format!("{count} {}", verdict.name()))
                 .collect();
@@ -148,7 +153,7 @@ impl Screen for ExtremesScreen {
     }
 }
 
-fn table_row(row: &Row) -> TableRow {
+fn table_row(row: &ExtremesRow) -> TableRow {
     TableRow {
         cells: vec![
             row.subject.clone(),
@@ -159,9 +164,9 @@ fn table_row(row: &Row) -> TableRow {
             row.group.to_owned(),
         ],
         emphasis: match row.verdict {
-            Verdict::Wrong => Emphasis::Alarm,
-            Verdict::Right => Emphasis::Plain,
-            Verdict::Refused | Verdict::Flagged => Emphasis::Quiet,
+            ExtremesVerdict::Wrong => Emphasis::Alarm,
+            ExtremesVerdict::Right => Emphasis::Plain,
+            ExtremesVerdict::Refused | ExtremesVerdict::Flagged => Emphasis::Quiet,
         },
         hint: (!row.sentence.is_empty()).then(|| row.sentence.clone()),
     }

@@ -3,7 +3,7 @@
 use crate::widgets::{quiet_ui, tokens_of};
 use eframe::egui::{Align, Layout, Response, RichText, Ui, vec2};
 use palpate_analysis::report::text::{ParameterText, typeset};
-use palpate_model::estimate::{LiveEstimate, Parameter};
+use palpate_model::estimate::{FittedParameter, LiveEstimate};
 use palpate_model::rig::Phase;
 use palpate_runner::RunView;
 
@@ -77,7 +77,7 @@ fn row_ui(
     ui: &mut Ui,
     name: &str,
     unit: &str,
-    parameter: Option<&Parameter>,
+    parameter: Option<&FittedParameter>,
     reason: Option<&str>,
 ) {
     let tokens = tokens_of(ui);
@@ -110,12 +110,12 @@ pub(super) fn cell<R>(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui) -> 
     ui.allocate_ui_with_layout(vec2(width, 18.0), layout, content).inner
 }
 
-fn is_known(parameter: Option<&Parameter>) -> bool {
+fn is_known(parameter: Option<&FittedParameter>) -> bool {
     parameter.is_some_and(|parameter| parameter.is_fixed || parameter.std_error.is_some())
 }
 
 /// The words of a fit for what is known; live, what is not identified is not yet shown as a number.
-fn value_text(parameter: Option<&Parameter>) -> String {
+fn value_text(parameter: Option<&FittedParameter>) -> String {
     match parameter.filter(|_| is_known(parameter)) {
         Some(known) => ParameterText::of(known).value,
         None => "not yet".into(),
@@ -123,7 +123,7 @@ fn value_text(parameter: Option<&Parameter>) -> String {
 }
 
 /// Why something is not known yet, or never became known; `None` when all is known.
-fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
+fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
     let missing: Vec<&str> = SHOWN
         .iter()
         .map(|(name, _)| *name)
@@ -155,8 +155,8 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
 mod tests {
     use super::*;
 
-    fn parameter(name: &str, std_error: Option<f64>) -> Parameter {
-        Parameter {
+    fn parameter(name: &str, std_error: Option<f64>) -> FittedParameter {
+        FittedParameter {
             name: name.into(),
             value: 1.5,
             unit: "s".into(),
@@ -191,7 +191,7 @@ mod tests {
     fn the_remark_names_what_is_missing_and_why() {
         let early = remark(Phase::Contact, &[]).unwrap();
         assert!(early.contains("none known") && early.contains("not indented"));
-        let mut known: Vec<Parameter> =
+        let mut known: Vec<FittedParameter> =
             SHOWN.iter().map(|(name, _)| parameter(name, Some(0.1))).collect();
         assert_eq!(remark(Phase::Hold, &known), None);
         known[4].std_error = None;

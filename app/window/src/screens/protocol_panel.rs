@@ -11,7 +11,7 @@ use crate::widgets::{
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
-use palpate_protocols::file::{Kind, What};
+use palpate_protocols::file::{QuantityKind, ValueContent};
 
 /// What the panel needs from the run screen.
 pub struct ProtocolFacts<'a> {
@@ -75,7 +75,7 @@ fn head_ui(ui: &mut Ui, form: &ProtocolForm) {
 fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     let tokens = tokens_of(ui);
     let hint = field.hint();
-    if field.parameter.kind == Kind::Flag {
+    if field.parameter.kind == QuantityKind::Flag {
         let mut is_on = field.text == "true";
         let tick = tick_box(ui, &mut is_on, field.parameter.name.as_str());
         if tick.on_hover_text(hint).changed() {
@@ -83,7 +83,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
         }
         return;
     }
-    let is_wide = field.parameter.is_list || field.parameter.kind == Kind::Text;
+    let is_wide = field.parameter.is_list || field.parameter.kind == QuantityKind::Text;
     let is_focused = ui
         .horizontal(|ui| {
             let label = form_label(ui, &field.parameter.name).on_hover_text(&hint);
@@ -93,7 +93,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             } else {
                 input.desired_width(76.0).align(Align2::RIGHT_CENTER)
             };
-            let is_optional = field.parameter.default.what == What::None;
+            let is_optional = field.parameter.default.content == ValueContent::None;
             let input = ui.add(input.hint_text(if is_optional { "none" } else { "" }));
             let input = input.labelled_by(label.id).named(&field.parameter.name);
             let input = input.on_hover_text(&hint);

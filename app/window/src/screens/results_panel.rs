@@ -7,18 +7,18 @@ use crate::command::Commands;
 use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
 use crate::workers::fit::Refit;
 use eframe::egui::Ui;
-use palpate_analysis::report::live::Cycle;
+use palpate_analysis::report::live::LiveCycle;
 use palpate_protocols::engine::EndingKind;
-use palpate_runner::{RunView, Snapshot};
+use palpate_runner::{RunView, RunnerSnapshot};
 
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;
 
 pub fn results_ui(
     ui: &mut Ui,
-    snapshot: &Snapshot,
+    snapshot: &RunnerSnapshot,
     refit: Refit<'_>,
-    cycles: &[Cycle],
+    cycles: &[LiveCycle],
     commands: &mut Commands,
 ) {
     let run = snapshot.run.as_ref();
@@ -29,7 +29,7 @@ pub fn results_ui(
 }
 
 /// Draws what was found, without what can be done.
-pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, cycles: &[Cycle]) {
+pub fn findings_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, refit: Refit<'_>, cycles: &[LiveCycle]) {
     let run = snapshot.run.as_ref();
     match refit {
         Refit::Done(exact) => exact_ui(ui, &exact.report),
@@ -90,7 +90,7 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 }
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
-fn cycles_ui(ui: &mut Ui, cycles: &[Cycle]) {
+fn cycles_ui(ui: &mut Ui, cycles: &[LiveCycle]) {
     let Some(first) = cycles.first().and_then(|one| one.peak) else { return };
     section_ui(ui, "Peak of each cycle, change from the first");
     let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);

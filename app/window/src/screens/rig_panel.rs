@@ -7,11 +7,11 @@ use eframe::egui::{Button, RichText, Ui};
 use palpate_drivers::serial::PortInfo;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
-use palpate_runner::{RigView, Snapshot};
+use palpate_runner::{RigView, RunnerSnapshot};
 
 pub fn rig_ui(
     ui: &mut Ui,
-    snapshot: &Snapshot,
+    snapshot: &RunnerSnapshot,
     ports: &BackgroundTask<Vec<PortInfo>>,
     commands: &mut Commands,
 ) {

@@ -54,9 +54,9 @@ pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &m
 pub fn is_offered(view: RunPane, run: Option<&RunView>) -> bool {
     match view {
         RunPane::Choose | RunPane::Course | RunPane::Measured => true,
-        RunPane::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
+        RunPane::Weighing => run.is_some_and(|run| !run.planned_weights.is_empty()),
         RunPane::Approach => {
-            run.is_some_and(|run| run.phase == Phase::Contact || !run.touches.is_empty())
+            run.is_some_and(|run| run.phase == Phase::Contact || !run.contact_triggers.is_empty())
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::widgets::{alarm_ui, quiet_ui, reason_button, require, section_ui, tas
 use crate::workers::{BackgroundTask, Dialog, Job};
 use eframe::egui::{Context, Ui, vec2};
 use palpate_analysis::progress::Progress;
-use palpate_analysis::recorded::{Ended, Replayed, ended_words};
+use palpate_analysis::tick_replay::{FinishedRecording, ReplayResult, describe_finished};
 use std::path::{Path, PathBuf};
 
 /// Draws the button that starts a loop, or the one that stops it while it runs.
@@ -28,7 +28,7 @@ pub(super) fn loop_button_ui(
 }
 
 /// Computes a recording again.
-pub(super) type Replay = fn(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String>;
+pub(super) type Replay = fn(&Path, &mut dyn FnMut(f64) -> bool) -> Result<ReplayResult, String>;
 
 #[derive(Default)]
 pub(super) struct TapePanel {
@@ -38,9 +38,9 @@ pub(super) struct TapePanel {
     /// The window to draw again when the recording in progress has ended.
     recording: Option<Context>,
     /// The end of a recording, which waits for the disk.
-    ending: Job<Ended>,
+    ending: Job<FinishedRecording>,
     message: Option<Result<String, String>>,
-    task: BackgroundTask<Replayed>,
+    task: BackgroundTask<ReplayResult>,
 }
 
 impl TapePanel {
@@ -67,7 +67,7 @@ impl TapePanel {
     }
 
     /// Ends a loop, and its recording on a thread: a stop never waits for the disk.
-    pub fn end(&mut self, work: impl FnOnce() -> Ended + Send + 'static) {
+    pub fn end(&mut self, work: impl FnOnce() -> FinishedRecording + Send + 'static) {
         let Some(ctx) = self.recording.clone() else {
             // Dropping it ends the loop.
             drop(work);
@@ -78,10 +78,10 @@ impl TapePanel {
         }
     }
 
-    fn ended(&mut self, ended: Ended) {
+    fn ended(&mut self, ended: FinishedRecording) {
         if self.recording.take().is_some() {
             self.message = Some(match ended {
-                Some(ended) => ended.map(ended_words),
+                Some(ended) => ended.map(describe_finished),
                 None => Err("the loop failed, and its recording has no end".to_owned()),
             });
         }
@@ -127,7 +127,7 @@ impl TapePanel {
     }
 
     /// What was computed again last.
-    pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
+    pub fn replayed(&self) -> Option<&Result<ReplayResult, String>> {
         self.task.answer()
     }
 

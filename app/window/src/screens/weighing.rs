@@ -10,11 +10,11 @@ use crate::widgets::{
     Column, Emphasis, TableRow, heading_ui, reason_button, require, share_ui, table_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_analysis::report::live::weighing;
-use palpate_model::calibration::{Curve, SettlingNow, newtons_of};
+use palpate_analysis::report::live::weighing_plot;
+use palpate_model::calibration::{CalibrationCurve, SettleProgress, newtons_of};
 use palpate_model::units::Volts;
-use palpate_protocols::weighed::Weighed;
-use palpate_runner::{RunView, ToWeigh};
+use palpate_protocols::weight_readings::WeightReading;
+use palpate_runner::{PlannedWeight, RunView};
 
 /// Height of the table in points.
 const TABLE_HEIGHT: f32 = 250.0;
@@ -38,7 +38,7 @@ pub fn weighing_ui(
     });
     ui.add_space(4.0);
     let rows: Vec<TableRow> =
-        run.to_weigh.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
+        run.planned_weights.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
     let columns = [
         Column::numbers("pass", 34.0),
         Column::words("masses go", 66.0),
@@ -56,33 +56,35 @@ pub fn weighing_ui(
 }
 
 /// The reading that comes next or is under way.
-fn next_of(run: &RunView) -> Option<&ToWeigh> {
+fn next_of(run: &RunView) -> Option<&PlannedWeight> {
     let is_over = run.outcome.is_some();
-    let mut ahead = run.to_weigh.iter();
+    let mut ahead = run.planned_weights.iter();
     ahead.find(|one| !is_over && one.step_index >= run.step_index)
 }
 
 fn now_ui(
     ui: &mut Ui,
     run: &RunView,
-    next: Option<&ToWeigh>,
+    next: Option<&PlannedWeight>,
     signal: Option<Volts>,
-    curve: &Curve,
+    curve: &CalibrationCurve,
 ) {
     let tokens = tokens_of(ui);
     let place = match next {
         Some(next) => {
-            let done = run.weighed.len();
+            let done = run.weight_readings.len();
             let expected = curve.volts_from_newtons(newtons_of(next.mass_g));
             format!(
                 "Reading {} of {}: {} g in all, {:.4} expected",
                 done + 1,
-                run.to_weigh.len(),
+                run.planned_weights.len(),
                 next.mass_g,
                 expected
             )
         }
-        None => format!("{} of {} readings taken", run.weighed.len(), run.to_weigh.len()),
+        None => {
+            format!("{} of {} readings taken", run.weight_readings.len(), run.planned_weights.len())
+        }
     };
     heading_ui(ui, place);
     ui.horizontal(|ui| {
@@ -100,7 +102,7 @@ fn now_ui(
 }
 
 /// The stability indicator: how full the window is that must be steady, and what is not steady yet.
-fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
+fn steady_ui(ui: &mut Ui, settling: &SettleProgress) {
     ui.vertical(|ui| {
         ui.set_width(240.0);
         share_ui(ui, settling.filled);
@@ -109,7 +111,7 @@ fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
 }
 
 /// The same in words.
-fn steady_words(settling: &SettlingNow) -> String {
+fn steady_words(settling: &SettleProgress) -> String {
     let left = (settling.timeout.0 - settling.waited.0).max(0.0);
     match &settling.last {
         None => format!("watching for {:.1} s; {left:.0} s left", settling.waited.0),
@@ -126,8 +128,13 @@ fn steady_words(settling: &SettlingNow) -> String {
     }
 }
 
-fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> TableRow {
-    let taken = run.weighed.iter().find(|one| one.step_index == planned.step_index);
+fn row(
+    planned: &PlannedWeight,
+    run: &RunView,
+    next: Option<&PlannedWeight>,
+    curve: &CalibrationCurve,
+) -> TableRow {
+    let taken = run.weight_readings.iter().find(|one| one.step_index == planned.step_index);
     let is_next = next == Some(planned);
     let expected = curve.volts_from_newtons(newtons_of(planned.mass_g));
     let deviation = taken.map(|one| WeightDeviation::of(one, curve));
@@ -165,7 +172,7 @@ struct WeightDeviation {
 }
 
 impl WeightDeviation {
-    fn of(one: &Weighed, curve: &Curve) -> Self {
+    fn of(one: &WeightReading, curve: &CalibrationCurve) -> Self {
         let known = newtons_of(one.mass_g());
         Self {
             mv: (one.volts().0 - curve.volts_from_newtons(known).0) * 1e3,
@@ -177,7 +184,7 @@ impl WeightDeviation {
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
     let words = format!("Force by the calibration in use ({}) - weight", bench.calibration.name);
     ui.label(RichText::new(words).strong());
-    let plot = weighing(run, &bench.curve);
+    let plot = weighing_plot(run, &bench.curve);
     legend_ui(ui, &[&plot]);
     plot_ui(ui, "weighing residuals", &plot, PlotLook::default());
 }
@@ -185,12 +192,12 @@ fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::calibration::Steady;
+    use palpate_model::calibration::SteadySignal;
     use palpate_model::units::Seconds;
 
     #[test]
     fn the_indicator_says_what_is_missing() {
-        let mut settling = SettlingNow {
+        let mut settling = SettleProgress {
             waited: Seconds(1.2),
             timeout: Seconds(30.0),
             filled: 0.5,
@@ -199,7 +206,7 @@ mod tests {
             noise_max: Volts(0.005),
         };
         assert_eq!(steady_words(&settling), "watching for 1.2 s; 29 s left");
-        let mut steady = Steady {
+        let mut steady = SteadySignal {
             mean: Volts(1.3),
             noise: Volts(0.02),
             slope_v_per_s: 0.004,

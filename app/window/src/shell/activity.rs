@@ -3,7 +3,7 @@
 use crate::widgets::Glyph;
 use palpate_model::rig::AxisStatus;
 use palpate_protocols::engine::{EndingKind, PauseView};
-use palpate_runner::{RunView, Snapshot};
+use palpate_runner::{RunView, RunnerSnapshot};
 
 /// Urgency of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,13 +41,13 @@ pub enum Intent {
 
 /// The run in progress, if there is one.
 #[must_use]
-pub fn run_in_progress(snapshot: &Snapshot) -> Option<&RunView> {
+pub fn run_in_progress(snapshot: &RunnerSnapshot) -> Option<&RunView> {
     snapshot.run.as_ref().filter(|run| run.outcome.is_none())
 }
 
 /// Whether the axis moves or may begin to, in a run or without one.
 #[must_use]
-pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
+pub fn is_motion_possible(snapshot: &RunnerSnapshot) -> bool {
     // The last reading of a lost link is out of date, and must not keep the window open for ever.
     let is_axis_moving = snapshot
         .rig
@@ -58,7 +58,7 @@ pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
 }
 
 #[must_use]
-pub fn activity(snapshot: &Snapshot, intent: Intent) -> Activity {
+pub fn activity(snapshot: &RunnerSnapshot, intent: Intent) -> Activity {
     use palpate_model::rig::Phase;
     if snapshot.rig.link_error.is_some() {
         return Activity::new("LINK LOST", Glyph::Diamond, StateTone::Alarm);

@@ -4,7 +4,7 @@ use crate::command::{Commands, UiCommand};
 use crate::screens::{models, run, scene};
 use crate::workers::PathPurpose;
 use palpate_analysis::haptics_tape::is_tape;
-use palpate_sessions::ticks::TICKS;
+use palpate_sessions::ticks::TICKS_FILE;
 use std::path::{Path, PathBuf};
 
 /// Pushes a command for each dropped file or folder; `shown` is the screen in front.
@@ -14,7 +14,7 @@ pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
     let (tables, folders): (Vec<_>, Vec<_>) =
         others.into_iter().partition(|path| path.is_file() && !ends(path, "mcap"));
     let (recordings, sessions): (Vec<_>, Vec<_>) =
-        folders.into_iter().partition(|path| path.join(TICKS).is_file());
+        folders.into_iter().partition(|path| path.join(TICKS_FILE).is_file());
     match protocols.into_iter().next() {
         Some(path) if shown == scene::SCREEN.name => {
             commands.push(UiCommand::Chosen(PathPurpose::Scene, path));
@@ -99,7 +99,7 @@ mod tests {
         // Ticks of no known loop are refused on the screen of scenes.
         let ticks = at("ticks");
         std::fs::create_dir(&ticks).unwrap();
-        std::fs::write(ticks.join(TICKS), "").unwrap();
+        std::fs::write(ticks.join(TICKS_FILE), "").unwrap();
         assert_eq!(dropped(&[&ticks], "Run"), [UiCommand::ReplayScene(ticks)]);
     }
 }

@@ -3,7 +3,7 @@
 use crate::command::{Commands, UiCommand};
 use crate::widgets::{NamedControl, placeholder_ui, tokens_of};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
-use palpate_runner::{LogLine, Snapshot};
+use palpate_runner::{LogLine, RunnerSnapshot};
 
 /// The filter as typed.
 #[derive(Clone, Debug, Default)]
@@ -13,7 +13,7 @@ pub struct EventLog {
 
 impl EventLog {
     /// Draws the log in the space there is.
-    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+    pub fn ui(&mut self, ui: &mut Ui, snapshot: &RunnerSnapshot, commands: &mut Commands) {
         let events = snapshot.run.as_ref().map_or(&[][..], |run| run.events.as_slice());
         let shown: Vec<&LogLine> =
             events.iter().filter(|line| is_shown(line, &self.filter)).collect();

@@ -7,7 +7,7 @@ use crate::widgets::{badge_ui, quiet_ui, share_ui, tokens_of};
 use eframe::egui::{Align, Button, Context, Id, Label, Layout, RichText, Stroke, Ui, vec2};
 use palpate_figures::uncertain::clock;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_runner::{RunView, Snapshot};
+use palpate_runner::{RunView, RunnerSnapshot};
 
 /// Height of the bar's content in points.
 pub const HEIGHT: f32 = 52.0;
@@ -16,7 +16,7 @@ pub const HEIGHT: f32 = 52.0;
 const RUN_WIDTH: f32 = 226.0;
 
 /// Draws the bar. `specimen` is the one of the run in progress or of the form.
-pub fn top_bar_ui(ui: &mut Ui, snapshot: &Snapshot, activity: &Activity, specimen: &str) {
+pub fn top_bar_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, activity: &Activity, specimen: &str) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         badge_ui(ui, activity, vec2(146.0, HEIGHT));
@@ -107,7 +107,7 @@ fn run_line(run: &RunView) -> String {
 }
 
 /// Force, depth, position and velocity, right to left.
-pub fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
+pub fn numbers_ui(ui: &mut Ui, snapshot: &RunnerSnapshot) {
     let derived = run_in_progress(snapshot).map(|run| run.derived);
     let at_rest = snapshot.rig.reading.filter(|_| snapshot.rig.is_homed).map(|reading| {
         position_from_pulses(reading.pulses, snapshot.rig.description.mm_per_pulse).0

@@ -167,7 +167,7 @@ pub struct ModelChoice {
 
 impl Default for ModelChoice {
     fn default() -> Self {
-        let keys = families::all().iter().map(|one| one.key()).collect();
+        let keys = families::all_families().iter().map(|one| one.key()).collect();
         Self { keys, family: None, is_rejected_included: false }
     }
 }

@@ -3,10 +3,10 @@
 use super::text::{fact_ui, tokens_of};
 use eframe::egui::{Grid, RichText, Ui};
 use palpate_model::units::Seconds;
-use palpate_runner::haptics::timing::Kept;
+use palpate_runner::haptics::timing::LoopTiming;
 
 /// Draws overruns, and the percentiles of period, lateness and work.
-pub fn loop_times_ui(ui: &mut Ui, timing: &Kept) {
+pub fn loop_times_ui(ui: &mut Ui, timing: &LoopTiming) {
     let tokens = tokens_of(ui);
     fact_ui(ui, "overruns", format!("{}; {} ticks missed", timing.overruns, timing.missed));
     let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);

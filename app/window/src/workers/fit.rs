@@ -3,10 +3,10 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
-use palpate_analysis::fit::Recipe;
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::report::picture::fit_plots;
-use palpate_analysis::source::Wanted;
-use palpate_figures::figure::{Ink, Shape};
+use palpate_analysis::source::SourceSelection;
+use palpate_figures::figure::{Ink, SeriesShape};
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::RunView;
@@ -80,7 +80,7 @@ fn has_ramp(run: &RunView) -> bool {
 }
 
 fn fit_exactly(folder: &Path) -> Result<ExactFit, String> {
-    let recipe = Recipe::new(FitOptions::default(), Wanted::default());
+    let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
     let fitted = recipe.fit(folder).map_err(|err| err.to_string())?;
     let report = fitted.result.map_err(|err| err.to_string())?;
     let [mut force, mut residual] =
@@ -88,7 +88,7 @@ fn fit_exactly(folder: &Path) -> Result<ExactFit, String> {
     force.series.retain(|one| one.ink == Ink::Limit);
     for one in &mut force.series {
         // Dashed, so that the measured force shows through where both agree.
-        one.shape = Shape::Line { width: 2.0, dash: 8.0 };
+        one.shape = SeriesShape::Line { width: 2.0, dash: 8.0 };
     }
     // It stands under the force, over the same time.
     residual.x.name.clear();

@@ -4,9 +4,9 @@ use super::trail::{TIMING_S, forget_old};
 use palpate_haptics::Flags;
 use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
-use palpate_runner::haptics::taped::{LedRecorder, TapedLed};
-use palpate_runner::haptics::timing::Kept;
-use palpate_runner::haptics::{Beat, Lead, Led, TrailPoint};
+use palpate_runner::haptics::device_recording::{GuidedDeviceRecorder, RecordedGuidedDevice};
+use palpate_runner::haptics::timing::LoopTiming;
+use palpate_runner::haptics::{GuidedDevice, HandTarget, RealTimeLoop, TrailPoint};
 use std::collections::VecDeque;
 
 /// Time in s for which a cause of less force stays on the screen.
@@ -14,12 +14,12 @@ const CAUSE_S: f64 = 0.3;
 
 /// A loop that runs or ran last.
 pub struct HapticLoop {
-    beat: Option<Beat<TapedLed>>,
-    lead: Lead,
+    beat: Option<RealTimeLoop<RecordedGuidedDevice>>,
+    lead: HandTarget,
     points_read: u64,
     trail: VecDeque<TrailPoint>,
     last: SimulationTick,
-    timing: Kept,
+    timing: LoopTiming,
     timing_read_at: f64,
     /// Ticks missed between the last two readings of the timing.
     missed: u64,
@@ -32,25 +32,25 @@ impl HapticLoop {
     pub fn start(
         settings: &SimulationSettings,
         speed: MmPerS,
-        recorder: Option<LedRecorder>,
+        recorder: Option<GuidedDeviceRecorder>,
     ) -> Result<Self, String> {
-        let device = Led::new(settings, speed).map_err(|err| err.to_string())?;
-        let (lead, first) = (device.lead(), device.live().clone());
+        let device = GuidedDevice::new(settings, speed).map_err(|err| err.to_string())?;
+        let (lead, first) = (device.hand_target(), device.view().clone());
         let last = first.last;
         let period = settings.system.law.period;
-        let device = TapedLed { led: device, recorder };
-        let beat = Beat::start(device, period, first)
+        let device = RecordedGuidedDevice { device: device, recorder };
+        let beat = RealTimeLoop::start(device, period, first)
             .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
         Ok(Self {
             lead,
             points_read: 0,
             trail: VecDeque::new(),
             last,
-            timing: beat.kept(),
+            timing: beat.timing(),
             timing_read_at: 0.0,
             missed: 0,
             rate_hz: period.hz(),
-            priority: beat.granted().to_string(),
+            priority: beat.granted_priority().to_string(),
             beat: Some(beat),
         })
     }
@@ -60,14 +60,14 @@ impl HapticLoop {
         let Some(beat) = &mut self.beat else {
             return Ok(());
         };
-        let live = beat.seen();
+        let live = beat.view();
         self.trail.extend(live.since(self.points_read).copied());
         self.points_read = live.count();
         self.last = live.last;
         let now = self.last.t.0;
         forget_old(&mut self.trail, now, |point| point.t);
         if now - self.timing_read_at >= TIMING_S {
-            let timing = beat.kept();
+            let timing = beat.timing();
             self.missed = timing.missed - self.timing.missed;
             self.timing = timing;
             self.timing_read_at = now;
@@ -84,20 +84,20 @@ impl HapticLoop {
     }
 
     /// Takes the thread out to be ended, as its recording waits for the disk.
-    pub fn stop(&mut self) -> Option<Beat<TapedLed>> {
+    pub fn stop(&mut self) -> Option<RealTimeLoop<RecordedGuidedDevice>> {
         let beat = self.beat.take()?;
-        self.timing = beat.kept();
+        self.timing = beat.timing();
         Some(beat)
     }
 
     /// Leads the hand to a place in mm.
     pub fn lead(&self, place_mm: f64) {
-        self.lead.to(place_mm);
+        self.lead.set(place_mm);
     }
 
     /// The target of the hand in mm.
     pub fn place(&self) -> f64 {
-        self.lead.place()
+        self.lead.position()
     }
 
     /// 250 points a second.
@@ -109,7 +109,7 @@ impl HapticLoop {
         &self.last
     }
 
-    pub fn kept(&self) -> &Kept {
+    pub fn kept(&self) -> &LoopTiming {
         &self.timing
     }
 

@@ -2,13 +2,13 @@
 
 use super::trail::{TIMING_S, forget_old};
 use palpate_haptics::LawSettings;
-use palpate_haptics::margin::{Device, Margin, Watch};
-use palpate_haptics::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
+use palpate_haptics::margin::{LoopDevice, Margin, MarginSettings};
+use palpate_haptics::scene::{HandLedScene, HandPose, Scene, ScenePath, SceneSettings, SceneTick};
 use palpate_haptics::surface::{Grid, Heights, MeshError};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_runner::haptics::SceneLoop;
 use palpate_runner::haptics::scene::SceneRecorder;
-use palpate_runner::haptics::timing::Kept;
+use palpate_runner::haptics::timing::LoopTiming;
 use std::collections::VecDeque;
 
 /// Ticks between two points of a computed path.
@@ -77,11 +77,11 @@ impl SceneInstant {
 #[must_use]
 pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
     let device = &settings.device;
-    let watch = Watch {
+    let watch = MarginSettings {
         body: LawSettings::of(settings.body, settings.period).body,
         scheme: settings.scheme,
         period: settings.period,
-        device: Device {
+        device: LoopDevice {
             damping: device.damping_n_s_per_mm,
             friction: Newtons(device.friction_n),
             count_mm: device.step_mm,
@@ -107,7 +107,7 @@ pub fn compute_path(
     path: ScenePath,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<ComputedPath, String> {
-    let mut led = LedScene::new(settings).map_err(|err| err.to_string())?;
+    let mut led = HandLedScene::new(settings).map_err(|err| err.to_string())?;
     let mut deepest = SceneInstant::of(&led.scene);
     let mut trail = Vec::new();
     let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
@@ -137,7 +137,7 @@ pub struct LiveScene {
     settings: SceneSettings,
     moment: SceneInstant,
     trail: VecDeque<ForcePoint>,
-    timing: Kept,
+    timing: LoopTiming,
     timing_read_at: f64,
     is_led: bool,
     priority: String,
@@ -160,13 +160,13 @@ impl LiveScene {
             timing: live.timing(),
             timing_read_at: 0.0,
             is_led: path.is_some(),
-            priority: live.granted().to_string(),
+            priority: live.granted_priority().to_string(),
             live: Some(live),
         })
     }
 
     /// Moves the hand and reads the newest tick. An error: the loop has ended by itself.
-    pub fn poll(&mut self, hand: Hand6) -> Result<(), String> {
+    pub fn poll(&mut self, hand: HandPose) -> Result<(), String> {
         let Some(live) = &mut self.live else {
             return Ok(());
         };
@@ -233,7 +233,7 @@ impl LiveScene {
         self.trail.iter()
     }
 
-    pub fn kept(&self) -> &Kept {
+    pub fn kept(&self) -> &LoopTiming {
         &self.timing
     }
 

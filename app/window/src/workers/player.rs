@@ -1,7 +1,7 @@
 //! A recorded session on a thread of its own: asked for a moment, it shows the run as it was then.
 
 use palpate_model::Nanos;
-use palpate_runner::Snapshot;
+use palpate_runner::RunnerSnapshot;
 use palpate_runner::replay::Player;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,7 +19,7 @@ pub struct PlayerThread {
 /// What both ends see.
 struct Desk {
     wanted: Mutex<Option<Nanos>>,
-    shown: Mutex<Arc<Snapshot>>,
+    shown: Mutex<Arc<RunnerSnapshot>>,
 }
 
 fn locked<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -50,7 +50,7 @@ impl PlayerThread {
     }
 
     /// The newest picture.
-    pub fn snapshot(&self) -> Arc<Snapshot> {
+    pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
         Arc::clone(&locked(&self.desk.shown))
     }
 }

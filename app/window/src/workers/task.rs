@@ -144,7 +144,7 @@ mod tests {
     fn stepwise(task: &mut BackgroundTask<usize>, of: usize, go: Receiver<()>) {
         task.start("test", &Context::default(), move |progress| {
             for done in 0..of {
-                if progress.tell(done, of, "a piece").is_break() {
+                if progress.report(done, of, "a piece").is_break() {
                     return Err("cancelled".into());
                 }
                 go.recv().map_err(|err| err.to_string())?;

@@ -55,7 +55,7 @@ const HANDLES: usize = 8;
 const BOOT: Nanos = Nanos(300_000_000);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GalilSettings {
+pub struct EmulatedGalilSettings {
     pub sim: SimSettings,
     pub model: GalilModel,
     /// Bits of the analog inputs' converter, 12 or 16; `None` without analog inputs.
@@ -69,7 +69,7 @@ pub struct GalilSettings {
     pub serial_number: u32,
 }
 
-impl Default for GalilSettings {
+impl Default for EmulatedGalilSettings {
     fn default() -> Self {
         Self {
             sim: SimSettings::default(),
@@ -115,7 +115,7 @@ enum Answer {
 /// The emulated controller.
 #[derive(Clone, Debug)]
 pub struct GalilEmulator {
-    settings: GalilSettings,
+    settings: EmulatedGalilSettings,
     plant: EmulatedPlant,
     clock: SampleClock,
     axes: Vec<GalilAxis>,
@@ -154,7 +154,7 @@ pub struct GalilEmulator {
 
 impl GalilEmulator {
     /// A controller just switched on at time zero.
-    pub fn new(settings: GalilSettings) -> Self {
+    pub fn new(settings: EmulatedGalilSettings) -> Self {
         let plant = EmulatedPlant::new(
             &settings.sim,
             SampleClock::new(Nanos::ZERO, settings.clock_ppm).period(),
@@ -170,7 +170,7 @@ impl GalilEmulator {
 
     /// The state after power-up or a reset, with what survives one. The slide is at zero counts.
     fn start(
-        settings: GalilSettings,
+        settings: EmulatedGalilSettings,
         plant: EmulatedPlant,
         burned: Option<Program>,
         clients: Vec<GalilClient>,

@@ -72,8 +72,8 @@ mod tests {
     const DT: f64 = 1.0 / 1024.0;
 
     /// The closed form, with 1 count for 1 mm.
-    fn closed(to: f64, speed: f64, rate: f64) -> rig::Profile {
-        rig::Profile::to_rest(Position(0.0), Position(to), MmPerS(speed), MmPerS2(rate))
+    fn closed(to: f64, speed: f64, rate: f64) -> rig::MotionProfile {
+        rig::MotionProfile::to_rest(Position(0.0), Position(to), MmPerS(speed), MmPerS2(rate))
     }
 
     #[test]

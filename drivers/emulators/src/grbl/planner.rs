@@ -201,7 +201,7 @@ fn dot(one: &Coordinates, other: &Coordinates) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::rig::Profile;
+    use palpate_model::rig::MotionProfile;
     use palpate_model::{MmPerS, MmPerS2, Position, Seconds};
 
     const LIMITS: [(f64, f64); AXES] = [(25.0, 50.0); AXES];
@@ -218,7 +218,8 @@ mod tests {
                 let to = 30.0 * f64::from(piece) / f64::from(pieces);
                 planner.push([to, 0.0, 0.0], 9.0, &LIMITS);
             }
-            let exact = Profile::to_rest(Position(0.0), Position(30.0), MmPerS(9.0), MmPerS2(50.0));
+            let exact =
+                MotionProfile::to_rest(Position(0.0), Position(30.0), MmPerS(9.0), MmPerS2(50.0));
             let points = run(&mut planner);
             for (at, point) in points.iter().enumerate() {
                 let place = exact.position(Seconds((at + 1) as f64 * STEP)).0;

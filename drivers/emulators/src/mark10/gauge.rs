@@ -5,7 +5,7 @@ use crate::cell::{CellLoad, EmulatedCell};
 use crate::wire::Outbox;
 use palpate_drivers::mark10::gauge::{FILTER_MAX, RATES};
 use palpate_drivers::mark10::protocol::ForceUnit;
-use palpate_drivers::sim::{Cause, Random};
+use palpate_drivers::sim::{Random, RandomStream};
 use palpate_model::Nanos;
 use std::collections::VecDeque;
 
@@ -106,7 +106,7 @@ impl EmulatedGauge {
     pub fn new(settings: EmulatedGaugeSettings) -> Self {
         Self {
             state: GaugeState::new(settings.unit),
-            noise: Random::new(settings.seed, Cause::Noise),
+            noise: Random::new(settings.seed, RandomStream::Noise),
             settings,
             command: Vec::new(),
             forces: VecDeque::from([0.0]),

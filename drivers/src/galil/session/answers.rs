@@ -1,7 +1,7 @@
-//! Answers: each belongs to the oldest question without one.
+//! PromptResponder: each belongs to the oldest question without one.
 
 use super::Outgoing;
-use super::{ExpectedReply, PendingStop, RESET, Session};
+use super::{ExpectedReply, GalilSession, PendingStop, RESET};
 use crate::galil::clock_alignment::ClockAlignment;
 use crate::galil::order::OrderStep;
 use crate::galil::protocol::{GalilReply, parse_error};
@@ -14,7 +14,7 @@ use palpate_model::rig::{Fault, RigCommand};
 /// After so many `?` to a stop, `AB 1` is sent in its place; after one more it counts as refused.
 const REFUSALS_MAX: u32 = 3;
 
-impl Session {
+impl GalilSession {
     pub(super) fn on_reply(&mut self, now: Nanos, reply: &GalilReply) {
         if self.resync.is_some() {
             return self.on_reply_while_resynchronising(now, reply);
@@ -40,7 +40,7 @@ impl Session {
             }
             ExpectedReply::Part => {
                 let settings = self.settings.clone();
-                // Answers to an order that a stop has ended are dropped.
+                // PromptResponder to an order that a stop has ended are dropped.
                 if let Some((_, order)) = &mut self.order {
                     let next = order.take(reply, &settings);
                     self.apply_step(now, next);
@@ -118,7 +118,7 @@ impl Session {
         if !recording.take_status(status, sent, marked) {
             return self.end_recording(now, sent, &status, marked == Some(true));
         }
-        self.stats.lost = recording.samples_lost;
+        self.stats.samples_lost = recording.samples_lost;
         self.timing.push(status.time as u64, self.pace.tick, sent, now);
         self.fetch(now);
     }

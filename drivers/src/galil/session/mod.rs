@@ -6,7 +6,7 @@ mod resync;
 mod writing;
 
 use super::clock_alignment::ClockAlignment;
-use super::connect::Connected;
+use super::connect::ConnectedGalil;
 use super::order::GalilOrder;
 use super::protocol::{GalilMessage, GalilParser, LINE_MAX, pack_lines};
 use super::recording::{self, ArrayRecording};
@@ -85,7 +85,7 @@ pub struct PollPace {
 }
 
 #[derive(Clone, Debug)]
-pub struct Session {
+pub struct GalilSession {
     settings: GalilSettings,
     pace: PollPace,
     has_watchdog: bool,
@@ -120,9 +120,9 @@ pub struct Session {
     stats: LinkStats,
 }
 
-impl Session {
+impl GalilSession {
     #[must_use]
-    pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
+    pub fn new(settings: GalilSettings, connected: &ConnectedGalil, now: Nanos) -> Self {
         let recording = connected.plan.map(ArrayRecording::new);
         let question = match &recording {
             Some(_) => recording::question(&settings),
@@ -185,8 +185,8 @@ impl Session {
     }
 }
 
-impl Dialogue for Session {
-    fn attended(&mut self, at: Nanos) {
+impl Dialogue for GalilSession {
+    fn note_attendance(&mut self, at: Nanos) {
         self.attended_at = at;
         self.abandoned_at = None;
     }
@@ -206,7 +206,7 @@ impl Dialogue for Session {
         }
     }
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
         if let Some(resync) = self.resync.as_mut().filter(|_| !bytes.is_empty()) {
             resync.last_byte = now;
         }

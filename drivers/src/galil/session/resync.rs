@@ -1,7 +1,7 @@
 //! Questions and answers that do not belong together any more: the line is left to fall silent, then a number that must
 //! come back shows where answers are.
 
-use super::{ExpectedReply, Outgoing, PendingStop, Session};
+use super::{ExpectedReply, GalilSession, Outgoing, PendingStop};
 use crate::galil::protocol::GalilReply;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
@@ -28,8 +28,8 @@ impl Resynchronisation {
     }
 }
 
-impl Session {
-    /// Answers and questions do not belong together any more: bytes were lost, doubled or spoilt.
+impl GalilSession {
+    /// PromptResponder and questions do not belong together any more: bytes were lost, doubled or spoilt.
     pub(super) fn resynchronise(&mut self, now: Nanos) {
         self.stats.resynchronised += 1;
         self.parser.clear();

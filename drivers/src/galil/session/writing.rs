@@ -1,6 +1,6 @@
 //! The order of writing: stops before everything, then the watchdog, increments of a sine, commands, questions.
 
-use super::{ExpectedReply, Outgoing, PendingStop, Session};
+use super::{ExpectedReply, GalilSession, Outgoing, PendingStop};
 use crate::galil::order::{GalilOrder, OrderStep};
 use crate::galil::recording::ArrayRecording;
 use crate::galil::watchdog;
@@ -10,7 +10,7 @@ use palpate_model::rig::RigCommand;
 
 const ABANDONED: &str = "no samples were taken for half a second, so the axis was stopped";
 
-impl Session {
+impl GalilSession {
     pub(super) fn with_sample(
         &self,
         commands: &[String],
@@ -160,7 +160,7 @@ impl Session {
             let text = format!("{}\r", commands.join(";"));
             return Some(Outgoing { text, expects });
         }
-        // Answers of an order that a stop has ended may still be on their way.
+        // PromptResponder of an order that a stop has ended may still be on their way.
         let has_answers_to_come = self.expected.iter().any(|(expects, _)| {
             matches!(expects, ExpectedReply::Part | ExpectedReply::RefusalReason)
         });

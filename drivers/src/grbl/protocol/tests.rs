@@ -3,13 +3,13 @@
 use super::*;
 use palpate_model::random::SplitMix;
 
-fn all(bytes: &[u8]) -> Vec<Incoming> {
-    let mut parser = Parser::default();
+fn all(bytes: &[u8]) -> Vec<GrblLine> {
+    let mut parser = GrblParser::default();
     bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
 }
 
 fn status(text: &str) -> GrblStatus {
-    let Some(Incoming::Status(status)) = all(text.as_bytes()).pop() else {
+    let Some(GrblLine::Status(status)) = all(text.as_bytes()).pop() else {
         panic!("{text}");
     };
     status
@@ -21,25 +21,25 @@ const TRANSCRIPT: &[u8] = b"\r\nGrbl 1.1h ['$' for help]\r\n[MSG:'$H'|'$X' to un
     $0=10\r\n$11=0.010\r\n$130=200.000\r\nok\r\n>G54G20:ok\r\n$N0=G54\r\n[PRB:0.000,0.000,0.000:0]\r\n\
     <Hold:0|MPos:0.000,-10.000,5.000|FS:0,0|Pn:XP>\r\n";
 
-fn meaning() -> Vec<Incoming> {
-    let message = |text: &str| Incoming::Message(text.to_owned());
+fn meaning() -> Vec<GrblLine> {
+    let message = |text: &str| GrblLine::Message(text.to_owned());
     vec![
-        Incoming::Hello("1.1h".into()),
+        GrblLine::Hello("1.1h".into()),
         message("MSG:'$H'|'$X' to unlock"),
         message("VER:v1.1d.20161014:Some string"),
         message("OPT:VL"),
-        Incoming::Ok,
-        Incoming::Refused(GrblCode::parse(false, "9")),
-        Incoming::Alarm(GrblCode::parse(true, "1")),
+        GrblLine::Ok,
+        GrblLine::Refused(GrblCode::parse(false, "9")),
+        GrblLine::Alarm(GrblCode::parse(true, "1")),
         message("MSG:Reset to continue"),
-        Incoming::Setting(0, 10.0),
-        Incoming::Setting(11, 0.01),
-        Incoming::Setting(130, 200.0),
-        Incoming::Ok,
-        Incoming::Other(">G54G20:ok".into()),
-        Incoming::Other("$N0=G54".into()),
+        GrblLine::Setting(0, 10.0),
+        GrblLine::Setting(11, 0.01),
+        GrblLine::Setting(130, 200.0),
+        GrblLine::Ok,
+        GrblLine::Other(">G54G20:ok".into()),
+        GrblLine::Other("$N0=G54".into()),
         message("PRB:0.000,0.000,0.000:0"),
-        Incoming::Status(GrblStatus {
+        GrblLine::Status(GrblStatus {
             state: GrblState::Hold(true),
             machine: Some(vec![0.0, -10.0, 5.0]),
             work: None,
@@ -51,16 +51,16 @@ fn meaning() -> Vec<Incoming> {
 #[test]
 fn welcome_of_grblhal_is_recognised() {
     let lines = all(b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n");
-    assert_eq!(lines, [Incoming::Hello("1.1f".into())]);
+    assert_eq!(lines, [GrblLine::Hello("1.1f".into())]);
 }
 
 #[test]
 fn a_transcript_is_understood_split_at_every_byte() {
     assert_eq!(all(TRANSCRIPT), meaning());
     for at in 0..TRANSCRIPT.len() {
-        let mut parser = Parser::default();
+        let mut parser = GrblParser::default();
         let (first, second) = TRANSCRIPT.split_at(at);
-        let mut got: Vec<Incoming> = first.iter().filter_map(|b| parser.take(*b)).collect();
+        let mut got: Vec<GrblLine> = first.iter().filter_map(|b| parser.take(*b)).collect();
         got.extend(second.iter().filter_map(|b| parser.take(*b)));
         assert_eq!(got, meaning(), "split at {at}");
     }
@@ -80,7 +80,7 @@ fn status_reports_have_fields_in_any_order() {
         ["<Idle>", "<|MPos:0,0,0>", "<Idle|MPos:0,x,0>", "<Idle|MPos:0,nan,0>", "<Idle|MPos:0,0,0"]
     {
         let got = all(format!("{bad}\r\n").as_bytes());
-        assert_eq!(got, [Incoming::Other(bad.into())]);
+        assert_eq!(got, [GrblLine::Other(bad.into())]);
     }
 }
 
@@ -89,10 +89,10 @@ fn lines_of_older_firmware_are_read() {
     let got =
         all(b"error: Bad number format\r\n$100=250.000 (x, step/mm)\r\nALARM: Hard limit\r\n");
     assert!(
-        matches!(&got[0], Incoming::Refused(refusal) if refusal.to_string().contains("Bad number"))
+        matches!(&got[0], GrblLine::Refused(refusal) if refusal.to_string().contains("Bad number"))
     );
-    assert_eq!(got[1], Incoming::Setting(100, 250.0));
-    assert!(matches!(&got[2], Incoming::Alarm(alarm) if alarm.to_string().contains("Hard limit")));
+    assert_eq!(got[1], GrblLine::Setting(100, 250.0));
+    assert!(matches!(&got[2], GrblLine::Alarm(alarm) if alarm.to_string().contains("Hard limit")));
 }
 
 #[test]
@@ -114,25 +114,25 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
             })
             .collect();
         let cut = random.below(length);
-        let mut parser = Parser::default();
-        let mut parts: Vec<Incoming> =
+        let mut parser = GrblParser::default();
+        let mut parts: Vec<GrblLine> =
             bytes[..cut].iter().filter_map(|b| parser.take(*b)).collect();
         parts.extend(bytes[cut..].iter().filter_map(|b| parser.take(*b)));
         assert!(parser.line.len() <= LINE_MAX);
         assert_eq!(parts, all(&bytes));
         for incoming in &parts {
-            if let Incoming::Refused(refusal) = incoming {
+            if let GrblLine::Refused(refusal) = incoming {
                 assert!(!refusal.to_string().is_empty());
             }
         }
     }
-    let mut parser = Parser::default();
+    let mut parser = GrblParser::default();
     for _ in 0..10 * LINE_MAX {
         assert_eq!(parser.take(b'x'), None);
     }
     assert!(parser.line.len() <= LINE_MAX);
-    assert_eq!(parser.take(b'\n'), Some(Incoming::Flood));
+    assert_eq!(parser.take(b'\n'), Some(GrblLine::Flood));
     assert_eq!(parser.take(b'o'), None);
     assert_eq!(parser.take(b'k'), None);
-    assert_eq!(parser.take(b'\n'), Some(Incoming::Ok));
+    assert_eq!(parser.take(b'\n'), Some(GrblLine::Ok));
 }

@@ -1,6 +1,6 @@
 //! Lines of the board and what follows from them.
 
-use super::Session;
+use super::GrblSession;
 use crate::grbl::error::GrblCode;
 use crate::grbl::protocol::{CYCLE_START, GrblState, GrblStatus};
 use crate::grbl::times::STOP_MAX;
@@ -10,7 +10,7 @@ use palpate_model::rig::{AxisStatus, Fault, RigCommand};
 
 const LOCKED: &str = "the board is locked; look at the axis, then open the rig again";
 
-impl Session {
+impl GrblSession {
     pub(super) fn on_ok(&mut self, now: Nanos) {
         let Some(written) = self.open.take() else {
             // An answer that came late, after its line was given up.

@@ -11,11 +11,11 @@ mod stopping;
 use super::feed_correction::FeedCorrection;
 use super::motion::JogMotion;
 use super::pins::EndSwitches;
-use super::protocol::{self, GrblState, Incoming, Parser, QUERY};
+use super::protocol::{self, GrblLine, GrblParser, GrblState, QUERY};
 use super::settings::{BoardParameters, GrblSettings};
 use super::times::{POLL, POLL_CLOSELY, REPORT_MAX, RESET_MAX, SILENCE_MAX};
-use crate::parts::Track;
 use crate::rig::RigEventBody;
+use crate::split_rig::AxisTrack;
 use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, TOO_MANY_COMMANDS, lock};
 use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, RigCommand};
@@ -26,7 +26,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 const FEED_MIN: f64 = 1.0;
 
 /// The track of an axis, shared with the load cell, which looks up its past.
-pub type SharedTrack = Arc<Mutex<Track>>;
+pub type SharedTrack = Arc<Mutex<AxisTrack>>;
 
 struct PendingReset {
     owed: Vec<(u64, RigCommand)>,
@@ -34,11 +34,11 @@ struct PendingReset {
     written: Nanos,
 }
 
-pub struct Session {
+pub struct GrblSession {
     settings: GrblSettings,
     facts: BoardParameters,
     track: SharedTrack,
-    parser: Parser,
+    parser: GrblParser,
     /// The jog whose `ok` is to come.
     open: Option<Nanos>,
     urgent: VecDeque<Vec<u8>>,
@@ -67,7 +67,7 @@ pub struct Session {
     stats: LinkStats,
 }
 
-impl Session {
+impl GrblSession {
     #[must_use]
     pub fn new(
         settings: GrblSettings,
@@ -81,7 +81,7 @@ impl Session {
             settings,
             facts,
             track,
-            parser: Parser::default(),
+            parser: GrblParser::default(),
             open: None,
             urgent: VecDeque::new(),
             orders: VecDeque::new(),
@@ -105,7 +105,7 @@ impl Session {
         }
     }
 
-    fn track(&self) -> MutexGuard<'_, Track> {
+    fn track(&self) -> MutexGuard<'_, AxisTrack> {
         lock(&self.track)
     }
 
@@ -240,8 +240,8 @@ impl Session {
     }
 }
 
-impl Dialogue for Session {
-    fn attended(&mut self, at: Nanos) {
+impl Dialogue for GrblSession {
+    fn note_attendance(&mut self, at: Nanos) {
         self.attended_at = at;
     }
 
@@ -259,17 +259,17 @@ impl Dialogue for Session {
         }
     }
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
         for byte in bytes {
             match self.parser.take(*byte) {
-                Some(Incoming::Ok) => self.on_ok(now),
-                Some(Incoming::Refused(refusal)) => self.on_refusal(now, &refusal),
-                Some(Incoming::Alarm(alarm)) => self.on_alarm(now, &alarm),
-                Some(Incoming::Hello(_)) => self.on_hello(now),
-                Some(Incoming::Status(status)) => self.on_status(now, &status),
+                Some(GrblLine::Ok) => self.on_ok(now),
+                Some(GrblLine::Refused(refusal)) => self.on_refusal(now, &refusal),
+                Some(GrblLine::Alarm(alarm)) => self.on_alarm(now, &alarm),
+                Some(GrblLine::Hello(_)) => self.on_hello(now),
+                Some(GrblLine::Status(status)) => self.on_status(now, &status),
                 // Settings and messages are in the log of raw bytes.
-                Some(Incoming::Setting(..) | Incoming::Message(_)) | None => {}
-                Some(Incoming::Other(_) | Incoming::Flood) => self.stats.resynchronised += 1,
+                Some(GrblLine::Setting(..) | GrblLine::Message(_)) | None => {}
+                Some(GrblLine::Other(_) | GrblLine::Flood) => self.stats.resynchronised += 1,
             }
         }
     }
@@ -323,7 +323,7 @@ impl Dialogue for Session {
     }
 }
 
-impl Drop for Session {
+impl Drop for GrblSession {
     /// When the thread ends, such as when the port is gone, jogs that the board has end in the track too.
     fn drop(&mut self) {
         self.settle_track(self.looked_at);

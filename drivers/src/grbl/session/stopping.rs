@@ -1,13 +1,13 @@
 //! Stops, by command and by the session itself, and what becomes of the motion under way.
 
-use super::{PendingReset, Session};
+use super::{GrblSession, PendingReset};
 use crate::grbl::protocol::{GrblState, JOG_CANCEL, RESET};
 use crate::grbl::times::{CANCEL_AGAIN, OK_MAX, PAUSE, RESET_AGAIN, SEGMENTS};
 use crate::wire::{ATTENDED_MAX, OVERTAKEN};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 
-impl Session {
+impl GrblSession {
     /// Refuses commands of a kind that wait, and the motion under way if it is not acknowledged yet.
     fn refuse_waiting(&mut self, now: Nanos, why: &str, is_refused: fn(&RigCommand) -> bool) {
         for (number, order) in std::mem::take(&mut self.orders) {

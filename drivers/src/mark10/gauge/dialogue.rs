@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn one_volt_is_one_newton() {
         let mut dialogue = dialogue();
-        dialogue.received(Nanos(5), b"4.285 N\r\n-0.015 N\r\n");
+        dialogue.handle_bytes(Nanos(5), b"4.285 N\r\n-0.015 N\r\n");
         let sample = dialogue.take_sample().unwrap();
         assert_eq!((sample.counts, sample.at), (4285, Nanos(5)));
         assert!((sample.volts.0 - 4.285).abs() < 1e-12);
@@ -130,7 +130,7 @@ mod tests {
             GaugeReading { number: FixedDecimal::parse("-18.78").unwrap(), unit: ForceUnit::Pound };
         let scale = GaugeScale::new(like, Newtons(500.0));
         let mut dialogue = GaugeDialogue::new(scale, 10.0, Nanos::ZERO);
-        dialogue.received(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");
+        dialogue.handle_bytes(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");
         let sample = dialogue.take_sample().unwrap();
         assert!((sample.volts.0 + 18.78 * 4.448_221_615).abs() < 1e-6);
         assert_eq!((dialogue.take_sample(), dialogue.garbled()), (None, 1));
@@ -140,7 +140,7 @@ mod tests {
     fn lines_with_other_units_or_digits_count_as_garbled() {
         let mut dialogue = dialogue();
         for line in ["4.285 mN", "4.28 N", "4285 N", "4.285N", "*10", "RS", "4.2\u{7f}5 N"] {
-            dialogue.received(Nanos(5), format!("{line}\r\n").as_bytes());
+            dialogue.handle_bytes(Nanos(5), format!("{line}\r\n").as_bytes());
         }
         assert_eq!((dialogue.take_sample(), dialogue.garbled()), (None, 7));
     }
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn beyond_its_range_it_reads_the_end_of_it() {
         let mut dialogue = dialogue();
-        dialogue.received(Nanos(1), b"-20.000 N\r\nOVER\r\nOVER\r\n27.500 N\r\n3.000 N\r\n");
+        dialogue.handle_bytes(Nanos(1), b"-20.000 N\r\nOVER\r\nOVER\r\n27.500 N\r\n3.000 N\r\n");
         let counts: Vec<i32> =
             std::iter::from_fn(|| dialogue.take_sample()).map(|sample| sample.counts).collect();
         assert_eq!(counts, [-20_000, -27_500, -27_500, 27_500, 3_000]);
@@ -160,7 +160,7 @@ mod tests {
     fn silent_gauge_counts_as_gone() {
         let mut dialogue = dialogue();
         let at = Nanos::from_millis(500);
-        dialogue.received(at, b"0.000 N\r\n");
+        dialogue.handle_bytes(at, b"0.000 N\r\n");
         assert_eq!(dialogue.is_dead(at + silence_max(1e3)), None);
         let later = at + silence_max(1e3) + Nanos(1);
         assert!(dialogue.is_dead(later).unwrap().contains("silent"));

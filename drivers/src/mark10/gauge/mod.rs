@@ -8,7 +8,7 @@ pub use dialogue::{GaugeDialogue, GaugeScale};
 pub(crate) use open::{ask_text, check, filters, set_up};
 
 use super::protocol::GaugeLine;
-use crate::devices::{DeviceKind, Role, find_line};
+use crate::devices::{DeviceKind, DeviceRole, find_line};
 use crate::rig_file::{Fields, gauge};
 use palpate_model::units::{Newtons, Volts};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "mark10",
     title: "a Mark-10 gauge",
     introduction: "force gauge that reads ",
-    role: Role::Cell {
+    role: DeviceRole::Cell {
         read: |fields: &mut Fields| Some(Arc::new(gauge(fields)?)),
         emulation: None,
     },

@@ -62,7 +62,7 @@ impl CellDevice for GaugeSettings {
             description,
             dialogue: Box::new(GaugeDialogue::new(scale, rate, console.now())),
             raw: console.into_raw(),
-            farewell: FAREWELL.to_vec(),
+            closing_bytes: FAREWELL.to_vec(),
         })
     }
 }

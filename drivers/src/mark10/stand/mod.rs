@@ -26,10 +26,10 @@ pub use session::{StandPace, StandSession};
 
 use super::gauge::GaugeSettings;
 use super::protocol::GaugeLine;
-use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
-use crate::devices::{DeviceKind, Role, find_line};
+use crate::device::{DeviceRig, OpenError, OpenedDevices, RigDevice};
+use crate::devices::{DeviceKind, DeviceRole, find_line};
 use crate::rig_file;
-use crate::wire::{HostClock, Link, LinkThread, Place};
+use crate::wire::{DeviceAddress, HostClock, Link, LinkThread};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "mark10-stand",
     title: "a Mark-10 stand",
     introduction: "force stand at ",
-    role: Role::Axis(rig_file::stand),
+    role: DeviceRole::Axis(rig_file::stand),
     // A travel alone may be that of any caliper.
     recognise: |lines| {
         let is_reading = |line: &str| matches!(GaugeLine::parse(line), GaugeLine::Reading(_));
@@ -83,12 +83,12 @@ pub type StandRig = DeviceRig<StandDevice>;
 
 #[derive(Clone)]
 pub struct StandDevice {
-    pub place: Place,
+    pub place: DeviceAddress,
     pub settings: StandSettings,
 }
 
 impl RigDevice for StandDevice {
-    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+    fn open(&mut self, clock: &HostClock) -> Result<OpenedDevices, OpenError> {
         open(self.place.open()?, &self.settings, clock)
     }
 }
@@ -98,12 +98,12 @@ pub fn open(
     mut link: Box<dyn Link>,
     settings: &StandSettings,
     clock: &HostClock,
-) -> Result<Opened, OpenError> {
+) -> Result<OpenedDevices, OpenError> {
     let device: Arc<str> = "stand".into();
     let connected = connect(link.as_mut(), clock, settings, &device)?;
     let session = StandSession::new(settings.clone(), &connected, clock());
     let farewell = protocol::STOP.into();
-    Ok(Opened {
+    Ok(OpenedDevices {
         lines: vec![LinkThread::start(link, session, clock, device, farewell)?],
         description: connected.description,
         // The gauge reads newtons, each of which counts as a volt.

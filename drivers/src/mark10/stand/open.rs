@@ -1,6 +1,6 @@
 //! Opening a stand: it is stopped, its travel is limited, its gauge is set up. Nothing moves.
 
-use super::protocol::{Pair, STOP, Status, ask_limit, number, set_limit, to_gauge};
+use super::protocol::{ForceTravelPair, STOP, StandStatus, ask_limit, number, set_limit, to_gauge};
 use super::session::{StandPace, TICK};
 use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, StandSettings};
 use crate::mark10::gauge::{self, GaugeScale};
@@ -78,7 +78,7 @@ pub fn connect(
 
 fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, DeviceError> {
     console.write("n")?;
-    let mut pair = Pair::default();
+    let mut pair = ForceTravelPair::default();
     let mut is_over = false;
     let mut is_inches = false;
     let found = console.find(ANSWER_MAX, |line| {
@@ -134,7 +134,7 @@ fn set_up_gauge(
 /// Whether it reports its state; if it does, it must keep to travel limits.
 fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     console.write("p")?;
-    let status = console.find(ANSWER_MAX, Status::parse)?;
+    let status = console.find(ANSWER_MAX, StandStatus::parse)?;
     if status.is_some_and(|status| status.is_limit_mode == Some(false)) {
         return Err(unfit(
             "it does not enter its travel limit mode; switch PC control on, cycling and auto return off",

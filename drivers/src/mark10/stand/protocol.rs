@@ -42,7 +42,7 @@ pub fn to_gauge(command: &str) -> String {
 
 /// The answer to `p`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Status {
+pub struct StandStatus {
     /// The crosshead goes up (`U`) or down (`D`); `S` is stopped.
     pub is_moving: bool,
     /// Whether it keeps to its travel limits (`L`); `None` when it does not report it.
@@ -51,7 +51,7 @@ pub struct Status {
     pub is_at_lower: bool,
 }
 
-impl Status {
+impl StandStatus {
     /// Reads the letters, whatever stands between them: crosshead, mode, limit switch, in the order of the guide.
     #[must_use]
     pub fn parse(line: &str) -> Option<Self> {
@@ -102,11 +102,11 @@ pub fn number(line: &str) -> Option<f64> {
 
 /// Reads the two lines of `n` out of lines that come one by one.
 #[derive(Clone, Debug, Default)]
-pub struct Pair {
+pub struct ForceTravelPair {
     force: Option<GaugeForce>,
 }
 
-impl Pair {
+impl ForceTravelPair {
     /// The next line: a force and the travel behind it make a pair. Others are thrown away, as is a force that another
     /// one follows: a gauge that still sends by itself.
     pub fn take(&mut self, line: &str) -> Option<(GaugeForce, i64)> {
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn status_is_read_from_its_letters() {
         let parsed = |line: &str| {
-            Status::parse(line)
+            StandStatus::parse(line)
                 .map(|s| (s.is_moving, s.is_limit_mode, s.is_at_upper, s.is_at_lower))
         };
         for line in ["SLUL", "S L UL", "S,L,UL"] {
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_pair_is_a_force_and_the_travel_behind_it() {
-        let mut pair = Pair::default();
+        let mut pair = ForceTravelPair::default();
         let found: Vec<i64> = [
             "99.0 N",
             "2.500 lbF",

@@ -30,7 +30,7 @@ impl Notes {
 }
 
 impl Dialogue for Notes {
-    fn attended(&mut self, _at: Nanos) {}
+    fn note_attendance(&mut self, _at: Nanos) {}
 
     fn command(&mut self, _now: Nanos, command: RigCommand) {
         self.note(format!("{command:?}"));
@@ -41,7 +41,7 @@ impl Dialogue for Notes {
         self.note(format!("overtaken {command:?}"));
     }
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
         for byte in bytes {
             if Some(*byte) == self.fails_at {
                 (self.fails)();
@@ -118,7 +118,7 @@ fn read(link: &mut impl Link, count: usize) -> Vec<u8> {
 
 #[test]
 fn stops_overtake_waiting_commands() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let (release, go_on) = sync_channel::<()>(1);
     let (waits, waiting) = sync_channel(1);
     let notes = Notes::default();
@@ -146,7 +146,7 @@ fn stops_overtake_waiting_commands() {
 
 #[test]
 fn stop_does_not_wait_for_a_reader_of_reports() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let mut line = start(here, Notes::default());
     let reports = Arc::clone(&line.reports);
     let reading = reports.0.lock().unwrap();
@@ -163,7 +163,7 @@ fn stop_does_not_wait_for_a_reader_of_reports() {
 
 #[test]
 fn events_are_reported_in_order_and_a_lost_link_last() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let line = start(here, Notes::default());
     there.write(b"ab").unwrap();
     let late = Nanos(u64::MAX);
@@ -180,7 +180,7 @@ fn events_are_reported_in_order_and_a_lost_link_last() {
 
 #[test]
 fn a_driver_that_fails_is_a_lost_link() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let notes = Notes { fails_at: Some(b'!'), ..Notes::default() };
     let line = start(here, notes);
     there.write(b"!").unwrap();
@@ -192,7 +192,7 @@ fn a_driver_that_fails_is_a_lost_link() {
 
 #[test]
 fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let mut line = start(here, Notes::default());
     let handle = line.halt_handle().unwrap();
     assert!(handle.halt(WAIT) && handle.written() == 1);
@@ -210,14 +210,14 @@ fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
 
 #[test]
 fn what_waits_for_a_farewell_comes_after_it() {
-    let (here, mut there) = super::super::pair();
+    let (here, mut there) = super::super::memory_link_pair();
     let (events, order) = sync_channel(2);
     let deferred = events.clone();
     let notes = Notes {
         fails_at: Some(b'!'),
         fails: Box::new(move || {
             let deferred = deferred.clone();
-            super::super::after_farewell(move || deferred.send("deferred").unwrap());
+            super::super::run_after_link_stop(move || deferred.send("deferred").unwrap());
         }),
         ..Notes::default()
     };

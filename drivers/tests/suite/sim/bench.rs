@@ -32,7 +32,7 @@ fn read(rig: &mut SimRig) -> f64 {
 fn weights_rest_on_the_cell_until_they_are_taken_off() {
     // As a trait object, as a runner holds its rig.
     let mut boxed: Box<dyn Rig> = Box::new(rig_with("100", "0"));
-    boxed.by_hand(HandAction::LoadCell { mass_g: 1000.0 });
+    boxed.apply_hand_action(HandAction::LoadCell { mass_g: 1000.0 });
     let volts = next_reading(boxed.as_mut()).1.volts.0;
     // 0.15 V/N and six times 0.02 N of noise.
     assert!((volts - 1.28 - 0.15 * 9.80665).abs() < 0.018, "{volts}");
@@ -44,7 +44,7 @@ fn weights_rest_on_the_cell_until_they_are_taken_off() {
         (-3.0, 6.276_256),
         (0.0, 0.0),
     ] {
-        rig.by_hand(HandAction::LoadCell { mass_g });
+        rig.apply_hand_action(HandAction::LoadCell { mass_g });
         // Four standard errors of 0.02 N over 1000 samples.
         let force = read(&mut rig);
         assert!((force - newtons).abs() < 2.6e-3, "{mass_g} g: {force}");
@@ -56,14 +56,14 @@ fn weights_rest_on_the_cell_until_they_are_taken_off() {
 fn specimens_are_numbered_and_number_zero_is_the_first() {
     let mut rig = rig_with("100", "0");
     let first = rig.truth();
-    rig.by_hand(HandAction::Mount { specimen: 3 });
+    rig.apply_hand_action(HandAction::Mount { specimen: 3 });
     let third = rig.truth();
     assert!(third.surface != first.surface && third.body != first.body);
     assert_eq!(third.base, first.base);
-    rig.by_hand(HandAction::Unmount);
+    rig.apply_hand_action(HandAction::Unmount);
     assert_eq!(rig.truth().surface, first.base);
     for (specimen, as_before) in [(0, first), (3, third)] {
-        rig.by_hand(HandAction::Mount { specimen });
+        rig.apply_hand_action(HandAction::Mount { specimen });
         assert_eq!((rig.truth().surface, rig.truth().body), (as_before.surface, as_before.body));
     }
 }
@@ -75,7 +75,7 @@ fn a_fresh_specimen_has_forgotten_the_last_one() {
     run_move(&mut rig, target, 6.0);
     assert!(rig.truth().force.0 > 0.1);
     run_move(&mut rig, 0, 6.0);
-    rig.by_hand(HandAction::Mount { specimen: 0 });
+    rig.apply_hand_action(HandAction::Mount { specimen: 0 });
     let again = run_move(&mut rig, target, 6.0).len();
     let (deep, mut fresh) = (rig.truth(), rig_with("100", "0"));
     run_move(&mut fresh, target, 6.0);
@@ -90,7 +90,7 @@ fn without_a_specimen_the_probe_meets_the_base_or_nothing() {
         let base = rig.truth().base;
         let first = rig.truth().surface;
         assert!((base.distance_from(first) - thickness.parse::<f64>().unwrap()).abs() < 1e-12);
-        rig.by_hand(HandAction::Unmount);
+        rig.apply_hand_action(HandAction::Unmount);
         let end = if meets { base.moved_by(0.02) } else { Position(150.0) };
         let target = pulses_at(&rig, end);
         run_move(&mut rig, target, 12.0);

@@ -1,6 +1,6 @@
 //! Bands of depth in which something is so, for bodies of any number of terms.
 
-use super::linear::Linear;
+use super::linear::LinearisedBody;
 use palpate_model::units::Depth;
 use palpate_rheology::families::POWER_MAX;
 use palpate_rheology::integrators::SeriesBody;
@@ -21,7 +21,7 @@ const DEPTHS: u32 = 4000;
 /// [`palpate_model::viscoelastic::admissibility::active_cycles`], within the stroke.
 #[must_use]
 pub fn active_cycles(body: &SeriesBody<POWER_MAX>, deepest: Depth) -> Vec<DepthBand> {
-    where_above(deepest, DEPTHS, |depth| Linear::of(body, depth).lag())
+    where_above(deepest, DEPTHS, |depth| LinearisedBody::of(body, depth).lag())
 }
 
 /// Depths to which a slow poke returns energy: `tau_sig X^2 / 2 < tau_eps g(X)`.

@@ -2,11 +2,11 @@
 
 use palpate_model::units::Depth;
 use palpate_rheology::families::POWER_MAX;
-use palpate_rheology::integrators::{Scheme, SeriesBody, Weights};
+use palpate_rheology::integrators::{RuleWeights, Scheme, SeriesBody};
 
 /// The body for small motions about a depth: `tau F' + F = stiffness x + damping x'`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Linear {
+pub struct LinearisedBody {
     /// `k0 = g'(x0)` in N/mm: stiffness of slow motions.
     pub stiffness: f64,
     /// `c0 = tau_sig x0` in N s/mm.
@@ -15,7 +15,7 @@ pub struct Linear {
     pub tau: f64,
 }
 
-impl Linear {
+impl LinearisedBody {
     /// Of a body at a depth.
     #[must_use]
     pub fn of(body: &SeriesBody<POWER_MAX>, depth: Depth) -> Self {
@@ -49,7 +49,7 @@ pub struct SampledStep {
 impl SampledStep {
     /// Of a body by a scheme, its speed the difference of two depths, as the integrators take it.
     #[must_use]
-    pub fn of(linear: &Linear, scheme: Scheme, tick: f64) -> Self {
+    pub fn of(linear: &LinearisedBody, scheme: Scheme, tick: f64) -> Self {
         if linear.tau <= 0.0 {
             let rate = linear.damping / tick;
             return Self {
@@ -60,7 +60,7 @@ impl SampledStep {
                 both: linear.stiffness,
             };
         }
-        let Weights { forcing, share } = scheme.weights(tick / linear.tau);
+        let RuleWeights { forcing, share } = scheme.weights(tick / linear.tau);
         let [left, middle, right] = forcing;
         let all = left + middle + right;
         let rate = linear.damping / tick;

@@ -14,7 +14,7 @@ pub mod criterion;
 mod linear;
 
 pub use bands::{DepthBand, active_cycles, active_pokes};
-pub use linear::{Linear, SampledStep};
+pub use linear::{LinearisedBody, SampledStep};
 
 use super::Period;
 use palpate_model::units::{Depth, MmPerS, Newtons};
@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 /// Properties of a device that the stability margin depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Device {
+pub struct LoopDevice {
     /// Its own damping in N s/mm; a voltage drive adds its motor's.
     pub damping: f64,
     pub friction: Newtons,
@@ -39,17 +39,17 @@ const DEPTHS: u32 = 1000;
 
 /// Everything the margin depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Watch {
+pub struct MarginSettings {
     pub body: SeriesBody<POWER_MAX>,
     pub scheme: Scheme,
     pub period: Period,
-    pub device: Device,
+    pub device: LoopDevice,
 }
 
 /// Why damping is needed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Cause {
+pub enum MarginCause {
     /// The body's own lag: it needs this much at any tick.
     #[default]
     Lag,
@@ -68,7 +68,7 @@ pub struct Margin {
     /// Damping the device has, in N s/mm.
     pub has: f64,
     /// Why so much.
-    pub cause: Cause,
+    pub cause: MarginCause,
     /// Friction needed against a buzz of a count or so.
     pub friction_needed: Newtons,
     pub friction: Newtons,
@@ -91,11 +91,11 @@ impl Margin {
     }
 }
 
-impl Watch {
+impl MarginSettings {
     /// The margin at a depth and speed; for every tick.
     pub fn at(&self, depth: Depth, speed: MmPerS) -> Margin {
         let tick = self.period.seconds().0;
-        let linear = Linear::of(&self.body, depth);
+        let linear = LinearisedBody::of(&self.body, depth);
         let sampled = SampledStep::of(&linear, self.scheme, tick);
         let delay = self.device.delay_ticks.max(0.0);
         let moving = self.moving(speed);
@@ -103,11 +103,11 @@ impl Watch {
         let sudden = sampled.fast() * (1.0 + 2.0 * delay);
         let lag = linear.lag();
         let cause = if sudden > slow {
-            Cause::Sudden
+            MarginCause::Sudden
         } else if lag > 0.5 * slow {
-            Cause::Lag
+            MarginCause::Lag
         } else {
-            Cause::Tick
+            MarginCause::Tick
         };
         let half_count = 0.5 * self.device.count_mm;
         Margin {
@@ -122,11 +122,11 @@ impl Watch {
 
     /// The same with the whole criterion instead of its two ends, which with a delay are up to a few times too
     /// careful. For before play: it looks at some hundreds of frequencies.
-    pub fn exactly_at(&self, depth: Depth, speed: MmPerS) -> Margin {
+    pub fn exact_margin_at(&self, depth: Depth, speed: MmPerS) -> Margin {
         if self.device.delay_ticks <= 0.0 {
             return self.at(depth, speed);
         }
-        let linear = Linear::of(&self.body, depth);
+        let linear = LinearisedBody::of(&self.body, depth);
         let sampled = SampledStep::of(&linear, self.scheme, self.period.seconds().0);
         let (needed, _) = criterion::damping_needed(&sampled, self.device.delay_ticks.max(0.0));
         Margin { needed: needed + self.moving(speed), ..self.at(depth, speed) }
@@ -144,22 +144,22 @@ impl Watch {
     /// Margins over a stroke, from the surface to `deepest`, at a speed.
     fn over(&self, deepest: Depth, speed: MmPerS) -> impl Iterator<Item = Margin> {
         let at = move |i: u32| Depth(deepest.0 * f64::from(i) / f64::from(DEPTHS));
-        (0..=DEPTHS).map(move |i| self.exactly_at(at(i), speed))
+        (0..=DEPTHS).map(move |i| self.exact_margin_at(at(i), speed))
     }
 
     /// The margin over a stroke to `deepest`, entered at up to `speed`, before the device is used.
-    pub fn before_play(&self, deepest: Depth, speed: MmPerS) -> Verdict {
+    pub fn assess_stroke(&self, deepest: Depth, speed: MmPerS) -> MarginReport {
         let all = || self.over(deepest, speed).chain(self.over(deepest, MmPerS(0.0)));
         let worst = |more: fn(&Margin, &Margin) -> bool| {
             all().fold(self.at(Depth(0.0), MmPerS(0.0)), |worst, one| {
                 if more(&one, &worst) { one } else { worst }
             })
         };
-        Verdict {
+        MarginReport {
             worst: worst(|one, worst| one.needed > worst.needed),
             loudest: worst(|one, worst| one.friction_needed > worst.friction_needed),
             bands: bands::where_above(deepest, DEPTHS, |depth| {
-                self.exactly_at(depth, speed).needed - self.device.damping
+                self.exact_margin_at(depth, speed).needed - self.device.damping
             }),
             cycles: active_cycles(&self.body, deepest),
             pokes: active_pokes(&self.body, deepest),
@@ -170,7 +170,7 @@ impl Watch {
 
 /// The margin before play.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
+pub struct MarginReport {
     /// The margin where most damping is needed.
     pub worst: Margin,
     /// The margin where most friction is needed.
@@ -185,7 +185,7 @@ pub struct Verdict {
     pub deepest: Depth,
 }
 
-impl Verdict {
+impl MarginReport {
     /// Damping there is over damping needed, at the worst depth; `None` where none is needed.
     pub fn ratio(&self) -> Option<f64> {
         self.worst.ratio()
@@ -236,9 +236,9 @@ impl Verdict {
             return "The body brings all the damping it needs.".into();
         };
         let why = match cause {
-            Cause::Lag => "the body's own lag asks for it, and a faster loop does not help",
-            Cause::Tick => "tick and delay ask for it, so a faster loop helps",
-            Cause::Sudden => "sudden moves ask for it, so a faster loop or less delay helps",
+            MarginCause::Lag => "the body's own lag asks for it, and a faster loop does not help",
+            MarginCause::Tick => "tick and delay ask for it, so a faster loop helps",
+            MarginCause::Sudden => "sudden moves ask for it, so a faster loop or less delay helps",
         };
         if self.worst.is_enough() {
             format!(

@@ -9,7 +9,7 @@ use crate::controller::{ControllerSettings, ControllerTick, PassivityController}
 use crate::flags::Flags;
 use crate::force::{ForceLaw, LawTick};
 use crate::guard::ForceGuard;
-use crate::margin::Watch;
+use crate::margin::MarginSettings;
 use crate::observer::PassivityObserver;
 use crate::rig::{EncoderCounter, Gear, GearRatio, ThermalState};
 use crate::torque::TorqueSettings;
@@ -57,7 +57,7 @@ pub struct MasterSlave {
     counter: EncoderCounter,
     gear: Gear,
     torque: TorqueSettings,
-    watch: Watch,
+    watch: MarginSettings,
     count_mm: f64,
     mm_per_pulse: f64,
     surface_mm: f64,

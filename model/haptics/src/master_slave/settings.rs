@@ -5,7 +5,7 @@ use crate::contact::{ContactSettings, ContactThresholdError};
 use crate::controller::ControllerSettings;
 use crate::force::{LawError, LawSettings};
 use crate::guard::GuardSettings;
-use crate::margin::{Device, Watch};
+use crate::margin::{LoopDevice, MarginSettings};
 use crate::observer::DELAY_MAX;
 use crate::rig::{Encoder, GearError, SlaveDrive};
 use crate::setting_error::{SettingError, SettingRange};
@@ -83,12 +83,12 @@ impl MasterSlaveSettings {
     }
 
     /// The margin of these settings, for before play and during it.
-    pub fn watch(&self) -> Watch {
-        Watch {
+    pub fn watch(&self) -> MarginSettings {
+        MarginSettings {
             body: self.law.body,
             scheme: self.law.scheme,
             period: self.law.period,
-            device: Device {
+            device: LoopDevice {
                 damping: self.damping + self.torque.damping(),
                 friction: self.torque.friction(),
                 count_mm: self.count_mm(),

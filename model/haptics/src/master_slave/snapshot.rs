@@ -2,7 +2,7 @@
 
 use crate::buzz::Buzz;
 use crate::flags::Flags;
-use crate::margin::{Margin, Watch};
+use crate::margin::{Margin, MarginSettings};
 use palpate_model::time::Nanos;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::Serialize;
@@ -51,7 +51,7 @@ pub struct MasterSlaveSnapshot {
 
 impl MasterSlaveSnapshot {
     /// Before the first tick.
-    pub(super) fn at_start(watch: &Watch, depth: Depth, winding_c: f64) -> Self {
+    pub(super) fn at_start(watch: &MarginSettings, depth: Depth, winding_c: f64) -> Self {
         let margin = watch.at(depth, MmPerS(0.0));
         Self { depth, winding_c, margin, ..Self::default() }
     }

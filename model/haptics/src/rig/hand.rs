@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// equilibrium point, Journal of Neuroscience 4 (1984) 2745-2754). The numbers of the grips are assumed: of the size
 /// that fingers have in one degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Hand {
+pub struct SimulatedHand {
     /// Mass in kg.
     pub mass_kg: f64,
     /// Spring to the intended path, in N/mm.
@@ -61,7 +61,7 @@ impl HandPath {
     }
 }
 
-impl Hand {
+impl SimulatedHand {
     /// No hand: the handle is let go.
     pub const NONE: Self =
         Self { mass_kg: 0.0, stiffness: 0.0, damping: 0.0, path: HandPath::Still { at: 0.0 } };

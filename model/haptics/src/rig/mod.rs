@@ -10,7 +10,7 @@ mod thermal;
 
 pub use encoder::{Encoder, EncoderCounter};
 pub use gear::{Gear, GearError, GearRatio, GearTick, SlaveDrive};
-pub use hand::{Hand, HandPath};
+pub use hand::{HandPath, SimulatedHand};
 pub use motor::{DriveInput, Motor, MotorState};
 pub use rack::{Pinion, Rack, RackEnergies, RackForces};
 pub use thermal::{Thermal, ThermalState};

@@ -1,6 +1,6 @@
 //! The rack on its slide, with the motor's rotor and whoever holds it, as one moving mass.
 
-use super::hand::Hand;
+use super::hand::SimulatedHand;
 use crate::inertia;
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +93,7 @@ impl Rack {
     }
 
     /// Moves for `dt` s with a hand on it; the hand's own mass is part of the rack's. Returns the hand's force, in N.
-    pub fn step(&mut self, forces: &RackForces, hand: &Hand, dt: f64) -> f64 {
+    pub fn step(&mut self, forces: &RackForces, hand: &SimulatedHand, dt: f64) -> f64 {
         let [place, speed] = forces.hand;
         let v0 = self.v;
         // m (v1 - v0) / dt = motor + k (place - x - dt v / 2) + c (speed - v) - b v - friction, v = (v0 + v1) / 2.
@@ -124,8 +124,12 @@ mod tests {
 
     #[test]
     fn a_free_swing_keeps_its_energy_and_period() {
-        let hand =
-            Hand { mass_kg: 0.0, stiffness: 0.5, damping: 0.0, path: HandPath::Still { at: 0.0 } };
+        let hand = SimulatedHand {
+            mass_kg: 0.0,
+            stiffness: 0.5,
+            damping: 0.0,
+            path: HandPath::Still { at: 0.0 },
+        };
         let mut rack = Rack::new(0.115, 0.0, [0.0; 2], 3.0);
         // 9.95 Hz; in steps of 20 us.
         let omega = (0.5 / inertia(0.115)).sqrt();
@@ -146,16 +150,16 @@ mod tests {
         let mut rack = Rack::new(0.1, 0.0, [0.8, 1.2], 0.0);
         let push = |motor: f64| RackForces { motor, hand: [0.0; 2] };
         for _ in 0..1000 {
-            rack.step(&push(1.19), &Hand::NONE, 1e-4);
+            rack.step(&push(1.19), &SimulatedHand::NONE, 1e-4);
         }
         assert_eq!((rack.x, rack.v), (0.0, 0.0));
-        rack.step(&push(1.21), &Hand::NONE, 1e-4);
+        rack.step(&push(1.21), &SimulatedHand::NONE, 1e-4);
         assert!(rack.v > 0.0);
         // Sliding at 100 mm/s it stops after v^2 m / (2 f) = 0.625 mm.
         let mut rack = Rack::new(0.1, 0.0, [0.8, 1.2], 0.0);
         rack.v = 100.0;
         for _ in 0..1000 {
-            rack.step(&push(0.0), &Hand::NONE, 1e-4);
+            rack.step(&push(0.0), &SimulatedHand::NONE, 1e-4);
         }
         assert_eq!(rack.v, 0.0);
         assert!((rack.x - 0.625).abs() < 0.005, "{rack:?}");

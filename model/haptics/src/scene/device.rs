@@ -5,7 +5,7 @@
 //! the sensor.
 
 use super::{LED_MAX, SceneSettings};
-use crate::rig::{Hand, HandPath, Rack, RackForces};
+use crate::rig::{HandPath, Rack, RackForces, SimulatedHand};
 use crate::{Period, SettingError, SettingRange};
 use serde::{Deserialize, Serialize};
 
@@ -15,14 +15,14 @@ const PARTS: u32 = 4;
 
 /// Pose of the stylus that a hand intends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Hand6 {
+pub struct HandPose {
     /// x, y and z in mm. The surface at rest is z = 0, tissue is below; x and y begin at the mesh's first node.
     pub at: [f64; 3],
     /// Yaw, pitch and roll in rad.
     pub turn: [f64; 3],
 }
 
-impl Hand6 {
+impl HandPose {
     pub(super) fn is_finite(&self) -> bool {
         self.at.iter().chain(&self.turn).all(|part| part.is_finite())
     }
@@ -67,7 +67,7 @@ impl Default for DeviceSettings {
     /// long and the reach are of SensAble's data sheet as remembered. Its damping, the step of turns (potentiometers read to 12 bits) and
     /// the grip are assumed.
     fn default() -> Self {
-        let grip = Hand::firm(HandPath::Still { at: 0.0 });
+        let grip = SimulatedHand::firm(HandPath::Still { at: 0.0 });
         Self {
             mass_kg: 0.045,
             damping_n_s_per_mm: 0.0005,
@@ -198,7 +198,7 @@ impl SimulatedDevice {
 
     /// Moves through `ticks` ticks, a thousand at most, with `force` (N) held on the stylus, led by a hand. A hand at no number
     /// stays where it was.
-    pub fn follow(&mut self, hand: Hand6, force: [f64; 3], ticks: u64) {
+    pub fn follow(&mut self, hand: HandPose, force: [f64; 3], ticks: u64) {
         let (force, _) = self.settings.limit_force(force);
         let target = if hand.is_finite() {
             self.turn = hand.turn;
@@ -220,7 +220,7 @@ impl SimulatedDevice {
             (self.settings.hand_speed_max_mm_per_s * self.tick_s / length(way).max(1e-12)).min(1.0);
         let speed = way.map(|part| part * share / self.tick_s);
         let dt = self.tick_s / f64::from(PARTS);
-        let grip = Hand {
+        let grip = SimulatedHand {
             mass_kg: self.settings.hand_mass_kg,
             stiffness: self.settings.hand_stiffness_n_per_mm,
             damping: self.settings.hand_damping_n_s_per_mm,

@@ -1,7 +1,7 @@
 //! A piece of tissue that is seen and felt: the [surface](crate::surface) that follows a stylus, the
 //! [force law](crate::ForceLaw) that answers it, and the device between them and a hand.
 //!
-//! One [`LedScene::tick`] is: the device moves under the force held; then [`Scene::feel`]: the contact point follows it on the
+//! One [`HandLedScene::tick`] is: the device moves under the force held; then [`Scene::feel`]: the contact point follows it on the
 //! surface at rest, so that the force does not see its own deformation; the law makes a force of depth; guards bound it along the
 //! normal; the surface follows the stylus. It allocates nothing, takes no lock, reads no clock and gives the same bits for the same
 //! hands.
@@ -12,14 +12,15 @@ mod no_force_reason;
 mod path;
 mod settings;
 
-pub use device::{DeviceSettings, Hand6, Pose, SimulatedDevice};
-pub use hand_led::LedScene;
-pub use no_force_reason::WhyNoForce;
+pub use device::{DeviceSettings, HandPose, Pose, SimulatedDevice};
+pub use hand_led::HandLedScene;
+pub use no_force_reason::NoForceReason;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
 
 use crate::surface::{
-    Contact, HeightField, Proxy, ProxyTouch, Recovery, Rect, Side, Surface, TouchState, dot,
+    ContactSide, GridRect, HeightField, Proxy, ProxyTouch, Surface, SurfaceContact,
+    SurfaceRecovery, TouchState, dot,
 };
 use crate::{
     BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
@@ -51,7 +52,7 @@ pub struct SceneTick {
     pub force: [f64; 3],
     /// Whether the device gives less than requested.
     pub is_saturated: bool,
-    pub why: WhyNoForce,
+    pub no_force_reason: NoForceReason,
     /// Damping added by the passivity controller in N s/mm.
     pub injected_damping: f64,
     /// Energy that the force along the normal has absorbed in N mm; below zero it has returned more.
@@ -86,7 +87,7 @@ pub struct Scene {
     /// Depth of the stylus below the surface at rest in mm; negative above it.
     below: f64,
     last: SceneTick,
-    dirty: Rect,
+    dirty: GridRect,
     moved: usize,
 }
 
@@ -95,7 +96,7 @@ impl Scene {
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
         let period = settings.period;
         let pose = SimulatedDevice::of(&settings)?.pose();
-        let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
+        let recovery = SurfaceRecovery::new(Seconds(settings.recovery_s), period.seconds())?;
         let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut);
         let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
@@ -116,7 +117,7 @@ impl Scene {
                 normal: [0.0, 0.0, 1.0],
                 ..SceneTick::default()
             },
-            dirty: Rect::EMPTY,
+            dirty: GridRect::EMPTY,
             moved: 0,
             settings,
         })
@@ -131,7 +132,7 @@ impl Scene {
     }
 
     /// Every node that may be elsewhere than at rest, now or before the last tick.
-    pub fn dirty(&self) -> Rect {
+    pub fn dirty(&self) -> GridRect {
         self.dirty
     }
 
@@ -151,7 +152,7 @@ impl Scene {
 
     /// The tick of a device that was sensed at `pose`, which [`SceneTick::force`] is for, `elapsed` ticks after the last: one,
     /// unless the loop was away. The law is led through what was missed; the surface stood still meanwhile.
-    pub fn feel(&mut self, pose: Pose, elapsed: u64) -> SceneTick {
+    pub fn render(&mut self, pose: Pose, elapsed: u64) -> SceneTick {
         let elapsed = elapsed.max(1);
         let tick = self.last.tick.saturating_add(elapsed);
         let touch = self.proxy.follow(self.surface.field().at_rest(), pose.at);
@@ -199,7 +200,7 @@ impl Scene {
         self.press(&touch);
         let is_saturated = is_saturated || flags.has(Flags::FORCE_MAX);
         let device = &self.settings.device;
-        let why = WhyNoForce::of(touch.state, flags, is_saturated, length(force), device);
+        let why = NoForceReason::of(touch.state, flags, is_saturated, length(force), device);
         let span = self.settings.period.seconds().0 * elapsed as f64;
         self.last = SceneTick {
             tick,
@@ -211,7 +212,7 @@ impl Scene {
             speed: (self.below - before) / span,
             force,
             is_saturated,
-            why,
+            no_force_reason: why,
             injected_damping,
             energy,
             is_buzzing: buzz.is_some(),
@@ -249,7 +250,7 @@ impl Scene {
     /// The surface follows the stylus from the contact point down.
     fn press(&mut self, touch: &ProxyTouch) {
         let [x, y, z] = touch.point;
-        let contact = Contact { x, y, z: z - touch.depth, side: Side::Push };
+        let contact = SurfaceContact { x, y, z: z - touch.depth, side: ContactSide::Push };
         let contacts = [contact];
         let contacts = if touch.is_contact() { &contacts[..] } else { &[] };
         let report = self.surface.tick(contacts);

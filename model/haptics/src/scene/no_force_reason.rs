@@ -9,7 +9,7 @@ palpate_model::named! {
     /// Why the force is zero or reduced; the first reason that applies.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "kebab-case")]
-    pub enum WhyNoForce {
+    pub enum NoForceReason {
         /// Nothing does.
         None = "the force is the model's",
         /// The stylus is above the surface.
@@ -34,7 +34,7 @@ palpate_model::named! {
     }
 }
 
-impl WhyNoForce {
+impl NoForceReason {
     pub(super) fn of(
         state: TouchState,
         flags: Flags,

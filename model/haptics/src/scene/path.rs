@@ -1,6 +1,6 @@
 //! Paths of a hand, for scenes without one.
 
-use super::device::Hand6;
+use super::device::HandPose;
 use super::settings::SceneSettings;
 use std::f64::consts::{PI, TAU};
 use std::str::FromStr;
@@ -41,7 +41,7 @@ impl ScenePath {
 
     /// Intended pose at `t_s` s; before and after, the scene's start.
     #[must_use]
-    pub fn at(self, t_s: f64, settings: &SceneSettings) -> Hand6 {
+    pub fn at(self, t_s: f64, settings: &SceneSettings) -> HandPose {
         let [x, y, high] = settings.start();
         let whole = self.contact_s();
         let t = t_s - WAY_S;
@@ -72,7 +72,7 @@ impl ScenePath {
                 )
             }
         };
-        Hand6 { at: [x + aside, y, above - depth], turn: [0.0, -0.5 + lean, lean] }
+        HandPose { at: [x + aside, y, above - depth], turn: [0.0, -0.5 + lean, lean] }
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::surface::{Cut, Grid, HeightField, MeshError, Method};
+use crate::surface::{Cut, Grid, HeightField, MeshError, SurfaceMethod};
 use crate::{ControllerSettings, GuardSettings, LawError, Period, SettingError};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -30,7 +30,7 @@ pub struct SceneSettings {
     /// From tick to tick.
     pub period: Period,
     pub scheme: Scheme,
-    pub method: Method,
+    pub method: SurfaceMethod,
     /// Bounds of a contact's influence on the surface.
     pub cut: Cut,
     /// Bounds of the force along the normal; those of the device come after.
@@ -55,7 +55,7 @@ impl Default for SceneSettings {
             device,
             period: Period::MILLISECOND,
             scheme: Scheme::Exact,
-            method: Method::Envelope,
+            method: SurfaceMethod::Envelope,
             cut: Cut::NONE,
             guard: GuardSettings {
                 force_max: Newtons(device.force_max_n),

@@ -7,9 +7,9 @@
 //! MaxShear moves just enough, once in a pass. The order matters: the first move that reaches a node must
 //! be the largest, and with one limit for all that is the one over the fewest links.
 
-use super::contact::{Cut, MoveCounts, Poke, Side};
+use super::contact::{ContactSide, Cut, MoveCounts, Poke};
 use super::envelope::height;
-use super::grid::{Grid, Node, Rect};
+use super::grid::{Grid, GridNode, GridRect};
 use super::mesh::HeightField;
 
 /// Storage of a pass, made once.
@@ -17,7 +17,7 @@ use super::mesh::HeightField;
 pub(super) struct Chain {
     /// Nodes in the order in which they moved. A node enters once, so it never overflows and what is
     /// still to process is its end.
-    queue: Box<[Node]>,
+    queue: Box<[GridNode]>,
     stamps: Stamps,
     moved: usize,
     /// Rows in which something moved.
@@ -72,7 +72,7 @@ impl Chain {
     pub(super) fn new(grid: &Grid) -> Self {
         let nodes = grid.nodes();
         Self {
-            queue: vec![Node::default(); nodes].into(),
+            queue: vec![GridNode::default(); nodes].into(),
             stamps: Stamps::new(nodes),
             moved: 0,
             rows: [0; 2],
@@ -90,8 +90,8 @@ impl Chain {
         self.stamps.begin();
         self.moved = 0;
         match poke.side {
-            Side::Push => self.spread::<false>(field, shear, cut, poke),
-            Side::Pull => self.spread::<true>(field, shear, cut, poke),
+            ContactSide::Push => self.spread::<false>(field, shear, cut, poke),
+            ContactSide::Pull => self.spread::<true>(field, shear, cut, poke),
         }
     }
 
@@ -113,12 +113,12 @@ impl Chain {
         let columns = field.grid.columns();
         let mut next = 0;
         while next < self.moved {
-            let Node { column, row } = self.queue[next];
+            let GridNode { column, row } = self.queue[next];
             next += 1;
-            if poke.node.steps_to(Node { column, row }) >= cut.range() {
+            if poke.node.steps_to(GridNode { column, row }) >= cut.range() {
                 continue;
             }
-            let index = field.grid.index(Node { column, row });
+            let index = field.grid.index(GridNode { column, row });
             let allowed = height::<PULL>(field.now[index], 1.0, shear);
             let mut offer = |column, row, index| {
                 counts.visited += 1;
@@ -127,7 +127,7 @@ impl Chain {
                 if excess::<PULL>(field.now[index], allowed) > cut.threshold()
                     && !self.stamps.has(index)
                 {
-                    self.put(field, Node { column, row }, index, allowed);
+                    self.put(field, GridNode { column, row }, index, allowed);
                 }
             };
             if column > 0 {
@@ -144,7 +144,7 @@ impl Chain {
             }
         }
         let rows = self.rows.map(u32::from);
-        field.displaced.widen(Rect { rows, ..field.grid.whole() });
+        field.displaced.widen(GridRect { rows, ..field.grid.whole() });
         field.displaced.tighten();
         extend_bounds::<PULL>(field, poke.z);
         counts.moved = self.moved;
@@ -152,7 +152,7 @@ impl Chain {
     }
 
     #[inline(always)]
-    fn put(&mut self, field: &mut HeightField, node: Node, index: usize, z: f64) {
+    fn put(&mut self, field: &mut HeightField, node: GridNode, index: usize, z: f64) {
         field.now[index] = z;
         field.displaced.include(node);
         self.stamps.set(index);
@@ -163,7 +163,7 @@ impl Chain {
 
     /// The nodes that the last pass moved, in order.
     #[cfg(test)]
-    pub(super) fn order(&self) -> &[Node] {
+    pub(super) fn order(&self) -> &[GridNode] {
         &self.queue[..self.moved]
     }
 }

@@ -1,11 +1,11 @@
 //! Contacts with a surface, and bounds of their influence.
 
-use super::grid::{Grid, Node};
+use super::grid::{Grid, GridNode};
 use super::mesh::HIGHEST_MM;
 use crate::{SettingError, SettingRange};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum ContactSide {
     /// The surface is never above it: down where it is.
     Push,
     /// The surface is never below it: up where it is.
@@ -14,13 +14,13 @@ pub enum Side {
 
 /// A point that the node nearest to it cannot pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
+pub struct SurfaceContact {
     /// Along columns, in mm.
     pub x: f64,
     /// Along rows, in mm.
     pub y: f64,
     pub z: f64,
-    pub side: Side,
+    pub side: ContactSide,
 }
 
 /// Bounds of a contact's influence, for speed.
@@ -57,20 +57,20 @@ impl Cut {
 /// A contact as the solvers take it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Poke {
-    pub node: Node,
+    pub node: GridNode,
     pub z: f64,
-    pub side: Side,
+    pub side: ContactSide,
 }
 
 impl Poke {
     pub(super) const NOWHERE: Self =
-        Self { node: Node { column: 0, row: 0 }, z: 0.0, side: Side::Push };
+        Self { node: GridNode { column: 0, row: 0 }, z: 0.0, side: ContactSide::Push };
 }
 
-impl Contact {
+impl SurfaceContact {
     /// At a node of a grid.
     #[must_use]
-    pub fn at(grid: &Grid, node: Node, z: f64, side: Side) -> Self {
+    pub fn at(grid: &Grid, node: GridNode, z: f64, side: ContactSide) -> Self {
         let [x, y] = grid.place(node);
         Self { x, y, z, side }
     }

@@ -11,11 +11,11 @@
 //! recovery and all contacts in one go over memory, no further than a contact can reach.
 
 use super::chain::{excess, extend_bounds};
-use super::contact::{Cut, MoveCounts, Poke, Side};
-use super::grid::{Grid, Node, Rect};
+use super::contact::{ContactSide, Cut, MoveCounts, Poke};
+use super::grid::{Grid, GridNode, GridRect};
 use super::mesh::HeightField;
-use super::recover::{Recovery, trim_span};
-use palpate_rheology::vectors::wide;
+use super::recover::{SurfaceRecovery, trim_span};
+use palpate_rheology::vectors::run_wide;
 
 /// Contacts that are worked through together.
 pub(super) const TOGETHER: usize = 8;
@@ -55,22 +55,22 @@ impl Envelope {
 pub(super) fn tick(
     field: &mut HeightField,
     shape: &Envelope,
-    recovery: Recovery,
+    recovery: SurfaceRecovery,
     cut: Cut,
     pokes: &[Poke],
 ) -> MoveCounts {
     let mut counts = MoveCounts::default();
     let mut cones = [NO_CONE; TOGETHER];
     let mut count = 0;
-    let mut touched = Rect::EMPTY;
+    let mut touched = GridRect::EMPTY;
     for &poke in pokes {
         if let Some(cone) = cone(field, shape, recovery, cut, poke, &cones[..count]) {
             cones[count] = cone;
             count += 1;
             touched = touched.union(cone.rect(&field.grid));
             match poke.side {
-                Side::Push => extend_bounds::<false>(field, poke.z),
-                Side::Pull => extend_bounds::<true>(field, poke.z),
+                ContactSide::Push => extend_bounds::<false>(field, poke.z),
+                ContactSide::Pull => extend_bounds::<true>(field, poke.z),
             }
         }
     }
@@ -82,7 +82,7 @@ pub(super) fn tick(
     field.displaced.widen(touched);
     let columns = field.grid.columns();
     let touched = field.displaced.active_rows();
-    wide(
+    run_wide(
         #[inline(always)]
         || {
             for row in touched {
@@ -105,7 +105,7 @@ pub(super) fn tick(
 fn cone(
     field: &HeightField,
     shape: &Envelope,
-    recovery: Recovery,
+    recovery: SurfaceRecovery,
     cut: Cut,
     poke: Poke,
     before: &[Cone],
@@ -117,13 +117,13 @@ fn cone(
         let steps = other.poke.node.steps_to(poke.node);
         z = match other.poke.side {
             _ if steps as usize > other.reach => z,
-            Side::Push => other.one::<false>(z, steps, shape.shear, cut).0,
-            Side::Pull => other.one::<true>(z, steps, shape.shear, cut).0,
+            ContactSide::Push => other.one::<false>(z, steps, shape.shear, cut).0,
+            ContactSide::Pull => other.one::<true>(z, steps, shape.shear, cut).0,
         };
     }
     let (above, furthest) = match poke.side {
-        Side::Push => (excess::<false>(z, poke.z), field.bounds[1] - poke.z),
-        Side::Pull => (excess::<true>(z, poke.z), poke.z - field.bounds[0]),
+        ContactSide::Push => (excess::<false>(z, poke.z), field.bounds[1] - poke.z),
+        ContactSide::Pull => (excess::<true>(z, poke.z), poke.z - field.bounds[0]),
     };
     if above <= 0.0 {
         return None;
@@ -137,13 +137,13 @@ fn cone(
 }
 
 impl Cone {
-    fn rect(&self, grid: &Grid) -> Rect {
+    fn rect(&self, grid: &Grid) -> GridRect {
         let side = |at: u16, count: usize| {
             let (at, reach) = (usize::from(at), self.reach);
             [at.saturating_sub(reach), (at + reach + 1).min(count)].map(|end| end as u32)
         };
-        let Node { column, row } = self.poke.node;
-        Rect { columns: side(column, grid.columns()), rows: side(row, grid.rows()) }
+        let GridNode { column, row } = self.poke.node;
+        GridRect { columns: side(column, grid.columns()), rows: side(row, grid.rows()) }
     }
 
     /// A height after this contact, and whether that moved it.
@@ -182,7 +182,7 @@ impl Row<'_> {
         &mut self,
         cones: &[Cone],
         shape: &Envelope,
-        recovery: Recovery,
+        recovery: SurfaceRecovery,
         cut: Cut,
         counts: &mut MoveCounts,
     ) {
@@ -208,12 +208,12 @@ impl Row<'_> {
                 Some(recovery) if is_free => recovery,
                 other => {
                     self.recover(other);
-                    Recovery::NONE
+                    SurfaceRecovery::NONE
                 }
             };
             let moved = match cone.poke.side {
-                Side::Push => self.press::<false>(cone, away, reached, shape, step, cut),
-                Side::Pull => self.press::<true>(cone, away, reached, shape, step, cut),
+                ContactSide::Push => self.press::<false>(cone, away, reached, shape, step, cut),
+                ContactSide::Pull => self.press::<true>(cone, away, reached, shape, step, cut),
             };
             self.span = join(self.span, reached);
             counts.moved += moved;
@@ -223,7 +223,7 @@ impl Row<'_> {
     }
 
     #[inline(always)]
-    fn recover(&mut self, recovery: Option<Recovery>) {
+    fn recover(&mut self, recovery: Option<SurfaceRecovery>) {
         let [from, to] = self.span;
         if let Some(recovery) = recovery {
             recovery.step_row(&mut self.now[from..to], &self.rest[from..to]);
@@ -238,7 +238,7 @@ impl Row<'_> {
         away: usize,
         [from, to]: [usize; 2],
         shape: &Envelope,
-        recovery: Recovery,
+        recovery: SurfaceRecovery,
         cut: Cut,
     ) -> usize {
         let column = usize::from(cone.poke.node.column);

@@ -9,7 +9,7 @@ pub const MOST_NODES: usize = 1 << 24;
 
 /// A node by column (along x) and row (along y).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Node {
+pub struct GridNode {
     /// Column, from 0.
     pub column: u16,
     /// Row, from 0.
@@ -67,31 +67,31 @@ impl Grid {
 
     /// Index of a node's numbers: row by row.
     #[inline(always)]
-    pub fn index(&self, node: Node) -> usize {
+    pub fn index(&self, node: GridNode) -> usize {
         usize::from(node.row) * usize::from(self.columns) + usize::from(node.column)
     }
 
     /// Position of a node in mm.
-    pub fn place(&self, node: Node) -> [f64; 2] {
+    pub fn place(&self, node: GridNode) -> [f64; 2] {
         [node.column, node.row].map(|step| f64::from(step) * self.spacing)
     }
 
     /// The node nearest to a place in mm; `None` more than half a spacing outside, or for no number.
-    pub fn nearest(&self, x: f64, y: f64) -> Option<Node> {
+    pub fn nearest(&self, x: f64, y: f64) -> Option<GridNode> {
         let step = |place: f64, count: u16| {
             let step = (place / self.spacing).round();
             // False for NaN and for both infinities.
             (step >= 0.0 && step < f64::from(count)).then_some(step as u16)
         };
-        Some(Node { column: step(x, self.columns)?, row: step(y, self.rows)? })
+        Some(GridNode { column: step(x, self.columns)?, row: step(y, self.rows)? })
     }
 
-    pub fn whole(&self) -> Rect {
-        Rect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
+    pub fn whole(&self) -> GridRect {
+        GridRect { columns: [0, u32::from(self.columns)], rows: [0, u32::from(self.rows)] }
     }
 }
 
-impl Node {
+impl GridNode {
     /// Steps along the axes from one node to another.
     #[must_use]
     #[inline(always)]
@@ -102,13 +102,13 @@ impl Node {
 
 /// A rectangle of nodes: from the first to before the last of each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rect {
+pub struct GridRect {
     /// Columns.
     pub columns: [u32; 2],
     pub rows: [u32; 2],
 }
 
-impl Rect {
+impl GridRect {
     pub const EMPTY: Self = Self { columns: [0; 2], rows: [0; 2] };
 
     /// Whether there is no node in it.
@@ -148,12 +148,12 @@ pub(super) struct Spans {
     /// From, and to before which, in each row; equal where nothing is.
     rows: Box<[[u16; 2]]>,
     /// Every displaced node is in it.
-    bounds: Rect,
+    bounds: GridRect,
 }
 
 impl Spans {
     pub(super) fn none(grid: &Grid) -> Self {
-        Self { rows: vec![[0; 2]; grid.rows()].into(), bounds: Rect::EMPTY }
+        Self { rows: vec![[0; 2]; grid.rows()].into(), bounds: GridRect::EMPTY }
     }
 
     #[inline(always)]
@@ -166,13 +166,13 @@ impl Spans {
         self.bounds.row_range()
     }
 
-    pub(super) fn bounds(&self) -> Rect {
+    pub(super) fn bounds(&self) -> GridRect {
         self.bounds
     }
 
     /// Takes in one node.
     #[inline(always)]
-    pub(super) fn include(&mut self, node: Node) {
+    pub(super) fn include(&mut self, node: GridNode) {
         let span = &mut self.rows[usize::from(node.row)];
         if span[0] == span[1] {
             *span = [node.column, node.column + 1];
@@ -183,7 +183,7 @@ impl Spans {
     }
 
     /// Bounds that hold every node taken in since.
-    pub(super) fn widen(&mut self, by: Rect) {
+    pub(super) fn widen(&mut self, by: GridRect) {
         self.bounds = self.bounds.union(by);
     }
 
@@ -194,11 +194,11 @@ impl Spans {
 
     /// Bounds drawn tight around the spans of the rows that were active.
     pub(super) fn tighten(&mut self) {
-        let mut tight = Rect::EMPTY;
+        let mut tight = GridRect::EMPTY;
         for row in self.active_rows() {
             let [from, to] = self.rows[row].map(u32::from);
             let row = row as u32;
-            tight = tight.union(Rect { columns: [from, to], rows: [row, row + 1] });
+            tight = tight.union(GridRect { columns: [from, to], rows: [row, row + 1] });
         }
         self.bounds = tight;
     }

@@ -1,6 +1,6 @@
 //! Heights between nodes: what is read of a surface, of whichever moment.
 
-use super::grid::{Grid, Node};
+use super::grid::{Grid, GridNode};
 use super::mesh_error::MeshError;
 
 /// Heights on a grid, borrowed: at rest, now, or of a snapshot.
@@ -48,12 +48,12 @@ impl<'a> Heights<'a> {
 
     /// Unit normal of a node: the normalised sum of the unit normals of the faces around it, at the
     /// boundary of those that there are.
-    pub fn normal(&self, node: Node) -> [f64; 3] {
+    pub fn normal(&self, node: GridNode) -> [f64; 3] {
         let [column, row] = [node.column, node.row].map(usize::from);
         let mut sum = [0.0; 3];
         for face_row in row.saturating_sub(1)..(row + 1).min(self.grid.rows() - 1) {
             for face_column in column.saturating_sub(1)..(column + 1).min(self.grid.columns() - 1) {
-                let corner = Node { column: face_column as u16, row: face_row as u16 };
+                let corner = GridNode { column: face_column as u16, row: face_row as u16 };
                 let normal = face(self.corners(corner), self.grid.spacing());
                 sum = [0, 1, 2].map(|axis| sum[axis] + normal[axis]);
             }
@@ -62,7 +62,7 @@ impl<'a> Heights<'a> {
     }
 
     /// The cell that holds a place: its first node, and how far along it in both directions, 0 to 1.
-    fn cell(&self, x: f64, y: f64) -> Option<(Node, [f64; 2])> {
+    fn cell(&self, x: f64, y: f64) -> Option<(GridNode, [f64; 2])> {
         let [wide, high] = self.grid.extent();
         if !((0.0..=wide).contains(&x) && (0.0..=high).contains(&y)) {
             return None;
@@ -75,12 +75,12 @@ impl<'a> Heights<'a> {
         };
         let (column, u) = split(x, self.grid.columns());
         let (row, v) = split(y, self.grid.rows());
-        Some((Node { column, row }, [u, v]))
+        Some((GridNode { column, row }, [u, v]))
     }
 
     /// Heights of a cell's four corners: along x first.
     #[inline(always)]
-    fn corners(&self, first: Node) -> [f64; 4] {
+    fn corners(&self, first: GridNode) -> [f64; 4] {
         let at = self.grid.index(first);
         let below = at + self.grid.columns();
         [self.of[at], self.of[at + 1], self.of[below], self.of[below + 1]]

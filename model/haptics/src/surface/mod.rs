@@ -5,7 +5,7 @@
 //! constant. [`Surface::tick`] does both; it allocates nothing, locks nothing, and gives the same bits
 //! for the same contacts.
 //!
-//! Two methods give the same shape: [`Method::Chain`] is ChainMail as published, [`Method::Envelope`] its
+//! Two methods give the same shape: [`SurfaceMethod::Chain`] is ChainMail as published, [`SurfaceMethod::Envelope`] its
 //! closed form, many times faster.
 
 mod chain;
@@ -21,14 +21,16 @@ mod recover;
 mod scene_curves;
 mod shape_error;
 
-pub use contact::{Contact, Cut, MoveCounts, Side};
-pub use grid::{Grid, MOST_NODES, Node, Rect};
+pub use contact::{ContactSide, Cut, MoveCounts, SurfaceContact};
+pub use grid::{Grid, GridNode, GridRect, MOST_NODES};
 pub use heights::Heights;
 pub use mesh::{HIGHEST_MM, HeightField, INERT};
 pub use mesh_error::MeshError;
-pub use plan::{Needs, NoPlan, OmittedPart, ScenePlan, plan, slower};
+pub use plan::{
+    OmittedPart, ScenePlan, ScenePlanError, SceneRequirements, plan, updated_cost_factor,
+};
 pub use proxy::{Proxy, ProxyTouch, TouchState};
-pub use recover::{Recovery, SETTLED_MM};
+pub use recover::{SETTLED_MM, SurfaceRecovery};
 pub use scene_curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
 pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 
@@ -40,7 +42,7 @@ pub(crate) use proxy::dot;
 palpate_model::named! {
     /// Algorithm that computes the shape.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Method {
+    pub enum SurfaceMethod {
         /// The closed form: the fast one.
         Envelope = "closed form",
         /// First moved first processed.
@@ -60,7 +62,7 @@ enum Solver {
 pub struct Surface {
     field: HeightField,
     solver: Solver,
-    recovery: Recovery,
+    recovery: SurfaceRecovery,
     cut: Cut,
 }
 
@@ -69,7 +71,7 @@ pub struct SurfaceTick {
     /// Work and effect of the contacts.
     pub moved: MoveCounts,
     /// Every node that may be at another height than before.
-    pub dirty: Rect,
+    pub dirty: GridRect,
     /// Contacts outside the mesh or with a number that is none: they had no effect.
     pub ignored: usize,
     /// Contacts beyond [`HIGHEST_MM`], which were taken to be there.
@@ -79,10 +81,15 @@ pub struct SurfaceTick {
 impl Surface {
     /// With everything a tick needs allocated.
     #[must_use]
-    pub fn new(field: HeightField, method: Method, recovery: Recovery, cut: Cut) -> Self {
+    pub fn new(
+        field: HeightField,
+        method: SurfaceMethod,
+        recovery: SurfaceRecovery,
+        cut: Cut,
+    ) -> Self {
         let solver = match method {
-            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), field.shear())),
-            Method::Chain => Solver::Chain(Chain::new(field.grid())),
+            SurfaceMethod::Envelope => Solver::Envelope(Envelope::new(field.grid(), field.shear())),
+            SurfaceMethod::Chain => Solver::Chain(Chain::new(field.grid())),
         };
         Self { field, solver, recovery, cut }
     }
@@ -97,7 +104,7 @@ impl Surface {
     }
 
     /// One tick of recovery, then the contacts one after the other.
-    pub fn tick(&mut self, contacts: &[Contact]) -> SurfaceTick {
+    pub fn tick(&mut self, contacts: &[SurfaceContact]) -> SurfaceTick {
         let mut report =
             SurfaceTick { dirty: self.field.displaced.bounds(), ..SurfaceTick::default() };
         let mut recovery = self.recovery;
@@ -118,7 +125,7 @@ impl Surface {
             }
             report.moved.add(self.solve(recovery, &pokes[..count]));
             report.dirty = report.dirty.union(self.field.displaced.bounds());
-            recovery = Recovery::NONE;
+            recovery = SurfaceRecovery::NONE;
             rest = others;
             if rest.is_empty() {
                 return report;
@@ -126,7 +133,7 @@ impl Surface {
         }
     }
 
-    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> MoveCounts {
+    fn solve(&mut self, recovery: SurfaceRecovery, pokes: &[Poke]) -> MoveCounts {
         let Self { field, solver, cut, .. } = self;
         match solver {
             Solver::Envelope(shape) => envelope::tick(field, shape, recovery, *cut, pokes),

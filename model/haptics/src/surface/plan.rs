@@ -14,7 +14,7 @@ use std::cmp::Ordering;
 
 /// Tolerances and time budget of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Needs {
+pub struct SceneRequirements {
     /// Error of force, such as so many percent of what a hand notices
     /// ([`THRESHOLD_SHARE`](palpate_rheology::tolerance::THRESHOLD_SHARE)).
     pub force: Tolerance,
@@ -59,17 +59,22 @@ pub struct ScenePlan {
 
 /// Nothing holds everything.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NoPlan {
+pub struct ScenePlanError {
     /// Why, in a sentence.
-    pub why: String,
+    #[serde(rename = "why")]
+    pub reason: String,
     /// The plan within the budget that exceeds the tolerances by the least factor.
     pub nearest: Option<Box<ScenePlan>>,
 }
 
 /// The cheapest plan that holds every tolerance and the budget, with `slower` times the measured
 /// costs: 1 at first, after a miss [`slower`].
-pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePlan, NoPlan> {
-    let refuse = |why: String| NoPlan { why, nearest: None };
+pub fn plan(
+    needs: &SceneRequirements,
+    curves: &SceneCurves,
+    slower: f64,
+) -> Result<ScenePlan, ScenePlanError> {
+    let refuse = |why: String| ScenePlanError { reason: why, nearest: None };
     let force_n = needs.force.in_newtons(needs.peak).0;
     for (what, value) in [
         ("tolerance of force", force_n),
@@ -117,13 +122,13 @@ pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePla
         ),
         None => "; nothing measured keeps to the budget: allow a tick more time".to_owned(),
     };
-    Err(NoPlan { why: why + &advice, nearest: nearest.map(Box::new) })
+    Err(ScenePlanError { reason: why + &advice, nearest: nearest.map(Box::new) })
 }
 
 /// The factor of cost after a tick of `plan`, made with the factor `slower`, took `measured_us`: with
 /// it the plan costs what it was seen to. A tick faster than expected leaves the factor.
 #[must_use]
-pub fn slower(plan: &ScenePlan, slower: f64, measured_us: f64) -> f64 {
+pub fn updated_cost_factor(plan: &ScenePlan, slower: f64, measured_us: f64) -> f64 {
     let ratio = measured_us / plan.cost_us;
     if ratio > 1.0 && ratio.is_finite() { slower * ratio } else { slower }
 }
@@ -208,7 +213,7 @@ impl SceneCurves {
             (what, [mesh.error_mm, finest.error_mm], "mm", saved_us)
         });
         let of_cut = widest.map(|widest| {
-            let what = format!("influence beyond {}", cut.words());
+            let what = format!("influence beyond {}", cut.description());
             let saved_us = (widest.cost_share - cut.cost_share) * mesh.cost_us;
             (what, [cut.error_mm, widest.error_mm], "mm", saved_us)
         });

@@ -11,7 +11,7 @@
 use super::mesh::HeightField;
 use crate::{SettingError, SettingRange};
 use palpate_model::units::Seconds;
-use palpate_rheology::vectors::wide;
+use palpate_rheology::vectors::run_wide;
 
 /// How far beyond rest a recovering node aims, in mm: a nanometre, a ten-thousandth of what any
 /// display or motor of this size resolves.
@@ -19,14 +19,14 @@ pub const SETTLED_MM: f64 = 1e-6;
 
 /// Exponential return of displaced nodes, before the contacts of each tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recovery {
+pub struct SurfaceRecovery {
     /// Share of the way to rest in a tick.
     share: f64,
     /// SETTLED_MM times that.
     creep: f64,
 }
 
-impl Recovery {
+impl SurfaceRecovery {
     /// At rest again at once: every tick starts from the rest surface, so that the shape depends on
     /// this tick's contacts alone.
     pub const ELASTIC: Self = Self { share: 1.0, creep: SETTLED_MM };
@@ -71,7 +71,7 @@ impl Recovery {
             return;
         }
         let columns = field.grid.columns();
-        wide(
+        run_wide(
             #[inline(always)]
             || {
                 for row in field.displaced.active_rows() {

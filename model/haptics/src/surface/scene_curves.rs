@@ -114,7 +114,7 @@ fn pairs<A, B>(first: &[A], second: &[B], sum: impl Fn(&A, &B) -> (f64, f64)) ->
 }
 
 impl CutPoint {
-    pub fn words(&self) -> String {
+    pub fn description(&self) -> String {
         match (self.range, self.threshold_mm > 0.0) {
             (Some(range), true) => {
                 format!("{range} nodes or below {} mm of movement", self.threshold_mm)

@@ -2,12 +2,12 @@
 //!
 //! Pure: errors alone. Times are measured by whoever has a clock, and [`plan`](super::plan()) takes both.
 
-use super::contact::{Contact, Cut, Side};
+use super::contact::{ContactSide, Cut, SurfaceContact};
 use super::envelope::{self, Envelope};
 use super::grid::Grid;
 use super::mesh::HeightField;
 use super::mesh_error::MeshError;
-use super::recover::Recovery;
+use super::recover::SurfaceRecovery;
 use palpate_rheology::integrators::{IntegratorError, Scheme, SeriesBody};
 use serde::{Deserialize, Serialize};
 
@@ -97,10 +97,11 @@ impl PokeScene {
 
     /// One poke of the surface at rest.
     fn poke(&self, field: &mut HeightField, cut: Cut, [x, y]: [f64; 2]) {
-        let contact = Contact { x, y, z: (self.rest)(x, y) - self.depth, side: Side::Push };
+        let contact =
+            SurfaceContact { x, y, z: (self.rest)(x, y) - self.depth, side: ContactSide::Push };
         let pokes = contact.poke(&field.grid).map(|(poke, _)| poke);
         let shape = Envelope::new(&field.grid, field.shear());
-        envelope::tick(field, &shape, Recovery::ELASTIC, cut, pokes.as_slice());
+        envelope::tick(field, &shape, SurfaceRecovery::ELASTIC, cut, pokes.as_slice());
     }
 }
 

@@ -11,9 +11,9 @@ fn field(n: usize) -> HeightField {
 fn random_poke(random: &mut SplitMix, n: usize) -> Poke {
     let [column, row] = [0, 1].map(|_| random.below(n) as u16);
     Poke {
-        node: Node { column, row },
+        node: GridNode { column, row },
         z: 4.0 * random.normal(),
-        side: [Side::Push, Side::Pull][random.below(2)],
+        side: [ContactSide::Push, ContactSide::Pull][random.below(2)],
     }
 }
 
@@ -88,14 +88,19 @@ fn meshes_that_cannot_be_are_refused_in_words() {
 #[test]
 fn a_surface_that_came_to_rest_reaches_no_further_than_a_new_one() {
     // Bounds of heights widen with pulls; left wide they would only cost time.
-    let recovery = Recovery::new(Seconds(1e-3), Seconds(1e-3)).unwrap();
-    let mut used = Surface::new(field(41), Method::Envelope, recovery, Cut::NONE);
+    let recovery = SurfaceRecovery::new(Seconds(1e-3), Seconds(1e-3)).unwrap();
+    let mut used = Surface::new(field(41), SurfaceMethod::Envelope, recovery, Cut::NONE);
     let at = |z, side| {
-        Contact::at(&Grid::new(41, 41, 1.0).unwrap(), Node { column: 20, row: 20 }, z, side)
+        SurfaceContact::at(
+            &Grid::new(41, 41, 1.0).unwrap(),
+            GridNode { column: 20, row: 20 },
+            z,
+            side,
+        )
     };
-    used.tick(&[at(5.0, Side::Pull)]);
+    used.tick(&[at(5.0, ContactSide::Pull)]);
     while !used.tick(&[]).dirty.is_empty() {}
-    let mut new = Surface::new(field(41), Method::Envelope, recovery, Cut::NONE);
-    let poke = [at(-1.0, Side::Push)];
+    let mut new = Surface::new(field(41), SurfaceMethod::Envelope, recovery, Cut::NONE);
+    let poke = [at(-1.0, ContactSide::Push)];
     assert_eq!(used.tick(&poke), new.tick(&poke));
 }

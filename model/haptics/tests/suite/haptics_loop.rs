@@ -2,8 +2,8 @@
 
 use crate::renderer::{Rendered, Renderer, RunTick, run};
 use palpate_haptics::closed_loop::{HapticPlant, PlantCommand, PlantSettings};
-use palpate_haptics::margin::{Device, Watch};
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::margin::{LoopDevice, MarginSettings};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::{
     ControllerSettings, Flags, ForceLaw, GuardSettings, LawSettings, Period, inertia,
 };
@@ -108,7 +108,7 @@ fn a_delay_takes_its_part() {
 /// Swing in mm at the end, and whether it was ever called a buzz, of a wall that a hand without damping leans on.
 fn leaned_on(stiffness: f64, damping: f64, friction: f64, count_mm: f64) -> (f64, bool) {
     let path = HandPath::RampHold { from: 0.0, to: 10.0, speed: 50.0 };
-    let hand = Hand { mass_kg: 0.05, stiffness: 0.2, damping: 0.0, path };
+    let hand = SimulatedHand { mass_kg: 0.05, stiffness: 0.2, damping: 0.0, path };
     let settings = PlantSettings {
         mass_kg: 0.115,
         damping,
@@ -212,7 +212,7 @@ fn swing_about(
     delay: usize,
 ) -> (f64, f64, f64) {
     let held = THESIS.elastic(Depth(depth)).0;
-    let hand = Hand {
+    let hand = SimulatedHand {
         mass_kg: hand_kg,
         stiffness: hand_stiffness,
         damping: 0.0,
@@ -262,18 +262,18 @@ fn swing_about(
 fn the_margin_s_damping_is_enough_and_a_part_of_it_is_not() {
     // Shallow the lag asks for it, deep sudden motion does.
     for (depth, delay, part) in [(0.3, 0, 0.01), (12.0, 2, 0.3), (25.0, 2, 0.3)] {
-        let watch = Watch {
+        let watch = MarginSettings {
             body: SeriesBody::from(THESIS).padded(),
             scheme: Scheme::Exact,
             period: Period::MILLISECOND,
-            device: Device {
+            device: LoopDevice {
                 damping: 0.0,
                 friction: Newtons(0.0),
                 count_mm: 0.0,
                 delay_ticks: delay as f64,
             },
         };
-        let needed = watch.exactly_at(Depth(depth), MmPerS(0.0)).needed;
+        let needed = watch.exact_margin_at(Depth(depth), MmPerS(0.0)).needed;
         let mut grown = 0.0f64;
         for (mass, stiffness) in [(0.05, 0.2), (0.2, 0.8), (0.05, 3.0), (2.0, 0.05), (5.0, 0.01)] {
             let (growth, least, start) = swing_about(depth, mass, stiffness, needed, delay);
@@ -341,7 +341,7 @@ fn what_the_model_returns_in_its_band_is_taken_back() {
             damping: 0.5e-3,
             count_mm: FINE / 16.0,
             x: -0.05,
-            hand: Hand { stiffness: 3.0, ..Hand::firm(path) },
+            hand: SimulatedHand { stiffness: 3.0, ..SimulatedHand::firm(path) },
             ..PlantSettings::bare(Period::MILLISECOND)
         };
         let law = LawSettings::of::<3>(THESIS, Period::MILLISECOND);
@@ -374,7 +374,7 @@ fn a_hand_at_five_hertz_is_no_buzz() {
                     friction: [0.1; 2],
                     count_mm: FINE,
                     x: middle - amplitude,
-                    hand: Hand::firm(path),
+                    hand: SimulatedHand::firm(path),
                     ..PlantSettings::bare(Period::MILLISECOND)
                 };
                 let rendered = if is_wall {
@@ -414,7 +414,7 @@ fn after_a_stall_the_force_ramps() {
             let settings = PlantSettings {
                 damping: 17.6e-3,
                 count_mm: FINE,
-                hand: Hand::firm(path),
+                hand: SimulatedHand::firm(path),
                 ..PlantSettings::bare(Period::MILLISECOND)
             };
             let wall = Rendered::Wall { stiffness: 0.3 };

@@ -2,7 +2,8 @@
 
 use palpate_haptics::Period;
 use palpate_haptics::margin::{
-    Cause, Device, Linear, SampledStep, Watch, active_cycles, active_pokes, criterion,
+    LinearisedBody, LoopDevice, MarginCause, MarginSettings, SampledStep, active_cycles,
+    active_pokes, criterion,
 };
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::{ModifiedKelvin, admissibility};
@@ -32,14 +33,14 @@ fn as_written(sampled: &SampledStep, delay: f64, th: f64) -> f64 {
 /// A spring with a damper by differences needs `K T / 2 + B`, and a delay of `d` ticks `K (T/2 + d T)`.
 #[test]
 fn known_walls() {
-    let spring = Linear { stiffness: 2.0, damping: 0.0, tau: 0.0 };
+    let spring = LinearisedBody { stiffness: 2.0, damping: 0.0, tau: 0.0 };
     let wall = SampledStep::of(&spring, Scheme::Exact, 1e-3);
     for (delay, expected) in [(0.0, 1e-3), (1.0, 3e-3), (2.5, 6e-3)] {
         let (needed, _) = criterion::damping_needed(&wall, delay);
         assert!((needed / expected - 1.0).abs() < 1e-9, "{delay}: {needed}");
     }
     // 2 N/mm and 3e-3 N s/mm at 1 ms: 4e-3.
-    let damped = Linear { damping: 3e-3, ..spring };
+    let damped = LinearisedBody { damping: 3e-3, ..spring };
     let wall = SampledStep::of(&damped, Scheme::Exact, 1e-3);
     let (needed, th) = criterion::damping_needed(&wall, 0.0);
     assert!((needed / 4e-3 - 1.0).abs() < 1e-12 && (th - std::f64::consts::PI).abs() < 1e-6);
@@ -52,7 +53,7 @@ fn two_ends_are_the_whole_criterion_without_delay() {
     let mut random = SplitMix::seeded(7);
     for scheme in Scheme::ALL {
         for _ in 0..60 {
-            let linear = Linear {
+            let linear = LinearisedBody {
                 stiffness: 10f64.powf(random.normal()),
                 damping: 10f64.powf(random.normal() - 1.0),
                 tau: 10f64.powf(1.5 * random.normal() - 1.0),
@@ -84,7 +85,7 @@ fn the_exact_and_the_left_edge_step_have_their_closed_forms() {
     for (k0, c0, tau, tick) in
         [(0.5, 0.02, 0.05, 1e-3), (1.0, 0.5, 0.05, 2e-3), (0.3, 3.0, 1.0, 5e-3)]
     {
-        let linear = Linear { stiffness: k0, damping: c0, tau };
+        let linear = LinearisedBody { stiffness: k0, damping: c0, tau };
         let k_inf: f64 = c0 / tau;
         let exact = SampledStep::of(&linear, Scheme::Exact, tick);
         let slow = k0 * tick / 2.0 + k0 * tau - c0;
@@ -119,11 +120,11 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
             ],
             tau_sig: 0.1 * random.normal().abs(),
         };
-        let watch = Watch {
+        let watch = MarginSettings {
             body: SeriesBody::from(body).padded(),
             scheme: Scheme::Exact,
             period: Period::of_nanos(250_000 * (1 + random.below(16) as u64)).expect("a period"),
-            device: Device {
+            device: LoopDevice {
                 damping: 0.002,
                 friction: Newtons(0.0),
                 count_mm: 0.015,
@@ -132,13 +133,13 @@ fn the_quick_margin_is_on_the_safe_side_of_the_criterion() {
         };
         let depth = Depth(30.0 * (random.below(1000) as f64 + 1.0) / 1000.0);
         let quick = watch.at(depth, MmPerS(0.0));
-        let whole = watch.exactly_at(depth, MmPerS(0.0));
+        let whole = watch.exact_margin_at(depth, MmPerS(0.0));
         let size = quick.needed.abs().max(1e-6);
         assert!(whole.needed <= quick.needed + 1e-3 * size, "{watch:?} {quick:?} {whole:?}");
         if watch.device.delay_ticks == 0.0 {
             let (needed, _) = criterion::damping_needed(
                 &SampledStep::of(
-                    &Linear::of(&watch.body, depth),
+                    &LinearisedBody::of(&watch.body, depth),
                     watch.scheme,
                     watch.period.seconds().0,
                 ),
@@ -201,17 +202,21 @@ fn bands_where_energy_comes_back() {
 
 #[test]
 fn a_verdict_says_it_in_words() {
-    let device =
-        Device { damping: 0.0176, friction: Newtons(0.81), count_mm: 0.01534, delay_ticks: 0.0 };
-    let watch = |device| Watch {
+    let device = LoopDevice {
+        damping: 0.0176,
+        friction: Newtons(0.81),
+        count_mm: 0.01534,
+        delay_ticks: 0.0,
+    };
+    let watch = |device| MarginSettings {
         body: SeriesBody::from(THESIS).padded(),
         scheme: Scheme::Exact,
         period: Period::MILLISECOND,
         device,
     };
     // At the surface the lag alone asks for mu1 tau = 54.6 N s/m.
-    let verdict = watch(device).before_play(Depth(30.0), MmPerS(0.0));
-    assert_eq!(verdict.worst.cause, Cause::Lag);
+    let verdict = watch(device).assess_stroke(Depth(30.0), MmPerS(0.0));
+    assert_eq!(verdict.worst.cause, MarginCause::Lag);
     assert!((verdict.worst.needed * 1e3 - 54.58).abs() < 0.05, "{:?}", verdict.worst);
     assert!(!verdict.is_calm() && (verdict.ratio().expect("a need") - 0.322).abs() < 1e-3);
     let sentences = verdict.sentences();
@@ -221,15 +226,15 @@ fn a_verdict_says_it_in_words() {
         assert!(sentences[1..].iter().any(|one| one.contains(fact)), "{fact}");
     }
     // Enough of everything.
-    let calm = Device { damping: 0.06, ..device };
+    let calm = LoopDevice { damping: 0.06, ..device };
     // Moving in at 100 mm/s, half a tick of tau_sig v = 6 N/mm is 3 N s/m more; at 500 mm/s 15.
-    assert!(watch(calm).before_play(Depth(30.0), MmPerS(100.0)).is_calm());
-    assert!(!watch(calm).before_play(Depth(30.0), MmPerS(500.0)).is_calm());
-    let verdict = watch(calm).before_play(Depth(30.0), MmPerS(0.0));
+    assert!(watch(calm).assess_stroke(Depth(30.0), MmPerS(100.0)).is_calm());
+    assert!(!watch(calm).assess_stroke(Depth(30.0), MmPerS(500.0)).is_calm());
+    let verdict = watch(calm).assess_stroke(Depth(30.0), MmPerS(0.0));
     assert!(verdict.is_calm() && verdict.bands.is_empty(), "{:#?}", verdict.sentences());
     assert!(verdict.sentences()[0].contains("1.10"));
     // Without friction counts may swing.
-    let smooth = Device { friction: Newtons(0.0), ..calm };
-    let verdict = watch(smooth).before_play(Depth(30.0), MmPerS(0.0));
+    let smooth = LoopDevice { friction: Newtons(0.0), ..calm };
+    let verdict = watch(smooth).assess_stroke(Depth(30.0), MmPerS(0.0));
     assert!(!verdict.is_calm() && verdict.sentences()[1].contains("encoder count"));
 }

@@ -7,8 +7,8 @@ use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons};
 use palpate_rheology::integrators::{
-    Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
-    RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
+    ExactIntegrator, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler,
+    Integrator, IntegratorStart, RuleIntegrator, RungeKutta, Scheme, SeriesBody, Trapezoid,
 };
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
@@ -30,21 +30,21 @@ fn law(settings: LawSettings) -> ForceLaw {
 #[test]
 fn amplification_of_every_scheme() {
     fn alone<I: Integrator<f64, 3>>(dt: f64, steps: u32) -> f64 {
-        let start = Start { depth: 0.0, force: Some(1.0) };
+        let start = IntegratorStart { depth: 0.0, force: Some(1.0) };
         let mut one = I::at_any_step(&SeriesBody::from(THESIS), dt, start);
         (0..steps).fold(1.0, |_, _| one.step(0.0).expect("a force"))
     }
     fn of(scheme: Scheme, dt: f64, steps: u32) -> f64 {
         match scheme {
-            Scheme::ExplicitEuler => alone::<Stepped<f64, 3, ExplicitEuler>>(dt, steps),
-            Scheme::ImplicitEuler => alone::<Stepped<f64, 3, ImplicitEuler>>(dt, steps),
-            Scheme::Trapezoid => alone::<Stepped<f64, 3, Trapezoid>>(dt, steps),
-            Scheme::ExponentialLeft => alone::<Stepped<f64, 3, ExponentialLeft>>(dt, steps),
+            Scheme::ExplicitEuler => alone::<RuleIntegrator<f64, 3, ExplicitEuler>>(dt, steps),
+            Scheme::ImplicitEuler => alone::<RuleIntegrator<f64, 3, ImplicitEuler>>(dt, steps),
+            Scheme::Trapezoid => alone::<RuleIntegrator<f64, 3, Trapezoid>>(dt, steps),
+            Scheme::ExponentialLeft => alone::<RuleIntegrator<f64, 3, ExponentialLeft>>(dt, steps),
             Scheme::ExponentialFirstOrder => {
-                alone::<Stepped<f64, 3, ExponentialFirstOrder>>(dt, steps)
+                alone::<RuleIntegrator<f64, 3, ExponentialFirstOrder>>(dt, steps)
             }
-            Scheme::Exact => alone::<Exact<f64, 3>>(dt, steps),
-            Scheme::RungeKutta => alone::<Stepped<f64, 3, RungeKutta>>(dt, steps),
+            Scheme::Exact => alone::<ExactIntegrator<f64, 3>>(dt, steps),
+            Scheme::RungeKutta => alone::<RuleIntegrator<f64, 3, RungeKutta>>(dt, steps),
         }
     }
     for h in [0.01, 0.1, 0.5, 1.0, 1.9, 2.0, 2.1, 2.785, 5.0, 100.0f64] {

@@ -1,8 +1,8 @@
 //! The whole tick: contact (L8), calibration (L9), transparency (G4), replay, snapshots, allocations, and the two
 //! demonstrations.
 
-use palpate_haptics::check::{CheckSettings, calibration_points, check};
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::check::{FeedbackCheckSettings, calibration_points, check};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::{Simulation, SimulationSettings};
 use palpate_haptics::{
     BiasCalibration, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags, ForceGuard,
@@ -140,8 +140,11 @@ fn commanded_torque_and_measured_force_follow_each_other() {
         (DriveKind::Current { amps_per_volt: 1.0 }, 0.0, 0.81),
         (DriveKind::Current { amps_per_volt: 1.0 }, 1.0, 0.0),
     ] {
-        let settings =
-            CheckSettings { drive, friction_share: share, ..CheckSettings::source(THESIS) };
+        let settings = FeedbackCheckSettings {
+            drive,
+            friction_share: share,
+            ..FeedbackCheckSettings::source(THESIS)
+        };
         let mut samples = Vec::new();
         let mut done = 0.0;
         check(&settings, |one| samples.push(*one), |share| done = share).expect("a check");
@@ -184,14 +187,14 @@ fn commanded_torque_and_measured_force_follow_each_other() {
 
 #[test]
 fn a_check_that_cannot_be_is_refused() {
-    let right = CheckSettings::source(THESIS);
+    let right = FeedbackCheckSettings::source(THESIS);
     for (wrong, words) in [
-        (CheckSettings { speed: palpate_model::MmPerS(0.0), ..right }, "speed = 0"),
-        (CheckSettings { depth: Depth(f64::NAN), ..right }, "depth = NaN"),
-        (CheckSettings { hold: Seconds(f64::NAN), ..right }, "hold = NaN"),
-        (CheckSettings { hold: Seconds(f64::INFINITY), ..right }, "duration = inf"),
-        (CheckSettings { samples_hz: 0.0, ..right }, "samples = 0"),
-        (CheckSettings { friction_share: -1.0, ..right }, "share of friction"),
+        (FeedbackCheckSettings { speed: palpate_model::MmPerS(0.0), ..right }, "speed = 0"),
+        (FeedbackCheckSettings { depth: Depth(f64::NAN), ..right }, "depth = NaN"),
+        (FeedbackCheckSettings { hold: Seconds(f64::NAN), ..right }, "hold = NaN"),
+        (FeedbackCheckSettings { hold: Seconds(f64::INFINITY), ..right }, "duration = inf"),
+        (FeedbackCheckSettings { samples_hz: 0.0, ..right }, "samples = 0"),
+        (FeedbackCheckSettings { friction_share: -1.0, ..right }, "share of friction"),
     ] {
         let message = check(&wrong, |_| (), |_| ()).expect_err("no check").to_string();
         assert!(message.contains(words), "{words}: {message}");
@@ -205,7 +208,7 @@ fn a_check_that_cannot_be_is_refused() {
 fn buzzing(is_guarded: bool) -> SimulationSettings {
     let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
     // Less damping than a firm grip has when it is asked to calm something.
-    let hand = Hand { damping: 0.002, ..Hand::firm(path) };
+    let hand = SimulatedHand { damping: 0.002, ..SimulatedHand::firm(path) };
     let mut all = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
     let (delay, damping) = (2, 0.5e-3);
     all.plant.friction = [0.0; 2];
@@ -229,9 +232,11 @@ fn the_thesis_body_buzzes_without_guard_and_not_with_it() {
     let mut swings = Vec::new();
     for is_guarded in [false, true] {
         let settings = buzzing(is_guarded);
-        let verdict = settings.system.watch().before_play(Depth(30.0), palpate_model::MmPerS(0.0));
+        let verdict =
+            settings.system.watch().assess_stroke(Depth(30.0), palpate_model::MmPerS(0.0));
         assert!(!verdict.is_calm());
-        let there = settings.system.watch().exactly_at(Depth(25.0), palpate_model::MmPerS(0.0));
+        let there =
+            settings.system.watch().exact_margin_at(Depth(25.0), palpate_model::MmPerS(0.0));
         assert!((there.needed * 1e3 - 3.55).abs() < 0.01, "{there:?}");
         let mut simulation = Simulation::new(&settings).expect("a simulation");
         let (mut buzzes, mut low, mut high, mut hz) = (0u32, f64::MAX, f64::MIN, 0.0);
@@ -340,13 +345,14 @@ fn a_late_slave_lags_and_turns_the_impedance() {
 /// the ramp says and never steps by more than the limit. Switched off and on, it starts softly.
 #[test]
 fn stalls_and_switches_of_the_whole_are_ramped() {
-    let hand = Hand::firm(HandPath::RampHold { from: 0.0, to: 25.0, speed: 50.0 });
+    let hand = SimulatedHand::firm(HandPath::RampHold { from: 0.0, to: 25.0, speed: 50.0 });
     let settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
     let step = 0.5 * settings.system.torque.volts_per_newton() + 20.0 / 4096.0;
     let mut simulation = Simulation::new(&settings).expect("a simulation");
     let mut last = 0.0;
     for i in 0..1500 {
-        let one = if (300..450).contains(&i) { simulation.stalled() } else { simulation.tick() };
+        let one =
+            if (300..450).contains(&i) { simulation.tick_stalled() } else { simulation.tick() };
         let bias = one.output.bias.0;
         assert!((bias - last).abs() <= step, "tick {i}: from {last} V to {bias} V");
         assert_eq!(one.snapshot.flags.has(Flags::STALL), (450..699).contains(&i), "{i}");
@@ -370,7 +376,7 @@ fn stalls_and_switches_of_the_whole_are_ramped() {
 /// and the controller does next to nothing.
 #[test]
 fn calm_play_is_left_alone() {
-    let hand = Hand::firm(HandPath::Sine { middle: 10.0, amplitude: 12.0, hz: 0.5 });
+    let hand = SimulatedHand::firm(HandPath::Sine { middle: 10.0, amplitude: 12.0, hz: 0.5 });
     let mut settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
     settings.plant.x = -2.0;
     settings.system.surface_mm = 2.0;
@@ -429,7 +435,7 @@ fn a_voltage_drive_drags_and_a_current_drive_does_not() {
         (DriveKind::Voltage { gain: 1.0 }, 0.81 + 1.764),
         (DriveKind::Current { amps_per_volt: 1.0 }, 0.81),
     ] {
-        let hand = Hand::firm(HandPath::RampHold { from: -100.0, to: 0.0, speed: 100.0 });
+        let hand = SimulatedHand::firm(HandPath::RampHold { from: -100.0, to: 0.0, speed: 100.0 });
         let mut settings = SimulationSettings::of(THESIS, Period::MILLISECOND, hand);
         settings.plant.x = -100.0;
         settings.system.surface_mm = 200.0;

@@ -2,8 +2,8 @@
 
 use palpate_haptics::rig::Rack;
 use palpate_haptics::scene::{
-    DeviceSettings, Hand6, LedScene, Pose, Scene, SceneError, ScenePath, SceneSettings, SceneTick,
-    SimulatedDevice, WhyNoForce,
+    DeviceSettings, HandLedScene, HandPose, NoForceReason, Pose, Scene, SceneError, ScenePath,
+    SceneSettings, SceneTick, SimulatedDevice,
 };
 use palpate_haptics::{Flags, Period};
 use palpate_model::random::SplitMix;
@@ -11,7 +11,7 @@ use palpate_model::units::Depth;
 use palpate_test_support::naive_surface as naive;
 
 fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, SceneTick)) -> Scene {
-    let mut led = LedScene::new(settings).expect("a scene");
+    let mut led = HandLedScene::new(settings).expect("a scene");
     let ticks = settings.period.hz() * path.seconds();
     for _ in 0..ticks as u64 {
         let t = settings.period.time_of(led.scene.ticks() + 1).seconds();
@@ -22,12 +22,12 @@ fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, Sc
 }
 
 /// A place, and no turn.
-fn at(x: f64, y: f64, z: f64) -> Hand6 {
-    Hand6 { at: [x, y, z], turn: [0.0; 3] }
+fn at(x: f64, y: f64, z: f64) -> HandPose {
+    HandPose { at: [x, y, z], turn: [0.0; 3] }
 }
 
 fn pose(x: f64, y: f64, z: f64) -> Pose {
-    let Hand6 { at, turn } = at(x, y, z);
+    let HandPose { at, turn } = at(x, y, z);
     Pose { at, turn }
 }
 
@@ -49,7 +49,7 @@ fn a_device_under_a_constant_force_moves_as_mass_and_damping_say() {
         SimulatedDevice::new(settings, Period::MILLISECOND, [0.0; 3], [0.0; 3]).unwrap();
     let (m, b, force) = (1e-3 * settings.mass_kg, settings.damping_n_s_per_mm, 0.02);
     for tick in 1..=300_u32 {
-        device.follow(Hand6::default(), [force, 0.0, -2.0 * force], 1);
+        device.follow(HandPose::default(), [force, 0.0, -2.0 * force], 1);
         let t = f64::from(tick) * 1e-3;
         let decayed = 1.0 - (-b * t / m).exp();
         let place = force / b * (t - m / b * decayed);
@@ -151,13 +151,13 @@ fn the_force_of_a_long_hold_is_the_bodys_own() {
     let mut scene = Scene::new(settings).unwrap();
     let mut last = scene.last();
     for _ in 0..25_000 {
-        last = scene.feel(pose(30.0, 30.0, -20.0), 1);
+        last = scene.render(pose(30.0, 30.0, -20.0), 1);
     }
     let elastic = settings.body.elastic(Depth(20.0)).0;
     assert!((last.depth - 20.0).abs() < 1e-12 && elastic > 1.0);
     assert!((last.force[2] - elastic).abs() < 1e-6, "{last:?} {elastic}");
     assert_eq!([last.force[0], last.force[1]], [0.0; 2]);
-    assert_eq!(last.why, WhyNoForce::None);
+    assert_eq!(last.no_force_reason, NoForceReason::None);
 }
 
 #[test]
@@ -167,7 +167,7 @@ fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
     let flat = scene.hash();
     for tick in 0..200 {
         let x = 20.0 + 0.1 * f64::from(tick);
-        let report = scene.feel(pose(x, 31.2, -3.0), 1);
+        let report = scene.render(pose(x, 31.2, -3.0), 1);
         let node = scene.field().grid().nearest(report.proxy[0], report.proxy[1]).unwrap();
         let height = scene.field().heights()[scene.field().grid().index(node)];
         assert!((height - (report.proxy[2] - report.depth)).abs() < 1e-12, "{report:?} {height}");
@@ -179,7 +179,7 @@ fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
     }
     assert_ne!(scene.hash(), flat);
     for _ in 0..2000 {
-        scene.feel(pose(30.0, 30.0, 5.0), 1);
+        scene.render(pose(30.0, 30.0, 5.0), 1);
     }
     assert_eq!(scene.hash(), flat);
     assert!(scene.dirty().is_empty());
@@ -195,7 +195,7 @@ fn a_fast_poke_never_pops_through() {
         let mut depth = 0.0;
         for tick in 0..200 {
             let z = 1.0 - speed * f64::from(tick);
-            let report = scene.feel(pose(x, y, z), 1);
+            let report = scene.render(pose(x, y, z), 1);
             assert!(
                 report.depth >= depth && (report.depth - (-z).max(0.0)).abs() < 1e-9,
                 "{report:?}"
@@ -233,29 +233,29 @@ fn the_reason_for_no_force_is_reported() {
     let mut why = |x: f64, z: f64, ticks: u32| {
         let mut last = scene.last();
         for _ in 0..ticks {
-            last = scene.feel(pose(x, 30.0, z), 1);
+            last = scene.render(pose(x, 30.0, z), 1);
         }
-        assert!(!last.why.name().is_empty());
-        (last.why, last.force[2])
+        assert!(!last.no_force_reason.name().is_empty());
+        (last.no_force_reason, last.force[2])
     };
-    assert_eq!(why(30.0, 1.0, 1), (WhyNoForce::NoContact, 0.0));
-    assert_eq!(why(70.0, -1.0, 1), (WhyNoForce::Outside, 0.0));
-    assert_eq!(why(30.0, 1.0, 2000).0, WhyNoForce::NoContact);
-    assert_eq!(why(30.0, -4.0, 1).0, WhyNoForce::RampingIn);
+    assert_eq!(why(30.0, 1.0, 1), (NoForceReason::NoContact, 0.0));
+    assert_eq!(why(70.0, -1.0, 1), (NoForceReason::Outside, 0.0));
+    assert_eq!(why(30.0, 1.0, 2000).0, NoForceReason::NoContact);
+    assert_eq!(why(30.0, -4.0, 1).0, NoForceReason::RampingIn);
     // After its ramp and its memory: 0.1 N, which 0.26 N of friction hide.
-    assert_eq!(why(30.0, -4.0, 9000).0, WhyNoForce::BelowThreshold);
-    assert_eq!(why(30.0, -3.0, 3).0, WhyNoForce::Leaving);
-    assert_eq!(why(30.0, 5.0, 9000).0, WhyNoForce::NoContact);
+    assert_eq!(why(30.0, -4.0, 9000).0, NoForceReason::BelowThreshold);
+    assert_eq!(why(30.0, -3.0, 3).0, NoForceReason::Leaving);
+    assert_eq!(why(30.0, 5.0, 9000).0, NoForceReason::NoContact);
     let (deep, force) = why(30.0, -29.0, 200);
-    assert_eq!(deep, WhyNoForce::Saturated);
+    assert_eq!(deep, NoForceReason::Saturated);
     assert!((force - 3.3).abs() < 1e-9, "{force}");
-    assert_eq!(why(30.0, f64::NAN, 1).0, WhyNoForce::NotANumber);
+    assert_eq!(why(30.0, f64::NAN, 1).0, NoForceReason::NotANumber);
 }
 
 #[test]
 fn a_stall_is_led_through_and_the_force_rises_from_what_was_held() {
     let settings = SceneSettings::default();
-    let mut led = LedScene::new(settings).unwrap();
+    let mut led = HandLedScene::new(settings).unwrap();
     let mut follow = |ticks: u32, depth: f64, stall: u64| {
         let hand = at(30.0, 30.0, -depth);
         let mut report = led.tick_after(hand, stall);
@@ -269,7 +269,10 @@ fn a_stall_is_led_through_and_the_force_rises_from_what_was_held() {
     // The hand goes on while the loop is away.
     let after = follow(1, 22.0, away);
     assert_eq!(after.tick, before.tick + away);
-    assert!(after.flags.has(Flags::STALL) && after.why == WhyNoForce::RampingIn, "{after:?}");
+    assert!(
+        after.flags.has(Flags::STALL) && after.no_force_reason == NoForceReason::RampingIn,
+        "{after:?}"
+    );
     assert!(after.depth > before.depth + 2.0, "{after:?}");
     assert!((after.force[2] - before.force[2]).abs() < 0.05, "{before:?} {after:?}");
     let risen = follow(2000, 22.0, 1);

@@ -1,8 +1,8 @@
 //! What meshes, cuts and steps cost in exactness, and the planner against trying everything.
 
 use palpate_haptics::surface::{
-    Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Needs, PokeScene, SceneCurves, ScenePlan,
-    StepPoint, plan, slower,
+    Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, PokeScene, SceneCurves, ScenePlan,
+    SceneRequirements, StepPoint, plan, updated_cost_factor,
 };
 use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -160,7 +160,7 @@ fn the_plan_is_the_cheapest_of_all_that_hold() {
     let mut outcomes = [0; 3];
     for _ in 0..3000 {
         let curves = curves(&mut random);
-        let needs = Needs {
+        let needs = SceneRequirements {
             force: Tolerance::PercentOfThreshold(25.0),
             peak: Newtons(8.0 * random.uniform()),
             shape_mm: 1.5 * random.uniform(),
@@ -183,7 +183,7 @@ fn the_plan_is_the_cheapest_of_all_that_hold() {
                 assert!(found[1] <= needs.shape_mm && found[2] <= force);
             }
             Err(none) => {
-                assert_eq!(cheapest, f64::INFINITY, "{}", none.why);
+                assert_eq!(cheapest, f64::INFINITY, "{}", none.reason);
                 let factor = |one: &[f64; 3]| (one[1] / needs.shape_mm).max(one[2] / force);
                 let payable = all.iter().filter(|one| one[0] <= needs.budget_us);
                 let least = payable.map(factor).fold(f64::INFINITY, f64::min);
@@ -225,7 +225,7 @@ fn measured() -> SceneCurves {
 #[test]
 fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     let curves = measured();
-    let needs = Needs {
+    let needs = SceneRequirements {
         force: Tolerance::PercentOfThreshold(10.0),
         peak: Newtons(6.0),
         shape_mm: 0.12,
@@ -241,9 +241,9 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     assert!(dropped[1].0.contains("0.0005 s") && dropped[1].1 == 1e-3);
     assert_eq!(first.inert.map(|(name, _)| name), ["MinDist", "MaxDist"]);
     // It took longer than it may: with that, nothing holds 0.12 mm, and the refusal names the nearest.
-    let again = slower(&first, 1.0, 130.0);
+    let again = updated_cost_factor(&first, 1.0, 130.0);
     let none = plan(&needs, &curves, again).unwrap_err();
-    assert!(none.why.contains("130.0 us") && none.why.contains("100 us"), "{}", none.why);
+    assert!(none.reason.contains("130.0 us") && none.reason.contains("100 us"), "{}", none.reason);
     let nearest = none.nearest.unwrap();
     assert_eq!((nearest.mesh.nodes, nearest.cut.range), (201, Some(40)));
     assert!(nearest.dropped.iter().any(|one| one.what.contains("40 nodes")));
@@ -251,30 +251,32 @@ fn a_plan_says_what_it_dropped_and_a_missed_budget_makes_another() {
     // The factor makes the plan cost what it was seen to; faster ticks and no times change nothing.
     assert!((again * first.cost_us - 130.0).abs() < 1e-9);
     for harmless in [1.0, 0.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(slower(&first, 2.0, harmless), 2.0);
+        assert_eq!(updated_cost_factor(&first, 2.0, harmless), 2.0);
     }
 }
 
 #[test]
 fn what_cannot_be_planned_is_refused_in_a_sentence() {
-    let needs = Needs {
+    let needs = SceneRequirements {
         force: Tolerance::PercentOfThreshold(10.0),
         peak: Newtons(6.0),
         shape_mm: 0.12,
         budget_us: 100.0,
     };
-    let why = |needs: Needs, curves: &SceneCurves| plan(&needs, curves, 1.0).unwrap_err().why;
+    let why = |needs: SceneRequirements, curves: &SceneCurves| {
+        plan(&needs, curves, 1.0).unwrap_err().reason
+    };
     let good = measured();
     for (shape_mm, budget_us) in [(f64::NAN, 1.0), (0.0, 1.0), (0.1, f64::INFINITY), (0.1, -1.0)] {
-        let needs = Needs { shape_mm, budget_us, ..needs };
+        let needs = SceneRequirements { shape_mm, budget_us, ..needs };
         assert!(why(needs, &good).contains("not possible"));
     }
-    let finer = Needs { shape_mm: 0.01, ..needs };
+    let finer = SceneRequirements { shape_mm: 0.01, ..needs };
     let said = why(finer, &good);
     assert!(said.contains("0.01 mm") && said.contains("0.02"));
-    let firmer = Needs { peak: Newtons(0.1), ..needs };
+    let firmer = SceneRequirements { peak: Newtons(0.1), ..needs };
     assert!(why(firmer, &good).contains("force"));
-    let hurried = Needs { budget_us: 0.01, ..needs };
+    let hurried = SceneRequirements { budget_us: 0.01, ..needs };
     assert!(why(hurried, &good).contains("budget"));
     let mut empty = good.clone();
     empty.cuts.clear();

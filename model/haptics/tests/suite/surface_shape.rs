@@ -1,10 +1,11 @@
 //! The shape of a poked surface against its closed form, and what must hold of it whatever touches it.
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Side, Surface,
+    ContactSide, Cut, Grid, GridNode, HeightField, Surface, SurfaceContact, SurfaceMethod,
+    SurfaceRecovery,
 };
 use palpate_model::Seconds;
-use palpate_test_support::naive_surface::{self as naive, Order};
+use palpate_test_support::naive_surface::{self as naive, PassOrder};
 use palpate_test_support::record::Noise;
 
 /// Exact in binary, so that sums of limits have no rounding and two orders of adding agree.
@@ -14,24 +15,29 @@ fn grid(columns: usize, rows: usize) -> Grid {
     Grid::new(columns, rows, 0.5).expect("a grid")
 }
 
-fn node(column: usize, row: usize) -> Node {
-    Node { column: column as u16, row: row as u16 }
+fn node(column: usize, row: usize) -> GridNode {
+    GridNode { column: column as u16, row: row as u16 }
 }
 
-fn surface(field: &HeightField, method: Method, recovery: Recovery, cut: Cut) -> Surface {
+fn surface(
+    field: &HeightField,
+    method: SurfaceMethod,
+    recovery: SurfaceRecovery,
+    cut: Cut,
+) -> Surface {
     Surface::new(field.clone(), method, recovery, cut)
 }
 
-fn lasting(field: &HeightField, method: Method) -> Surface {
-    surface(field, method, Recovery::NONE, Cut::NONE)
+fn lasting(field: &HeightField, method: SurfaceMethod) -> Surface {
+    surface(field, method, SurfaceRecovery::NONE, Cut::NONE)
 }
 
-fn push(grid: &Grid, column: usize, row: usize, z: f64) -> Contact {
-    Contact::at(grid, node(column, row), z, Side::Push)
+fn push(grid: &Grid, column: usize, row: usize, z: f64) -> SurfaceContact {
+    SurfaceContact::at(grid, node(column, row), z, ContactSide::Push)
 }
 
 /// Every height that the closed form gives.
-fn closed(heights: &[f64], grid: &Grid, at: Node, z: f64, shear: f64) -> Vec<f64> {
+fn closed(heights: &[f64], grid: &Grid, at: GridNode, z: f64, shear: f64) -> Vec<f64> {
     let mut expected = heights.to_vec();
     for row in 0..grid.rows() {
         for column in 0..grid.columns() {
@@ -55,7 +61,7 @@ fn hills(random: &mut Noise, grid: &Grid) -> Vec<f64> {
     heights
 }
 
-fn any_node(random: &mut Noise, grid: &Grid) -> Node {
+fn any_node(random: &mut Noise, grid: &Grid) -> GridNode {
     let mut below = |count: usize| (random.uniform() * count as f64) as usize % count;
     node(below(grid.columns()), below(grid.rows()))
 }
@@ -86,7 +92,7 @@ fn a_poke_of_a_flat_surface_is_the_closed_form_with_its_count_and_volume() {
             if depth > 0.0 && reach <= n / 2 {
                 assert_eq!(count, 2 * reach * reach + 2 * reach + 1);
             }
-            for method in Method::ALL {
+            for method in SurfaceMethod::ALL {
                 let mut surface = lasting(&field, method);
                 let report = surface.tick(&[push(&grid, n / 2, n / 2, -depth)]);
                 assert_eq!(surface.heights(), expected, "{n} {ratio} {method:?}");
@@ -109,17 +115,17 @@ fn all_methods_agree_on_hills_with_the_closed_form_for_any_contacts() {
         let grid = grid(3 + trial % 40, 2 + (trial * 7) % 33);
         let rest = hills(&mut random, &grid);
         let field = HeightField::new(grid, rest, S).unwrap();
-        let mut surfaces = Method::ALL.map(|method| lasting(&field, method));
+        let mut surfaces = SurfaceMethod::ALL.map(|method| lasting(&field, method));
         let mut expected = field.rest().to_vec();
         let mut plain = expected.clone();
         for _ in 0..3 {
             let mut contacts = Vec::new();
             for _ in 0..11 {
                 let (at, z) = (any_node(&mut random, &grid), binary(&mut random, 4.0));
-                contacts.push(Contact::at(&grid, at, z, Side::Push));
+                contacts.push(SurfaceContact::at(&grid, at, z, ContactSide::Push));
                 expected = closed(&expected, &grid, at, z, S);
                 let seed = (grid.index(at), z);
-                naive::push(&mut plain, grid.columns(), |_, _| S, seed, Order::First);
+                naive::push(&mut plain, grid.columns(), |_, _| S, seed, PassOrder::First);
             }
             let report = surfaces.each_mut().map(|surface| surface.tick(&contacts));
             for surface in &surfaces {
@@ -134,23 +140,23 @@ fn all_methods_agree_on_hills_with_the_closed_form_for_any_contacts() {
 #[test]
 fn pulling_up_is_pushing_down_mirrored() {
     let mut random = Noise::seeded(2);
-    for method in Method::ALL {
+    for method in SurfaceMethod::ALL {
         let grid = grid(37, 29);
         let rest = hills(&mut random, &grid);
         let mirrored = rest.iter().map(|z| -z).collect();
         let field = |rest| HeightField::new(grid, rest, S).unwrap();
-        let recovery = Recovery::new(Seconds(0.01), Seconds(1e-3)).unwrap();
+        let recovery = SurfaceRecovery::new(Seconds(0.01), Seconds(1e-3)).unwrap();
         let cut = Cut::new(Some(9), 1.0 / 64.0).unwrap();
         let mut down = surface(&field(rest), method, recovery, cut);
         let mut up = surface(&field(mirrored), method, recovery, cut);
         for _ in 0..50 {
-            let push = Contact::at(
+            let push = SurfaceContact::at(
                 &grid,
                 any_node(&mut random, &grid),
                 binary(&mut random, 4.0),
-                Side::Push,
+                ContactSide::Push,
             );
-            let pull = Contact { z: -push.z, side: Side::Pull, ..push };
+            let pull = SurfaceContact { z: -push.z, side: ContactSide::Pull, ..push };
             assert_eq!(down.tick(&[push]), up.tick(&[pull]));
             for (down, up) in down.heights().iter().zip(up.heights()) {
                 assert_eq!(*down, -up);
@@ -166,17 +172,19 @@ fn no_link_is_ever_beyond_its_limit() {
         let grid = grid(41, 23);
         let field = HeightField::new(grid, hills(&mut random, &grid), S).unwrap();
         let recovery = match trial % 3 {
-            0 => Recovery::NONE,
-            1 => Recovery::ELASTIC,
-            _ => Recovery::new(Seconds(0.02), Seconds(1e-3)).unwrap(),
+            0 => SurfaceRecovery::NONE,
+            1 => SurfaceRecovery::ELASTIC,
+            _ => SurfaceRecovery::new(Seconds(0.02), Seconds(1e-3)).unwrap(),
         };
-        let mut surfaces = Method::ALL.map(|method| surface(&field, method, recovery, Cut::NONE));
+        let mut surfaces =
+            SurfaceMethod::ALL.map(|method| surface(&field, method, recovery, Cut::NONE));
         for _ in 0..40 {
-            let contacts: Vec<Contact> = (0..3)
+            let contacts: Vec<SurfaceContact> = (0..3)
                 .map(|_| {
-                    let side = if random.uniform() < 0.7 { Side::Push } else { Side::Pull };
+                    let side =
+                        if random.uniform() < 0.7 { ContactSide::Push } else { ContactSide::Pull };
                     let z = 12.0 * (random.uniform() - 0.5);
-                    Contact::at(&grid, any_node(&mut random, &grid), z, side)
+                    SurfaceContact::at(&grid, any_node(&mut random, &grid), z, side)
                 })
                 .collect();
             for surface in &mut surfaces {
@@ -194,12 +202,12 @@ fn pokes_are_idempotent_monotone_and_commute() {
     for trial in 0..30 {
         let grid = grid(33, 21);
         let field = HeightField::new(grid, hills(&mut random, &grid), S).unwrap();
-        let method = Method::ALL[trial % 2];
+        let method = SurfaceMethod::ALL[trial % 2];
         let [a, b] = [0, 1].map(|_| {
             let z = binary(&mut random, 5.0);
-            Contact::at(&grid, any_node(&mut random, &grid), z, Side::Push)
+            SurfaceContact::at(&grid, any_node(&mut random, &grid), z, ContactSide::Push)
         });
-        let after = |contacts: &[Contact]| {
+        let after = |contacts: &[SurfaceContact]| {
             let mut surface = lasting(&field, method);
             for contact in contacts {
                 surface.tick(&[*contact]);
@@ -209,7 +217,7 @@ fn pokes_are_idempotent_monotone_and_commute() {
         let once = after(&[a]);
         assert_eq!(once, after(&[a, a]));
         assert_eq!(after(&[a, b]), after(&[b, a]));
-        let deeper = after(&[Contact { z: a.z - random.uniform(), ..a }]);
+        let deeper = after(&[SurfaceContact { z: a.z - random.uniform(), ..a }]);
         assert!(once.iter().zip(&deeper).all(|(once, deeper)| deeper <= once));
     }
 }
@@ -224,7 +232,7 @@ fn pokes_follow_shifts_and_quarter_turns() {
         surface.tick(&[push(&grid, column, row, -0.83)]);
         surface.heights().to_vec()
     };
-    for method in Method::ALL {
+    for method in SurfaceMethod::ALL {
         let [one, shifted, turned] =
             [(20, 18), (25, 21), (18, n - 1 - 20)].map(|(c, r)| shape(method, c, r));
         let at = |heights: &[f64], column: usize, row: usize| heights[row * n + column];
@@ -248,14 +256,14 @@ fn last_moved_first_breaks_the_limits_of_a_surface_but_not_of_a_line() {
         let n = 51;
         let seed = (n * (n / 2) + n / 2, -ratio * S);
         let mut z = vec![0.0; n * n];
-        naive::push(&mut z, n, |_, _| S, seed, Order::Last);
+        naive::push(&mut z, n, |_, _| S, seed, PassOrder::Last);
         assert!(naive::worst_excess(&z, n, |_, _| S) > 0.5 * S, "{ratio}");
         let grid = grid(n, n);
         let expected = closed(&vec![0.0; n * n], &grid, node(n / 2, n / 2), seed.1, S);
         assert_ne!(z, expected);
         // A line: one dimension hides the mistake.
         let mut line = vec![0.0; n];
-        naive::push(&mut line, n, |_, _| S, (n / 2, seed.1), Order::Last);
+        naive::push(&mut line, n, |_, _| S, (n / 2, seed.1), PassOrder::Last);
         assert!(naive::worst_excess(&line, n, |_, _| S) <= 0.0);
     }
 }
@@ -266,14 +274,18 @@ fn a_threshold_leaves_out_no_more_than_itself() {
     for _ in 0..20 {
         let grid = grid(39, 31);
         let field = HeightField::new(grid, hills(&mut random, &grid), S).unwrap();
-        let contact =
-            Contact::at(&grid, any_node(&mut random, &grid), binary(&mut random, 5.0), Side::Push);
-        for method in Method::ALL {
+        let contact = SurfaceContact::at(
+            &grid,
+            any_node(&mut random, &grid),
+            binary(&mut random, 5.0),
+            ContactSide::Push,
+        );
+        for method in SurfaceMethod::ALL {
             let mut whole = lasting(&field, method);
             let mut last = whole.tick(&[contact]).moved.moved;
             for threshold in [1.0 / 64.0, 1.0 / 16.0, 0.1875, 0.5, 1.0] {
                 let cut = Cut::new(None, threshold).unwrap();
-                let mut cut = surface(&field, method, Recovery::NONE, cut);
+                let mut cut = surface(&field, method, SurfaceRecovery::NONE, cut);
                 let moved = cut.tick(&[contact]).moved.moved;
                 assert!(moved <= last);
                 last = moved;
@@ -289,10 +301,10 @@ fn a_threshold_leaves_out_no_more_than_itself() {
     let field = HeightField::flat(grid, S).unwrap();
     for (depth, threshold) in [(5.0, 0.125), (3.3, 0.25), (2.0, 1.9), (0.5, 0.125)] {
         let reach = ((depth - threshold) / S).ceil() as usize - 1;
-        for method in Method::ALL {
+        for method in SurfaceMethod::ALL {
             let cut = Cut::new(None, threshold).unwrap();
-            let report =
-                surface(&field, method, Recovery::NONE, cut).tick(&[push(&grid, 50, 50, -depth)]);
+            let report = surface(&field, method, SurfaceRecovery::NONE, cut)
+                .tick(&[push(&grid, 50, 50, -depth)]);
             assert_eq!(report.moved.moved, 2 * reach * reach + 2 * reach + 1);
         }
     }
@@ -307,10 +319,10 @@ fn a_range_ends_the_chain() {
     let at = node(11, 17);
     let expected = closed(field.rest(), &grid, at, -9.0, S);
     for range in [0, 1, 5, 12] {
-        for method in Method::ALL {
+        for method in SurfaceMethod::ALL {
             let cut = Cut::new(Some(range), 0.0).unwrap();
-            let mut surface = surface(&field, method, Recovery::NONE, cut);
-            surface.tick(&[Contact::at(&grid, at, -9.0, Side::Push)]);
+            let mut surface = surface(&field, method, SurfaceRecovery::NONE, cut);
+            surface.tick(&[SurfaceContact::at(&grid, at, -9.0, ContactSide::Push)]);
             for row in 0..grid.rows() {
                 for column in 0..grid.columns() {
                     let here = node(column, row);
@@ -330,7 +342,7 @@ fn a_range_ends_the_chain() {
 fn edges_and_numbers_that_are_none() {
     let grid = grid(9, 5);
     let flat = |shear| HeightField::flat(grid, shear).unwrap();
-    for method in Method::ALL {
+    for method in SurfaceMethod::ALL {
         // Corner and edge: the closed form.
         for (column, row) in [(0, 0), (8, 0), (0, 4), (8, 4), (4, 0), (0, 2)] {
             let mut surface = lasting(&flat(S), method);
@@ -341,7 +353,7 @@ fn edges_and_numbers_that_are_none() {
             }
         }
         let mut surface = lasting(&flat(S), method);
-        let none = |x, y, z| Contact { x, y, z, side: Side::Push };
+        let none = |x, y, z| SurfaceContact { x, y, z, side: ContactSide::Push };
         let [nan, inf] = [f64::NAN, f64::INFINITY];
         let nothing = [
             none(-0.3, 0.0, -1.0),
@@ -399,20 +411,20 @@ fn whatever_comes_in_heights_stay_numbers_within_a_kilometre() {
     let grid = grid(13, 11);
     let taus = [0.0, 5e-324, 1e-3, 1e300, f64::INFINITY];
     for (trial, shear) in [0.0, 5e-324, 0.1, 1e300, f64::INFINITY].into_iter().enumerate() {
-        for method in Method::ALL {
+        for method in SurfaceMethod::ALL {
             let field = HeightField::new(grid, vec![1.5; grid.nodes()], shear).unwrap();
-            let recovery = Recovery::new(Seconds(taus[trial]), Seconds(1e-3)).unwrap();
+            let recovery = SurfaceRecovery::new(Seconds(taus[trial]), Seconds(1e-3)).unwrap();
             let cut = Cut::new(None, [0.0, 1e300][trial % 2]).unwrap();
             let mut surface = surface(&field, method, recovery, cut);
             for tick in 0..300 {
-                let contacts = [0; 3].map(|_| Contact {
+                let contacts = [0; 3].map(|_| SurfaceContact {
                     x: any(8.0),
                     y: any(6.0),
                     z: any(4.0),
-                    side: if tick % 2 == 0 { Side::Push } else { Side::Pull },
+                    side: if tick % 2 == 0 { ContactSide::Push } else { ContactSide::Pull },
                 });
                 let report = surface.tick(&contacts);
-                let is_none = |contact: &&Contact| {
+                let is_none = |contact: &&SurfaceContact| {
                     contact.z.is_nan() || grid.nearest(contact.x, contact.y).is_none()
                 };
                 assert_eq!(report.ignored, contacts.iter().filter(is_none).count());

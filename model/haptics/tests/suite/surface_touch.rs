@@ -1,8 +1,8 @@
 //! Normals and the contact point against planes and paraboloids.
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Heights, Method, Node, Proxy, ProxyTouch, Recovery, Side,
-    Surface, TouchState,
+    ContactSide, Cut, Grid, GridNode, HeightField, Heights, Proxy, ProxyTouch, Surface,
+    SurfaceContact, SurfaceMethod, SurfaceRecovery, TouchState,
 };
 use palpate_test_support::naive_surface as naive;
 use palpate_test_support::record::Noise;
@@ -31,7 +31,7 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Normals of all nodes, row by row.
 fn normals(heights: Heights) -> Vec<[f64; 3]> {
     let [columns, rows] = [heights.grid().columns(), heights.grid().rows()].map(|n| n as u16);
-    let nodes = (0..rows).flat_map(|row| (0..columns).map(move |column| Node { column, row }));
+    let nodes = (0..rows).flat_map(|row| (0..columns).map(move |column| GridNode { column, row }));
     nodes.map(|node| heights.normal(node)).collect()
 }
 
@@ -264,9 +264,10 @@ fn places_that_are_none_give_no_contact_and_say_why() {
 fn depth_is_of_the_rest_surface_for_the_one_that_followed_the_tool_has_none() {
     let grid = Grid::new(51, 51, 0.5).unwrap();
     let field = HeightField::new(grid, vec![0.0; 51 * 51], 0.1).unwrap();
-    let mut surface = Surface::new(field, Method::Envelope, Recovery::ELASTIC, Cut::NONE);
+    let mut surface =
+        Surface::new(field, SurfaceMethod::Envelope, SurfaceRecovery::ELASTIC, Cut::NONE);
     let device = [12.5, 12.5, -2.0];
-    let tool = Contact { x: 12.5, y: 12.5, z: -2.0, side: Side::Push };
+    let tool = SurfaceContact { x: 12.5, y: 12.5, z: -2.0, side: ContactSide::Push };
     surface.tick(&[tool]);
     let depth = |surface| Proxy::new(0.0).unwrap().follow(surface, device).depth;
     assert!((depth(surface.field().at_rest()) - 2.0).abs() < 1e-12);

@@ -8,7 +8,7 @@
 //! ```
 
 use palpate_model::units::Seconds;
-use palpate_model::viscoelastic::{Compensated, psi};
+use palpate_model::viscoelastic::{CompensatedSum, psi};
 
 /// Parameters of a Maxwell body, in the unit of the stress; strain is a ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl MaxwellStep {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaxwellState {
     /// Stress over `k`.
-    response: Compensated,
+    response: CompensatedSum,
     strain: f64,
 }
 
@@ -75,7 +75,7 @@ impl MaxwellState {
     /// A relaxed body at `strain`.
     #[must_use]
     pub fn at_rest_from(strain: f64) -> Self {
-        Self { response: Compensated::default(), strain }
+        Self { response: CompensatedSum::default(), strain }
     }
 
     /// Moves to `strain_to` within `dt` and returns the stress at the end.

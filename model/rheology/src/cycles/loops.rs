@@ -2,7 +2,7 @@
 
 use super::creep::{Creep, creep};
 use super::local::{bins, last_rise, mean, parabola};
-use super::relaxation::{Relaxation, relaxation};
+use super::relaxation::{StressRelaxation, relaxation};
 use super::{CycleSample, Estimate};
 use palpate_model::rig::Phase;
 use palpate_model::signal::work;
@@ -60,7 +60,7 @@ pub struct CycleAnalysis {
     /// Stiffness at the depth asked for.
     pub stiffness: Option<Stiffness>,
     /// The hold of the depth that follows loading, if there was one of twenty samples.
-    pub relaxation: Option<Relaxation>,
+    pub relaxation: Option<StressRelaxation>,
     /// The holds of a force of twenty samples or more, one for each step of the plan.
     pub creep: Vec<Creep>,
 }
@@ -73,7 +73,7 @@ impl CycleAnalysis {
     }
 
     /// Depth at half the first peak.
-    pub fn at_half(&self) -> Option<Depth> {
+    pub fn depth_at_half_peak(&self) -> Option<Depth> {
         self.levels[HALF].map(|level| level.depth.value)
     }
 }
@@ -82,7 +82,7 @@ impl CycleAnalysis {
 /// stiffness, 80 % of the first cycle's depth if none is given; `pulse` is the least step of the depth, where it is
 /// known.
 #[must_use]
-pub fn analyse(
+pub fn analyse_cycles(
     samples: &[CycleSample],
     at: Option<Depth>,
     pulse: Option<Depth>,

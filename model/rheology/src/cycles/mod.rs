@@ -2,7 +2,7 @@
 //! to a sine; and what a fitted body's prediction of a record is worth.
 //!
 //! Everything is measured on the record itself; no model is assumed but where a name says so. Standard errors hold
-//! for independent noise. [`analyse`] does the cycles; [`sine`], [`creep`] and [`predict`] stand alone.
+//! for independent noise. [`analyse_cycles`] does the cycles; [`sine`], [`creep`] and [`predict_cycles`] stand alone.
 
 mod creep;
 mod local;
@@ -14,11 +14,11 @@ mod split;
 mod steady;
 
 pub use creep::{Creep, creep};
-pub use loops::{CycleAnalysis, LEVELS, LevelDepth, Stiffness, analyse, stiffness_at};
-pub use predict::{Prediction, PredictionError, predict};
-pub use relaxation::{Relaxation, relaxation};
-pub use sine::{Sinusoid, SinusoidError, sinusoid};
-pub use split::by_depth;
+pub use loops::{CycleAnalysis, LEVELS, LevelDepth, Stiffness, analyse_cycles, stiffness_at};
+pub use predict::{CyclePrediction, PredictionError, predict_cycles};
+pub use relaxation::{StressRelaxation, relaxation};
+pub use sine::{Sinusoid, SinusoidError, fit_sinusoid};
+pub use split::split_by_depth;
 pub use steady::{CycleChange, Steadiness, SteadyRule};
 
 use palpate_model::rig::Phase;

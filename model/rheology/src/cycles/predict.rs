@@ -12,7 +12,7 @@ const NEAR: f64 = 0.02;
 
 /// A prediction beside its record; errors are predicted minus measured.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Prediction {
+pub struct CyclePrediction {
     /// Predicted force at every sample, in N.
     pub forces: Vec<Newtons>,
     /// Measured force at the turning point: what percentages refer to.
@@ -42,7 +42,7 @@ pub enum PredictionError {
     NotFinite,
 }
 
-impl Prediction {
+impl CyclePrediction {
     /// An error in percent of the measured peak.
     pub fn percent(&self, error: Newtons) -> f64 {
         100.0 * error.0 / self.peak.0
@@ -51,10 +51,10 @@ impl Prediction {
 
 /// Predicts the force along the path of a record that starts with the probe outside the tissue or just touching, by the
 /// exact step, and compares it with what was measured. Nothing is fitted.
-pub fn predict(
+pub fn predict_cycles(
     body: &ModifiedKelvin,
     samples: &[FitSample],
-) -> Result<Prediction, PredictionError> {
+) -> Result<CyclePrediction, PredictionError> {
     let mut state = KelvinState::at_rest_from(samples.first().map_or(Depth(0.0), |one| one.depth));
     let mut before = samples.first().map_or(0.0, |one| one.t.0);
     let forces: Vec<Newtons> = samples
@@ -89,7 +89,7 @@ pub fn predict(
         .iter()
         .copied()
         .fold(errors[0], |worst, one| if one.1.abs() > worst.1.abs() { one } else { worst });
-    Ok(Prediction {
+    Ok(CyclePrediction {
         peak: Newtons(peak),
         rms: Newtons((square / count).sqrt()),
         mean: Newtons(mean),
@@ -140,11 +140,11 @@ mod tests {
     #[test]
     fn the_right_body_predicts_without_error_and_an_offset_is_found() {
         let body = ModifiedKelvin::THESIS;
-        let exact = predict(&body, &record(&body, 0.0)).unwrap();
+        let exact = predict_cycles(&body, &record(&body, 0.0)).unwrap();
         assert!(exact.rms.0 < 1e-12 && exact.worst.0.0.abs() < 1e-12);
         // The thesis's peak, 6.396495 N, but for the curvature over the last 0.8 s.
         assert!((exact.peak.0 - 6.3965).abs() < 3e-3, "{:?}", exact.peak);
-        let off = predict(&body, &record(&body, -0.1)).unwrap();
+        let off = predict_cycles(&body, &record(&body, -0.1)).unwrap();
         assert!((off.at_peak.value.0 - 0.1).abs() < 1e-12);
         assert!((off.at_end.unwrap().value.0 - 0.1).abs() < 1e-12);
         assert!((off.worst.0.0 - 0.1).abs() < 1e-12 && off.worst.1.0 > 20.0 / 0.75);
@@ -163,10 +163,13 @@ mod tests {
         let mut samples = record(&body, 0.0);
         samples[5000].force = Newtons(99.0);
         samples[5000].sigma = Newtons(f64::INFINITY);
-        assert!(predict(&body, &samples).unwrap().worst.0.0.abs() < 1e-12);
-        assert!(matches!(predict(&body, &samples[..2]), Err(PredictionError::TooFew { .. })));
-        assert!(matches!(predict(&body, &[]), Err(PredictionError::TooFew { .. })));
+        assert!(predict_cycles(&body, &samples).unwrap().worst.0.0.abs() < 1e-12);
+        assert!(matches!(
+            predict_cycles(&body, &samples[..2]),
+            Err(PredictionError::TooFew { .. })
+        ));
+        assert!(matches!(predict_cycles(&body, &[]), Err(PredictionError::TooFew { .. })));
         samples[100].t = Seconds(0.0);
-        assert_eq!(predict(&body, &samples), Err(PredictionError::NotFinite));
+        assert_eq!(predict_cycles(&body, &samples), Err(PredictionError::NotFinite));
     }
 }

@@ -5,7 +5,7 @@ use super::local::{bins, last_rise, line, mean};
 use palpate_model::units::{Newtons, Seconds};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Relaxation {
+pub struct StressRelaxation {
     /// From the first to the last sample of the hold.
     pub duration: Seconds,
     /// Force at the end: a line through the last tenth of the hold, read at its end.
@@ -33,7 +33,7 @@ const RATIO_MAX: f64 = 0.9;
 
 /// Measures a hold from its points (time in s, force in N) and the force at its start; `None` for fewer than twenty.
 #[must_use]
-pub fn relaxation(hold: &[[f64; 2]], peak: Estimate<Newtons>) -> Option<Relaxation> {
+pub fn relaxation(hold: &[[f64; 2]], peak: Estimate<Newtons>) -> Option<StressRelaxation> {
     let (first, last) = (hold.first()?[0], hold.last()?[0]);
     let duration = last - first;
     if hold.len() < 20 || duration <= 0.0 || peak.value.0 == 0.0 {
@@ -43,7 +43,7 @@ pub fn relaxation(hold: &[[f64; 2]], peak: Estimate<Newtons>) -> Option<Relaxati
     let end = line(tail, last)?;
     let (remaining, top) = (end.value[0] / peak.value.0, peak.value.0);
     let percent_error = 100.0 * ((end.value[1] / top).hypot(remaining * peak.std_error.0 / top));
-    Some(Relaxation {
+    Some(StressRelaxation {
         duration: Seconds(duration),
         force_end: Estimate::of(Newtons, end.value),
         percent: Estimate { value: 100.0 * (1.0 - remaining), std_error: percent_error },

@@ -91,7 +91,7 @@ struct HarmonicFit {
 }
 
 /// Evaluates a record of a sine of known frequency in Hz, by least squares over whole cycles up to its end.
-pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, SinusoidError> {
+pub fn fit_sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, SinusoidError> {
     if !(frequency > 0.0 && frequency.is_finite()) {
         return Err(SinusoidError::Frequency { frequency });
     }
@@ -248,7 +248,7 @@ mod tests {
             };
             let seconds = (20.0 / f).max(40.0);
             let all = record(f, seconds, force);
-            let found = sinusoid(&all[20_000.min(all.len() / 2)..], f).unwrap();
+            let found = fit_sinusoid(&all[20_000.min(all.len() / 2)..], f).unwrap();
             assert!((found.storage.value - storage).abs() < 1e-8, "{f}: {found:?}");
             assert!((found.loss.value - loss).abs() < 1e-8, "{f}: {found:?}");
             let degrees = (loss / storage).atan().to_degrees();
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn distortion_is_the_root_of_squares() {
         let f = 1.0;
-        let found = sinusoid(
+        let found = fit_sinusoid(
             &record(f, 5.0, |t| {
                 let w = TAU * f * t;
                 2.0 + w.cos() + 0.03 * (2.0 * w).sin() + 0.04 * (3.0 * w).cos() + 0.1 * t
@@ -287,7 +287,7 @@ mod tests {
                     let pressed = (mean - 0.2 * (TAU * t + 0.3).cos()).max(0.0);
                     pressed + drift + rms * noise[(t * 1e3).round() as usize % noise.len()]
                 };
-                let found = sinusoid(&record(1.0, 10.0, force), 1.0).unwrap();
+                let found = fit_sinusoid(&record(1.0, 10.0, force), 1.0).unwrap();
                 let remark = found.remark();
                 assert_eq!(remark.is_some(), is_lost, "{mean} {rms} {drift}: {found:?}");
                 if mean == 0.1 {
@@ -298,7 +298,7 @@ mod tests {
             }
         }
         // A glued specimen pulls as much as it presses.
-        let found = sinusoid(&record(1.0, 10.0, |t| 0.2 * (TAU * t).cos()), 1.0).unwrap();
+        let found = fit_sinusoid(&record(1.0, 10.0, |t| 0.2 * (TAU * t).cos()), 1.0).unwrap();
         assert!(found.remark().is_none(), "{found:?}");
     }
 
@@ -312,7 +312,7 @@ mod tests {
                 let w = TAU * t;
                 5.0 - 0.5 * (0.4 * w.cos() - 0.1 * w.sin()) + noise[(t * 1e3).round() as usize]
             };
-            let found = sinusoid(&record(1.0, 6.0, force), 1.0).unwrap();
+            let found = fit_sinusoid(&record(1.0, 6.0, force), 1.0).unwrap();
             storages += ((found.storage.value - 0.4) / found.storage.std_error).powi(2);
             let miss = found.phase_degrees.value - 0.25f64.atan().to_degrees();
             phases += (miss / found.phase_degrees.std_error).powi(2);
@@ -326,7 +326,7 @@ mod tests {
     fn refusals_say_what_is_missing() {
         let all = record(1.0, 2.0, |_| 1.0);
         let message =
-            |samples: &[CycleSample], f: f64| sinusoid(samples, f).unwrap_err().to_string();
+            |samples: &[CycleSample], f: f64| fit_sinusoid(samples, f).unwrap_err().to_string();
         assert!(message(&all, 0.1).contains("0.20 cycles"));
         assert!(message(&all, 200.0).contains("5.0 samples"));
         assert!(message(&all, f64::NAN).contains("is not possible"));

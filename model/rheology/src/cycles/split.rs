@@ -13,7 +13,7 @@ const HOLD: f64 = 0.005;
 /// Divides a record into cycles, each of loading, a hold where the depth stays within half a percent of its greatest, and
 /// unloading. A cycle begins where the depth is least before it rises through most of its range.
 #[must_use]
-pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
+pub fn split_by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
     let low = depth.iter().copied().fold(f64::INFINITY, f64::min);
     let high = depth.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let range = high - low;
@@ -87,7 +87,7 @@ mod tests {
         depth.extend((1..=100).map(|i| 0.1 * f64::from(i)));
         depth.extend((0..100).map(|i| 9.9 - 0.1 * f64::from(i)));
         let t: Vec<f64> = (0..depth.len()).map(|i| i as f64).collect();
-        let all = by_depth(&t, &depth, &depth);
+        let all = split_by_depth(&t, &depth, &depth);
         let count = |cycle: u32, phase: Phase| {
             all.iter().filter(|one| one.cycle == cycle && one.phase == phase).count()
         };
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(count(1, Phase::Unload), 129);
         assert_eq!([count(2, Phase::Ramp), count(2, Phase::Hold)], [101, 0]);
         assert_eq!(count(2, Phase::Unload), 100);
-        assert!(by_depth(&[], &[], &[]).is_empty());
-        assert!(by_depth(&[0.0, 1.0], &[f64::NAN; 2], &[0.0; 2]).is_empty());
+        assert!(split_by_depth(&[], &[], &[]).is_empty());
+        assert!(split_by_depth(&[0.0, 1.0], &[f64::NAN; 2], &[0.0; 2]).is_empty());
     }
 }

@@ -9,7 +9,7 @@ pub struct SteadyRule {
     /// Largest change from one cycle to the next: of the peak in percent of it, of the place in percent of the greatest
     /// depth.
     pub percent: f64,
-    /// Changes in a row that have to be so small.
+    /// CatalogChanges in a row that have to be so small.
     pub in_a_row: usize,
 }
 
@@ -34,7 +34,7 @@ pub struct CycleChange {
     pub shift_percent: Option<f64>,
 }
 
-/// Changes from cycle to cycle and what they amount to.
+/// CatalogChanges from cycle to cycle and what they amount to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steadiness {
     /// One for every cycle but the first.
@@ -64,7 +64,7 @@ impl SteadyRule {
 
 fn change(before: &CycleAnalysis, after: &CycleAnalysis) -> CycleChange {
     let (one, other) = (before.force_peak.value.0, after.force_peak.value.0);
-    let shift = match (before.at_half(), after.at_half()) {
+    let shift = match (before.depth_at_half_peak(), after.depth_at_half_peak()) {
         (Some(from), Some(to)) => Some(Depth(to.0 - from.0)),
         _ => None,
     };

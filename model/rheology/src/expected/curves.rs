@@ -1,9 +1,9 @@
 //! Expected intervals against what can be chosen: hold, number of cycles, sampling rate.
 
 use super::information::{ExpectedError, intervals};
-use super::noise::{Noise, Unknowns};
+use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::ProtocolPath;
-use super::rig::{Rig, allowed_speeds, shallowest_turn};
+use super::rig::{DesignLimits, allowed_speeds, shallowest_turn};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
@@ -23,7 +23,7 @@ const SPEEDS: usize = 4;
 
 /// Half-widths of 95 % intervals along one choice.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Curve {
+pub struct PrecisionCurve {
     /// Speed of the ramp or of the cycles.
     pub speed: MmPerS,
     /// Hold in s, number of cycles, or samples per second.
@@ -35,28 +35,28 @@ pub struct Curve {
 
 /// Expected intervals against what can be chosen.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Curves {
+pub struct PrecisionCurves {
     /// Ramp and hold: against the hold in s, at several speeds.
-    pub hold: Vec<Curve>,
+    pub hold: Vec<PrecisionCurve>,
     /// Cycles: against their number, at several speeds.
-    pub cycles: Vec<Curve>,
+    pub cycles: Vec<PrecisionCurve>,
     /// Their turning points: the shallowest that keep the probe in contact at all these speeds.
     pub between: [Depth; 2],
     /// The ramp and hold asked about: against samples per second.
-    pub rate: Curve,
+    pub rate: PrecisionCurve,
     /// Its hold in s.
     pub rate_hold: Seconds,
 }
 
 /// Curves for a body on a rig; those over the sampling rate for a ramp and hold of this speed and
 /// hold.
-pub fn curves(
+pub fn compute_precision_curves(
     body: &ModifiedKelvin,
-    noise: &Noise,
-    unknowns: Unknowns,
-    rig: &Rig,
+    noise: &MeasurementNoise,
+    unknowns: FreeOffsets,
+    rig: &DesignLimits,
     (speed, hold): (MmPerS, Seconds),
-) -> Result<Curves, ExpectedError> {
+) -> Result<PrecisionCurves, ExpectedError> {
     noise.check()?;
     let tau = body.checked()?.tau_eps;
     let speeds = allowed_speeds(body, rig)?;
@@ -65,15 +65,13 @@ pub fn curves(
         Ok(expected) => expected.parameters.map(|parameter| parameter.percent),
         Err(_) => [None; 5],
     };
-    let curve = |speed: MmPerS, x: Vec<f64>, protocol: &dyn Fn(f64) -> ProtocolPath| Curve {
-        speed,
-        percent: x.iter().map(|&x| at(protocol(x))).collect(),
-        x,
+    let curve = |speed: MmPerS, x: Vec<f64>, protocol: &dyn Fn(f64) -> ProtocolPath| {
+        PrecisionCurve { speed, percent: x.iter().map(|&x| at(protocol(x))).collect(), x }
     };
     let (depth, rate) = (rig.depth, rig.sample_rate_hz);
     let counts: Vec<f64> = (1..=CYCLES).map(|count| count as f64).collect();
     let between = [shallowest_turn(body, rig, speeds[0]), depth];
-    Ok(Curves {
+    Ok(PrecisionCurves {
         hold: drawn()
             .map(|speed| {
                 curve(speed, decades(HOLD_TAUS * tau), &|hold| {

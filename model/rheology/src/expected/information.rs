@@ -4,7 +4,7 @@
 //! them as the first columns of an orthogonal triangularisation, the rows below theirs hold what the
 //! press contributes to the body alone, and the rows of all presses are triangularised together.
 
-use super::noise::{Noise, Unknowns};
+use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::{ProtocolPath, duration_of};
 use super::response::{COLUMNS, DIRECT_MAX, NUISANCES, Press, STEPS_PER_TAU_MIN};
 use super::triangle;
@@ -88,8 +88,8 @@ pub struct ExpectedPrecision {
 pub fn intervals(
     body: &ModifiedKelvin,
     protocol: &ProtocolPath,
-    noise: &Noise,
-    unknowns: Unknowns,
+    noise: &MeasurementNoise,
+    unknowns: FreeOffsets,
 ) -> Result<ExpectedPrecision, ExpectedError> {
     protocol.check()?;
     noise.check()?;
@@ -160,7 +160,7 @@ pub(super) fn check_resolved(
 fn variances(
     inverse: &[[f64; BODY]; BODY],
     slow: &[[f64; BODY]; BODY],
-    noise: &Noise,
+    noise: &MeasurementNoise,
 ) -> [f64; BODY] {
     let sd = noise.memory.map_or(0.0, |memory| memory.sd.0);
     let bread: [[f64; BODY]; BODY] = std::array::from_fn(|i| {
@@ -186,7 +186,7 @@ struct PressSums {
 }
 
 impl PressSums {
-    fn of(press: &Press<'_>, unknowns: Unknowns) -> Self {
+    fn of(press: &Press<'_>, unknowns: FreeOffsets) -> Self {
         let mut sums = Self {
             triangle: Triangle::default(),
             slow: [[0.0; COLUMNS]; COLUMNS],

@@ -7,16 +7,16 @@
 //! 2.1 and 6.2). `J` needs a path and a body but no measurement, so intervals can be known, and the
 //! shortest protocol that reaches a wanted one found, before any tissue is touched.
 //!
-//! Start at [`intervals`] for one protocol and at [`shortest`] for the search.
+//! Start at [`intervals`] for one protocol and at [`find_shortest_protocols`] for the search.
 //!
 //! ```
-//! use palpate_rheology::expected::{Noise, ProtocolPath, Unknowns, intervals};
+//! use palpate_rheology::expected::{Noise, ProtocolPath, FreeOffsets, intervals};
 //! use palpate_model::viscoelastic::ModifiedKelvin;
 //! use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 //!
 //! let protocol = ProtocolPath::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(50.0), 1000.0);
 //! let noise = Noise::white(Newtons(0.02));
-//! let expected = intervals(&ModifiedKelvin::THESIS, &protocol, &noise, Unknowns::default())?;
+//! let expected = intervals(&ModifiedKelvin::THESIS, &protocol, &noise, FreeOffsets::default())?;
 //! let tau = &expected.parameters[0];
 //! assert_eq!(tau.name, "tau_eps");
 //! // 1.96 standard deviations of 0.166 %.
@@ -33,12 +33,12 @@ mod rig;
 mod search;
 mod triangle;
 
-pub use curves::{Curve, Curves, curves};
+pub use curves::{PrecisionCurve, PrecisionCurves, compute_precision_curves};
 pub use information::{
     ExpectedError, ExpectedParameter, ExpectedPrecision, PARAMETER_NAMES, PARAMETER_UNITS,
     intervals,
 };
-pub use noise::{Memory, Noise, Unknowns};
+pub use noise::{CorrelatedNoise, FreeOffsets, MeasurementNoise};
 pub use protocol::{PathPiece, ProtocolPath};
-pub use rig::Rig;
-pub use search::{Family, Proposal, Target, shortest};
+pub use rig::DesignLimits;
+pub use search::{PrecisionTarget, ProtocolFamily, ProtocolProposal, find_shortest_protocols};

@@ -6,23 +6,23 @@ use serde::Serialize;
 
 /// Force noise expected of every sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Noise {
+pub struct MeasurementNoise {
     /// Standard deviation in N of what is independent from sample to sample.
     pub white: Newtons,
     /// Slow noise on top, if any.
-    pub memory: Option<Memory>,
+    pub memory: Option<CorrelatedNoise>,
 }
 
 /// Noise whose autocorrelation decays exponentially: its covariance over a lag `t` is `sd^2 exp(-t / time)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Memory {
+pub struct CorrelatedNoise {
     /// Standard deviation in N.
     pub sd: Newtons,
     /// Correlation time in s.
     pub time: Seconds,
 }
 
-impl Noise {
+impl MeasurementNoise {
     /// Independent noise alone, standard deviation in N.
     #[must_use]
     pub fn white(sd: Newtons) -> Self {
@@ -47,19 +47,19 @@ impl Noise {
     }
 }
 
-/// Unknowns of a fit other than the five parameters of the body.
+/// FreeOffsets of a fit other than the five parameters of the body.
 ///
 /// Both widen the intervals of the body; a known offset makes the interval of mu1 two to three times
 /// narrower.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Unknowns {
+pub struct FreeOffsets {
     /// The force at the start of every press, in a body that was not quite at rest.
     pub f0: bool,
     /// An offset of the load cell during every press.
     pub f_offset: bool,
 }
 
-impl Default for Unknowns {
+impl Default for FreeOffsets {
     /// Those that [`crate::fit::FitOptions`] frees by default.
     fn default() -> Self {
         Self { f0: true, f_offset: true }

@@ -9,7 +9,7 @@
 //! [`DIRECT_MIN`], all samples are visited; but not more than [`DIRECT_MAX`], beyond which the
 //! integral has to do down to [`STEPS_PER_TAU_MIN`], with 2 %, and below that the press is refused.
 
-use super::noise::{Noise, Unknowns};
+use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::{PathPiece, duration_of};
 use palpate_model::viscoelastic::{ModifiedKelvin, StepWeights, forcing, psi_derivatives};
 
@@ -91,8 +91,8 @@ pub(super) struct Press<'a> {
     pub body: &'a ModifiedKelvin,
     pub pieces: &'a [PathPiece],
     pub sample_rate_hz: f64,
-    pub noise: &'a Noise,
-    pub unknowns: Unknowns,
+    pub noise: &'a MeasurementNoise,
+    pub unknowns: FreeOffsets,
 }
 
 impl Press<'_> {

@@ -16,7 +16,7 @@ const PEAK_STEPS: u32 = 256;
 pub(super) const TURNS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
 /// Limits of rig and specimen, and the sampling rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Rig {
+pub struct DesignLimits {
     /// Speeds are multiples of this.
     pub speed_quantum: MmPerS,
     pub speed_max: MmPerS,
@@ -33,7 +33,7 @@ pub struct Rig {
 /// The speeds that are tried, fastest first.
 pub(super) fn allowed_speeds(
     body: &ModifiedKelvin,
-    rig: &Rig,
+    rig: &DesignLimits,
 ) -> Result<Vec<MmPerS>, ExpectedError> {
     let checked = [
         ("speed quantum in mm/s", rig.speed_quantum.0),
@@ -116,7 +116,7 @@ pub(super) fn has_tension(body: &ModifiedKelvin, protocol: &ProtocolPath) -> boo
 }
 
 /// Where cycles at a speed can turn back with the probe still in contact.
-pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &Rig, speed: MmPerS) -> Depth {
+pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &DesignLimits, speed: MmPerS) -> Depth {
     let turns = TURNS.map(|share| Depth(share * rig.depth.0));
     let presses = |turn: &Depth| {
         // The second cycle does what all later ones do.

@@ -7,9 +7,9 @@
 use super::information::{
     ExpectedError, ExpectedPrecision, PARAMETER_NAMES, check_resolved, intervals,
 };
-use super::noise::{Noise, Unknowns};
+use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::ProtocolPath;
-use super::rig::{Rig, TURNS, allowed_speeds, has_tension};
+use super::rig::{DesignLimits, TURNS, allowed_speeds, has_tension};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
@@ -22,14 +22,14 @@ const CYCLES_MAX: usize = 64;
 const HOLD_RATIO: f64 = 1.003;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Target {
+pub struct PrecisionTarget {
     /// One of [`PARAMETER_NAMES`].
     pub parameter: &'static str,
     /// Half-width of its 95 % interval, in percent of its value.
     pub percent: f64,
 }
 
-impl Target {
+impl PrecisionTarget {
     /// A target for a parameter by name; `tau` is short for `tau_eps`.
     pub fn new(name: &str, percent: f64) -> Result<Self, ExpectedError> {
         let full = if name == "tau" { "tau_eps" } else { name };
@@ -47,7 +47,7 @@ impl Target {
 /// The kinds of protocol that are tried.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "family", rename_all = "kebab-case")]
-pub enum Family {
+pub enum ProtocolFamily {
     RampHold {
         speed: MmPerS,
         hold: Seconds,
@@ -66,8 +66,8 @@ pub enum Family {
     },
 }
 
-impl Family {
-    pub fn protocol(&self, rig: &Rig) -> ProtocolPath {
+impl ProtocolFamily {
+    pub fn protocol(&self, rig: &DesignLimits) -> ProtocolPath {
         let (depth, rate) = (rig.depth, rig.sample_rate_hz);
         match *self {
             Self::RampHold { speed, hold } => ProtocolPath::ramp_hold(speed, depth, hold, rate),
@@ -83,9 +83,9 @@ impl Family {
 
 /// The shortest protocol of one family that reaches every target.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Proposal {
+pub struct ProtocolProposal {
     #[serde(flatten)]
-    pub family: Family,
+    pub family: ProtocolFamily,
     /// The precision it is expected to reach.
     #[serde(flatten)]
     pub expected: ExpectedPrecision,
@@ -95,13 +95,13 @@ pub struct Proposal {
 
 /// Searches ramps and holds, pairs of speeds and cycles, in this order, and returns the shortest of
 /// each family that reaches every target; a family that cannot is left out.
-pub fn shortest(
+pub fn find_shortest_protocols(
     body: &ModifiedKelvin,
-    noise: &Noise,
-    unknowns: Unknowns,
-    targets: &[Target],
-    rig: &Rig,
-) -> Result<Vec<Proposal>, ExpectedError> {
+    noise: &MeasurementNoise,
+    unknowns: FreeOffsets,
+    targets: &[PrecisionTarget],
+    rig: &DesignLimits,
+) -> Result<Vec<ProtocolProposal>, ExpectedError> {
     noise.check()?;
     let speeds = allowed_speeds(&body.checked()?, rig)?;
     check_resolved(body.tau_eps, rig.sample_rate_hz, rig.duration_max.0)?;
@@ -113,7 +113,7 @@ pub fn shortest(
         }
     }
     let found = [search.ramp_hold(&speeds), search.two_speeds(&speeds), search.cycles(&speeds)];
-    let proposals: Vec<Proposal> = found.into_iter().flatten().collect();
+    let proposals: Vec<ProtocolProposal> = found.into_iter().flatten().collect();
     match (proposals.is_empty(), search.closest) {
         (true, Some((_, target, reached))) => Err(ExpectedError::Unreachable {
             name: target.parameter,
@@ -137,44 +137,46 @@ fn value_of(body: &ModifiedKelvin, name: &str) -> f64 {
 
 struct Search<'a> {
     body: &'a ModifiedKelvin,
-    noise: &'a Noise,
-    unknowns: Unknowns,
-    targets: &'a [Target],
-    rig: &'a Rig,
+    noise: &'a MeasurementNoise,
+    unknowns: FreeOffsets,
+    targets: &'a [PrecisionTarget],
+    rig: &'a DesignLimits,
     /// The smallest worst excess met, as interval over target, with the target and its interval.
-    closest: Option<(f64, Target, f64)>,
+    closest: Option<(f64, PrecisionTarget, f64)>,
 }
 
-type BestProtocol = Option<(Family, ExpectedPrecision)>;
+type BestProtocol = Option<(ProtocolFamily, ExpectedPrecision)>;
 
 impl Search<'_> {
-    fn ramp_hold(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+    fn ramp_hold(&mut self, speeds: &[MmPerS]) -> Option<ProtocolProposal> {
         let mut best: BestProtocol = None;
         for &speed in speeds {
-            let found = self.least_hold(&best, |hold| Family::RampHold { speed, hold });
+            let found = self.least_hold(&best, |hold| ProtocolFamily::RampHold { speed, hold });
             best = found.or(best);
         }
         let reason = match best.as_ref()?.0 {
-            Family::RampHold { speed, .. } if speed == speeds[0] => self.fastest_speed_words(speed),
+            ProtocolFamily::RampHold { speed, .. } if speed == speeds[0] => {
+                self.fastest_speed_words(speed)
+            }
             _ => "a faster ramp needs a longer hold".to_owned(),
         };
         self.proposal(best, &reason)
     }
 
-    fn proposal(&self, best: BestProtocol, reason: &str) -> Option<Proposal> {
+    fn proposal(&self, best: BestProtocol, reason: &str) -> Option<ProtocolProposal> {
         let (family, expected) = best?;
         let name = self.worst(&expected).map_or("nothing", |(target, _)| target.parameter);
         let reason = format!("{name} decides the length; {reason}");
-        Some(Proposal { family, expected, reason })
+        Some(ProtocolProposal { family, expected, reason })
     }
 
-    fn two_speeds(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+    fn two_speeds(&mut self, speeds: &[MmPerS]) -> Option<ProtocolProposal> {
         let rest = Seconds(REST_TAUS * self.body.tau_eps);
         let mut best: BestProtocol = None;
         let coarse: Vec<MmPerS> = speeds.iter().copied().step_by(2).collect();
         for (index, &fast) in coarse.iter().enumerate() {
             for &slow in &coarse[index + 1..] {
-                let found = self.least_hold(&best, |hold| Family::TwoSpeeds {
+                let found = self.least_hold(&best, |hold| ProtocolFamily::TwoSpeeds {
                     speeds: [slow, fast],
                     hold,
                     rest,
@@ -189,7 +191,7 @@ impl Search<'_> {
         self.proposal(best, &reason)
     }
 
-    fn cycles(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+    fn cycles(&mut self, speeds: &[MmPerS]) -> Option<ProtocolProposal> {
         let mut best: BestProtocol = None;
         for &speed in speeds {
             for share in TURNS {
@@ -206,7 +208,7 @@ impl Search<'_> {
     fn least_hold(
         &mut self,
         best: &BestProtocol,
-        family: impl Fn(Seconds) -> Family,
+        family: impl Fn(Seconds) -> ProtocolFamily,
     ) -> BestProtocol {
         let limit = self.limit(best);
         let none = family(Seconds(0.0));
@@ -246,7 +248,7 @@ impl Search<'_> {
         between: [Depth; 2],
     ) -> BestProtocol {
         let limit = self.limit(best);
-        let family = |count| Family::Cycles { speed, between, count };
+        let family = |count| ProtocolFamily::Cycles { speed, between, count };
         let secs = |count| family(count).protocol(self.rig).duration().0;
         if has_tension(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
             return None;
@@ -271,7 +273,7 @@ impl Search<'_> {
     }
 
     /// The expected precision, if the force is allowed and every target is reached.
-    fn evaluate(&mut self, family: Family) -> Option<ExpectedPrecision> {
+    fn evaluate(&mut self, family: ProtocolFamily) -> Option<ExpectedPrecision> {
         let protocol = family.protocol(self.rig);
         let expected = intervals(self.body, &protocol, self.noise, self.unknowns).ok()?;
         // The rig's own limit is in force; what rounding adds is not.
@@ -287,8 +289,8 @@ impl Search<'_> {
     }
 
     /// The target that is furthest from being reached, with the interval there is.
-    fn worst(&self, expected: &ExpectedPrecision) -> Option<(Target, f64)> {
-        let excess = |(target, percent): &(Target, f64)| percent / target.percent;
+    fn worst(&self, expected: &ExpectedPrecision) -> Option<(PrecisionTarget, f64)> {
+        let excess = |(target, percent): &(PrecisionTarget, f64)| percent / target.percent;
         self.targets
             .iter()
             .filter_map(|target| {
@@ -344,9 +346,9 @@ mod tests {
 
     #[test]
     fn names_and_percentages_are_checked() {
-        assert_eq!(Target::new("tau", 1.0).unwrap().parameter, "tau_eps");
-        let text = Target::new("nu", 1.0).unwrap_err().to_string();
+        assert_eq!(PrecisionTarget::new("tau", 1.0).unwrap().parameter, "tau_eps");
+        let text = PrecisionTarget::new("nu", 1.0).unwrap_err().to_string();
         assert!(text.contains("'nu'") && text.contains("mu3, tau_sig"), "{text}");
-        assert!(Target::new("mu1", 0.0).is_err());
+        assert!(PrecisionTarget::new("mu1", 0.0).is_err());
     }
 }

@@ -1,11 +1,11 @@
 //! Inputs that are not numbers, and times that do not increase.
 
 use super::fits::{DEFAULT_FIT, fit_answer};
-use super::judge::{ExpectedAnswer, PathCase, Row, judge};
+use super::judge::{ExpectedAnswer, ExtremesRow, PathCase, judge};
 use super::members::make_member;
 use super::records::ramp_hold;
 use super::subjects::FamilyBody;
-use super::{Extent, Part};
+use super::{ExtremesExtent, ExtremesPart};
 use crate::families::{Family, PowerSeries};
 use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -13,7 +13,11 @@ use std::sync::Arc;
 
 pub(super) const GROUP: &str = "input";
 
-pub(super) fn rows(_: Extent, family: &Arc<dyn Family>, _: &mut dyn FnMut(f64)) -> Vec<Row> {
+pub(super) fn rows(
+    _: ExtremesExtent,
+    family: &Arc<dyn Family>,
+    _: &mut dyn FnMut(f64),
+) -> Vec<ExtremesRow> {
     let usual = || make_member(&**family, 1.0, 20.0, 2.0);
     let mut rows = Vec::new();
     for (case, start, step) in [
@@ -57,7 +61,7 @@ pub(super) fn rows(_: Extent, family: &Arc<dyn Family>, _: &mut dyn FnMut(f64)) 
 }
 
 /// Refused steps leave a body as it was.
-fn after_bad_steps(family: &dyn Family) -> Row {
+fn after_bad_steps(family: &dyn Family) -> ExtremesRow {
     struct BodyAfterRefusals(FamilyBody);
     impl super::judge::ExtremesSubject for BodyAfterRefusals {
         fn name(&self) -> String {
@@ -90,7 +94,7 @@ fn after_bad_steps(family: &dyn Family) -> Row {
 }
 
 /// A good record with one sample spoilt, put to a fit that must refuse it.
-fn record_rows(family: &Arc<dyn Family>, subject: &str) -> Vec<Row> {
+fn record_rows(family: &Arc<dyn Family>, subject: &str) -> Vec<ExtremesRow> {
     type Spoil = fn(&mut Vec<FitSample>);
     let spoilt: [(&str, Spoil); 14] = [
         ("a NaN time", |all| all[7].t = Seconds(f64::NAN)),
@@ -128,8 +132,8 @@ fn record_rows(family: &Arc<dyn Family>, subject: &str) -> Vec<Row> {
 }
 
 /// The same records for the fit of the thesis body.
-pub(super) fn thesis_part() -> Part {
-    Part::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
+pub(super) fn thesis_part() -> ExtremesPart {
+    ExtremesPart::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
         let family: Arc<dyn Family> = Arc::new(PowerSeries::THESIS);
         record_rows(&family, DEFAULT_FIT)
     })

@@ -1,9 +1,9 @@
 //! Every integrator of the modified Kelvin body, in double and single precision.
 
-use super::judge::{PathCase, Row};
+use super::judge::{ExtremesRow, PathCase};
 use super::subjects::SchemeBody;
 use super::tau_step::decades;
-use super::{Extent, Part};
+use super::{ExtremesExtent, ExtremesPart};
 use crate::integrators::{Precision, Scheme, SeriesBody};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
@@ -13,7 +13,7 @@ const GROUP: &str = "integrators, relaxation time and step";
 const OTHER: &str = "integrators, depth and force";
 const SAMPLES: u32 = 20;
 
-pub(super) fn parts(extent: Extent) -> Vec<Part> {
+pub(super) fn parts(extent: ExtremesExtent) -> Vec<ExtremesPart> {
     let mut parts = Vec::new();
     for scheme in Scheme::ALL {
         for precision in Precision::ALL {
@@ -23,7 +23,7 @@ pub(super) fn parts(extent: Extent) -> Vec<Part> {
                 body: body(tau, force),
             };
             let name = format!("{}, {}", scheme.name(), precision.name());
-            parts.push(Part::new(GROUP, name.clone(), move |progress| {
+            parts.push(ExtremesPart::new(GROUP, name.clone(), move |progress| {
                 let [taus, steps] = decades(extent);
                 let mut rows = Vec::new();
                 for (index, tau) in taus.iter().enumerate() {
@@ -36,7 +36,7 @@ pub(super) fn parts(extent: Extent) -> Vec<Part> {
                 }
                 rows
             }));
-            parts.push(Part::new(OTHER, name, move |_| others(subject)));
+            parts.push(ExtremesPart::new(OTHER, name, move |_| others(subject)));
         }
     }
     parts
@@ -63,7 +63,7 @@ fn poke(group: &'static str, case: String, depth: f64, dt: f64) -> PathCase {
     PathCase::new(group, case, 0.0, steps)
 }
 
-fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<Row> {
+fn others(subject: impl Fn(f64, f64) -> SchemeBody) -> Vec<ExtremesRow> {
     let path = |depth: f64, dt: f64| poke(OTHER, String::new(), depth, dt);
     let usual = || path(20.0, 0.01);
     let from = |start: f64| PathCase { start, ..usual() };

@@ -16,7 +16,7 @@ const FORCE_MAX: f64 = 1e299;
 palpate_model::named! {
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
     #[serde(rename_all = "lowercase")]
-    pub enum Verdict {
+    pub enum ExtremesVerdict {
         Right = "right",
         /// No number, and the reason in words.
         Refused = "refused",
@@ -28,12 +28,12 @@ palpate_model::named! {
 
 /// One case run on one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
+pub struct ExtremesRow {
     pub group: &'static str,
     pub case: String,
     /// Family, integrator or fit.
     pub subject: String,
-    pub verdict: Verdict,
+    pub verdict: ExtremesVerdict,
     /// Error of the answer: of a force relative to the peak of the path, of parameters the largest
     /// relative one; null where there is no finite number.
     pub relative_error: Option<f64>,
@@ -71,32 +71,34 @@ pub fn judge(
     expected: ExpectedAnswer,
     tolerance: f64,
     answer: SubjectAnswer,
-) -> Row {
+) -> ExtremesRow {
     let (verdict, error, sentence) = match answer {
         SubjectAnswer::Refused(reason) if reason.trim().is_empty() => {
-            (Verdict::Wrong, None, "refused without a reason".to_owned())
+            (ExtremesVerdict::Wrong, None, "refused without a reason".to_owned())
         }
         SubjectAnswer::Refused(reason) if expected == ExpectedAnswer::Number => {
-            (Verdict::Wrong, None, format!("refused what has an answer: {reason}"))
+            (ExtremesVerdict::Wrong, None, format!("refused what has an answer: {reason}"))
         }
-        SubjectAnswer::Refused(reason) => (Verdict::Refused, None, reason),
+        SubjectAnswer::Refused(reason) => (ExtremesVerdict::Refused, None, reason),
         SubjectAnswer::Number { error, .. } if !error.is_finite() => {
-            (Verdict::Wrong, None, "the answer is not a finite number".to_owned())
+            (ExtremesVerdict::Wrong, None, "the answer is not a finite number".to_owned())
         }
         SubjectAnswer::Number { error, .. } if expected == ExpectedAnswer::Refusal => {
-            (Verdict::Wrong, Some(error), "a number where there is no answer".to_owned())
+            (ExtremesVerdict::Wrong, Some(error), "a number where there is no answer".to_owned())
         }
         SubjectAnswer::Number { error, .. } if error <= tolerance => {
-            (Verdict::Right, Some(error), String::new())
+            (ExtremesVerdict::Right, Some(error), String::new())
         }
         SubjectAnswer::Number { error, warnings } if !warnings.is_empty() => {
-            (Verdict::Flagged, Some(error), warnings.join("; "))
+            (ExtremesVerdict::Flagged, Some(error), warnings.join("; "))
         }
-        SubjectAnswer::Number { error, .. } => {
-            (Verdict::Wrong, Some(error), format!("off by {error:.1e}, more than {tolerance:.0e}"))
-        }
+        SubjectAnswer::Number { error, .. } => (
+            ExtremesVerdict::Wrong,
+            Some(error),
+            format!("off by {error:.1e}, more than {tolerance:.0e}"),
+        ),
     };
-    Row {
+    ExtremesRow {
         group,
         case: case.into(),
         subject: subject.to_owned(),
@@ -185,7 +187,7 @@ impl PathCase {
     }
 
     /// Puts the path to a subject.
-    pub fn run_on(&self, subject: &dyn ExtremesSubject) -> Row {
+    pub fn run_on(&self, subject: &dyn ExtremesSubject) -> ExtremesRow {
         let forces = subject.forces(self);
         let truth = self.truth(subject, forces.as_deref().unwrap_or_default());
         let expected = match truth {

@@ -1,10 +1,10 @@
 //! Long records at a constant step, streamed: 1e8 samples, 24 h at 1 kHz.
 
-use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge};
+use super::judge::{ExpectedAnswer, ExtremesRow, SubjectAnswer, judge};
 use super::members::make_member;
-use super::{Extent, Part};
+use super::{ExtremesExtent, ExtremesPart};
 use crate::families::{Family, RelaxationTerm, StepError};
-use crate::integrators::{Exact, Integrator, Scheme, SeriesBody, Start};
+use crate::integrators::{ExactIntegrator, Integrator, IntegratorStart, Scheme, SeriesBody};
 use crate::reference::Reference;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -31,18 +31,18 @@ const LONGEST: [Case; 2] = [
 ];
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: ExtremesExtent,
     family: &Arc<dyn Family>,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let model = make_member(&**family, 2.0, 20.0, 2.0);
     let has_many = model.terms().is_ok_and(|terms| terms.len() > MANY);
     let cases: &[Case] = match extent {
-        Extent::Quick if has_many => &[SHORTEST],
-        Extent::Quick => &[SHORT],
-        Extent::Whole if has_many => &[SHORT],
-        Extent::Whole => &[LONG],
-        Extent::Soak => &LONGEST,
+        ExtremesExtent::Quick if has_many => &[SHORTEST],
+        ExtremesExtent::Quick => &[SHORT],
+        ExtremesExtent::Whole if has_many => &[SHORT],
+        ExtremesExtent::Whole => &[LONG],
+        ExtremesExtent::Soak => &LONGEST,
     };
     case_rows(cases, &family.key(), progress, |samples, dt, progress| {
         let words = |err: &dyn std::fmt::Display| err.to_string();
@@ -54,17 +54,17 @@ pub(super) fn rows(
 }
 
 /// The same for the exact step at a constant rate, which is made for records as long as these.
-pub(super) fn scheme_part(extent: Extent) -> Part {
+pub(super) fn scheme_part(extent: ExtremesExtent) -> ExtremesPart {
     let subject = format!("{}, f64", Scheme::Exact.name());
-    Part::new(GROUP, subject.clone(), move |progress| {
+    ExtremesPart::new(GROUP, subject.clone(), move |progress| {
         let body = SeriesBody::<3>::from(ModifiedKelvin::THESIS);
         let cases: &[Case] = match extent {
-            Extent::Quick => &[SHORT],
-            Extent::Whole | Extent::Soak => &LONGEST,
+            ExtremesExtent::Quick => &[SHORT],
+            ExtremesExtent::Whole | ExtremesExtent::Soak => &LONGEST,
         };
         case_rows(cases, &subject, progress, |samples, dt, progress| {
-            let start = Start { depth: 0.0, force: None };
-            let mut exact = Exact::<f64, 3>::at_any_step(&body, dt, start);
+            let start = IntegratorStart { depth: 0.0, force: None };
+            let mut exact = ExactIntegrator::<f64, 3>::at_any_step(&body, dt, start);
             let step = |depth| exact.step(depth).map(Newtons);
             drift(&[body.term()], samples, dt, step, progress)
         })
@@ -76,7 +76,7 @@ fn case_rows(
     subject: &str,
     progress: &mut dyn FnMut(f64),
     answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<SubjectAnswer, String>,
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let count = cases.len() as f64;
     let mut rows = Vec::new();
     for (index, &(case, samples, dt)) in cases.iter().enumerate() {

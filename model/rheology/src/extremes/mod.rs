@@ -20,17 +20,17 @@ mod subjects;
 mod tau_step;
 
 pub use judge::{
-    ExpectedAnswer, ExtremesSubject, Oracle, PathCase, Row, SubjectAnswer, TOLERANCE, Verdict,
-    judge,
+    ExpectedAnswer, ExtremesRow, ExtremesSubject, ExtremesVerdict, Oracle, PathCase, SubjectAnswer,
+    TOLERANCE, judge,
 };
 pub use members::make_member;
 pub use subjects::{FamilyBody, SchemeBody};
 
-use crate::families::{Family, UnknownFamily, all, by_key};
+use crate::families::{Family, UnknownFamily, all_families, find_family};
 use std::sync::Arc;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extent {
+pub enum ExtremesExtent {
     /// Seconds: corners and middles of every table.
     Quick,
     /// Minutes: every power of ten; the longest records for the cheap families.
@@ -40,17 +40,17 @@ pub enum Extent {
 }
 
 /// Rows of one group for one subject.
-pub struct Part {
+pub struct ExtremesPart {
     pub group: &'static str,
     pub subject: String,
     run: Box<Rows>,
 }
 
 /// Makes rows and reports the share done, 0 to 1.
-type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<Row>;
+type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow>;
 
 /// The same of a family.
-type FamilyRows = fn(Extent, &Arc<dyn Family>, &mut dyn FnMut(f64)) -> Vec<Row>;
+type FamilyRows = fn(ExtremesExtent, &Arc<dyn Family>, &mut dyn FnMut(f64)) -> Vec<ExtremesRow>;
 
 /// The groups that every family runs: name, words before the key of the family, rows.
 const FAMILY_GROUPS: [(&str, &str, FamilyRows); 6] = [
@@ -62,32 +62,35 @@ const FAMILY_GROUPS: [(&str, &str, FamilyRows); 6] = [
     (long::GROUP, "", long::rows),
 ];
 
-impl Part {
+impl ExtremesPart {
     fn new(
         group: &'static str,
         subject: String,
-        run: impl Fn(&mut dyn FnMut(f64)) -> Vec<Row> + 'static,
+        run: impl Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow> + 'static,
     ) -> Self {
         Self { group, subject, run: Box::new(run) }
     }
 
     /// Runs its cases; `progress` gets the share done, 0 to 1.
-    pub fn rows(&self, mut progress: impl FnMut(f64)) -> Vec<Row> {
+    pub fn rows(&self, mut progress: impl FnMut(f64)) -> Vec<ExtremesRow> {
         (self.run)(&mut progress)
     }
 }
 
 /// Everything there is to run, or what concerns one family.
-pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownFamily> {
+pub fn list_extremes(
+    extent: ExtremesExtent,
+    family: Option<&str>,
+) -> Result<Vec<ExtremesPart>, UnknownFamily> {
     let families: Vec<Arc<dyn Family>> = match family {
-        Some(key) => vec![by_key(key)?],
-        None => all(),
+        Some(key) => vec![find_family(key)?],
+        None => all_families(),
     };
     let mut parts = Vec::new();
     for (group, prefix, rows) in FAMILY_GROUPS {
         parts.extend(families.iter().cloned().map(|family| {
             let subject = format!("{prefix}{}", family.key());
-            Part::new(group, subject, move |progress| rows(extent, &family, progress))
+            ExtremesPart::new(group, subject, move |progress| rows(extent, &family, progress))
         }));
     }
     // Groups that concern no family are left out where one is given.
@@ -104,8 +107,8 @@ pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownF
 fn rows_of<T>(
     cases: Vec<T>,
     progress: &mut dyn FnMut(f64),
-    mut row: impl FnMut(T) -> Row,
-) -> Vec<Row> {
+    mut row: impl FnMut(T) -> ExtremesRow,
+) -> Vec<ExtremesRow> {
     let count = cases.len() as f64;
     let rows = cases.into_iter().enumerate().map(|(index, case)| {
         let row = row(case);

@@ -1,9 +1,9 @@
 //! Speeds, depths and where they change.
 
-use super::judge::{PathCase, Row};
+use super::judge::{ExtremesRow, PathCase};
 use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, rows_of};
+use super::{ExtremesExtent, rows_of};
 use crate::families::Family;
 use std::sync::Arc;
 
@@ -11,20 +11,20 @@ pub(super) const GROUP: &str = "speed and depth";
 const STEPS: u32 = 12;
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: ExtremesExtent,
     family: &Arc<dyn Family>,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let subject = FamilyBody(make_member(&**family, 1.0, 20.0, 2.0));
     rows_of(cases(extent), progress, |case| case.run_on(&subject))
 }
 
 /// Every path of this group; the body relaxes in 1 s.
-pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
+pub(super) fn cases(extent: ExtremesExtent) -> Vec<PathCase> {
     let mut cases = Vec::new();
     let speeds: &[i32] = match extent {
-        Extent::Quick => &[-6, 0, 3],
-        Extent::Whole | Extent::Soak => &[-6, -5, -4, -3, -2, -1, 0, 1, 2, 3],
+        ExtremesExtent::Quick => &[-6, 0, 3],
+        ExtremesExtent::Whole | ExtremesExtent::Soak => &[-6, -5, -4, -3, -2, -1, 0, 1, 2, 3],
     };
     for &speed in speeds {
         cases.push(ramp(
@@ -35,8 +35,8 @@ pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
     }
     cases.push(stationary("speed 0 at 10 mm", 10.0));
     let depths: &[i32] = match extent {
-        Extent::Quick => &[-6, 2],
-        Extent::Whole | Extent::Soak => &[-9, -6, -3, -2, -1, 0, 1, 2, 3],
+        ExtremesExtent::Quick => &[-6, 2],
+        ExtremesExtent::Whole | ExtremesExtent::Soak => &[-9, -6, -3, -2, -1, 0, 1, 2, 3],
     };
     for &depth in depths {
         let depth_mm = 10f64.powi(depth);

@@ -1,9 +1,9 @@
 //! Records of few samples, of too little movement, of odd sizes.
 
 use super::fits::{DEFAULT_FIT, fit_answer};
-use super::judge::{ExpectedAnswer, Row, SubjectAnswer, judge};
+use super::judge::{ExpectedAnswer, ExtremesRow, SubjectAnswer, judge};
 use super::members::make_member;
-use super::{Extent, Part, rows_of};
+use super::{ExtremesExtent, ExtremesPart, rows_of};
 use crate::families::{Family, Model, OuterParameter, OuterRange, PowerSeries};
 use crate::fit::FitSample;
 use palpate_model::units::{Depth, Newtons, Seconds};
@@ -69,7 +69,7 @@ impl RecordCase {
         samples
     }
 
-    fn judge(&self, subject: &str, answer: SubjectAnswer) -> Row {
+    fn judge(&self, subject: &str, answer: SubjectAnswer) -> ExtremesRow {
         judge(GROUP, self.case, subject, self.expected, self.tolerance, answer)
     }
 }
@@ -100,7 +100,7 @@ fn thesis(body: ModifiedKelvin) -> Model {
     }
 }
 
-fn cases(extent: Extent) -> Vec<RecordCase> {
+fn cases(extent: ExtremesExtent) -> Vec<RecordCase> {
     use ExpectedAnswer::{Either, Number, Refusal};
     let full = || path(161);
     let ramp: Vec<(f64, f64)> =
@@ -142,7 +142,7 @@ fn cases(extent: Extent) -> Vec<RecordCase> {
         tolerance: 1e-3,
         ..RecordCase::new("times since 1970", Number, full())
     });
-    if extent == Extent::Quick {
+    if extent == ExtremesExtent::Quick {
         return cases;
     }
     let sized = |case: &'static str, expected, [time, depth, force]: [f64; 3]| RecordCase {
@@ -170,10 +170,10 @@ fn cases(extent: Extent) -> Vec<RecordCase> {
 }
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: ExtremesExtent,
     family: &Arc<dyn Family>,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let mut cases = cases(extent);
     if times(&**family) > TIMES_SHOWN {
         for case in &mut cases {
@@ -187,7 +187,7 @@ pub(super) fn rows(
 }
 
 fn family_answer(family: &Arc<dyn Family>, case: &RecordCase) -> SubjectAnswer {
-    // Relaxation times around a second on the record's scale.
+    // StressRelaxation times around a second on the record's scale.
     let first = if times(&**family) > 1 { 0.2 } else { 1.0 };
     let body = make_member(&**family, first * case.time, 20.0 * case.depth, 2.0 * case.force);
     let samples = case.samples(|path| body.along(path.iter().copied()).ok());
@@ -204,8 +204,8 @@ fn times(family: &dyn Family) -> usize {
 const TIMES_SHOWN: usize = 2;
 
 /// The same records for the fit of the thesis body.
-pub(super) fn thesis_part(extent: Extent) -> Part {
-    Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
+pub(super) fn thesis_part(extent: ExtremesExtent) -> ExtremesPart {
+    ExtremesPart::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
         rows_of(cases(extent), progress, |case| {
             let known = ModifiedKelvin::THESIS;
             let scale = |power: i32| case.force / case.depth.powi(power);

@@ -1,9 +1,9 @@
 //! Small and large numbers: forces 1e-6..1e6 N, the ends of the doubles, subnormal numbers.
 
-use super::judge::{PathCase, Row};
+use super::judge::{ExtremesRow, PathCase};
 use super::members::make_member;
 use super::subjects::FamilyBody;
-use super::{Extent, rows_of};
+use super::{ExtremesExtent, rows_of};
 use crate::families::{Family, Model};
 use std::sync::Arc;
 
@@ -15,10 +15,10 @@ const SUBNORMAL: f64 = 1e-310;
 const MANY: usize = 12;
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: ExtremesExtent,
     family: &Arc<dyn Family>,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let cases = cases(extent, &**family);
     rows_of(cases, progress, |(path, model)| path.run_on(&FamilyBody(model)))
 }
@@ -30,11 +30,11 @@ fn poke(case: String, depth: f64, dt: f64) -> PathCase {
     PathCase::new(GROUP, case, -0.5 * depth, steps)
 }
 
-fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
+fn cases(extent: ExtremesExtent, family: &dyn Family) -> Vec<(PathCase, Model)> {
     let mut cases = Vec::new();
     let forces: &[i32] = match extent {
-        Extent::Quick => &[-6, 6, 290, 307],
-        Extent::Whole | Extent::Soak => &[
+        ExtremesExtent::Quick => &[-6, 6, 290, 307],
+        ExtremesExtent::Whole | ExtremesExtent::Soak => &[
             -300, -250, -190, -100, -6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6, 100, 290, 299, 307,
         ],
     };
@@ -45,9 +45,9 @@ fn cases(extent: Extent, family: &dyn Family) -> Vec<(PathCase, Model)> {
     let usual = || make_member(family, 1.0, 20.0, 2.0);
     let has_many = usual().terms().is_ok_and(|terms| terms.len() > MANY);
     let lengths: &[i32] = match extent {
-        Extent::Quick if has_many => &[],
-        Extent::Quick => &[-100, 100],
-        Extent::Whole | Extent::Soak => &[-300, -100, -30, 30, 100, 300],
+        ExtremesExtent::Quick if has_many => &[],
+        ExtremesExtent::Quick => &[-100, 100],
+        ExtremesExtent::Whole | ExtremesExtent::Soak => &[-300, -100, -30, 30, 100, 300],
     };
     for length in lengths {
         cases.push((poke(format!("depths of 1e{length} mm"), 10f64.powi(*length), 0.1), usual()));

@@ -1,7 +1,7 @@
-//! Relaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
+//! StressRelaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
 
-use super::Extent;
-use super::judge::{PathCase, Row};
+use super::ExtremesExtent;
+use super::judge::{ExtremesRow, PathCase};
 use super::members::make_member;
 use super::subjects::FamilyBody;
 use crate::families::Family;
@@ -20,21 +20,21 @@ const DEPTHS: [f64; 20] = [
 const MANY: usize = 12;
 
 /// Powers of ten of relaxation times and of steps.
-pub(super) fn decades(extent: Extent) -> [Vec<i32>; 2] {
+pub(super) fn decades(extent: ExtremesExtent) -> [Vec<i32>; 2] {
     match extent {
-        Extent::Quick => [vec![-9, 0, 9], vec![-9, -3, 3]],
-        Extent::Whole | Extent::Soak => [(-9..=9).collect(), (-9..=3).collect()],
+        ExtremesExtent::Quick => [vec![-9, 0, 9], vec![-9, -3, 3]],
+        ExtremesExtent::Whole | ExtremesExtent::Soak => [(-9..=9).collect(), (-9..=3).collect()],
     }
 }
 
 pub(super) fn rows(
-    extent: Extent,
+    extent: ExtremesExtent,
     family: &Arc<dyn Family>,
     progress: &mut dyn FnMut(f64),
-) -> Vec<Row> {
+) -> Vec<ExtremesRow> {
     let [mut taus, steps] = decades(extent);
     let probe = make_member(&**family, 1.0, 20.0, 2.0);
-    if extent == Extent::Whole && probe.terms().is_ok_and(|terms| terms.len() > MANY) {
+    if extent == ExtremesExtent::Whole && probe.terms().is_ok_and(|terms| terms.len() > MANY) {
         taus.retain(|tau| tau % 3 == 0);
     }
     let mut rows = Vec::new();

@@ -37,4 +37,4 @@ pub use power_series::PowerSeries;
 pub use prony::{Prony, TERMS_COMPARED, TERMS_MAX};
 pub use relaxation::{DepthDrive, POWER_MAX, RelaxationTerm, SOFTENING_MAX};
 pub use response::{Response, StepError};
-pub use table::{UnknownFamily, all, by_key};
+pub use table::{UnknownFamily, all_families, find_family};

@@ -3,7 +3,7 @@
 use super::family::Family;
 use super::relaxation::RelaxationTerm;
 use super::response::{Response, StepError, plain};
-use super::{UnknownFamily, by_key};
+use super::{UnknownFamily, find_family};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -55,7 +55,7 @@ pub enum ModelPathError {
 impl Model {
     /// The model, if its numbers describe one: positive times, finite coefficients.
     pub fn checked(self) -> Result<Self, ModelError> {
-        let family = by_key(&self.family)?;
+        let family = find_family(&self.family)?;
         let (outer, linear) = (family.outer(), family.linear());
         if outer.len() != self.outer.len() || linear.len() != self.linear.len() {
             let names = outer.iter().map(|one| one.name.clone());
@@ -89,7 +89,7 @@ impl Model {
 
     /// Its terms, those of one relaxation time joined, ready for any depth history.
     pub fn terms(&self) -> Result<Vec<RelaxationTerm>, ModelError> {
-        let family = by_key(&self.family)?;
+        let family = find_family(&self.family)?;
         Ok(joined(&family.columns(&self.outer), self.linear.iter().copied()))
     }
 
@@ -128,7 +128,7 @@ impl Model {
 
     /// All parameters: outer ones, coefficients, and what the literature makes of them.
     pub fn parameters(&self) -> Result<Vec<ModelParameter>, ModelError> {
-        let family = by_key(&self.family)?;
+        let family = find_family(&self.family)?;
         let outer = family.outer().into_iter().zip(&self.outer);
         let outer = outer.map(|(one, value)| ModelParameter::new(&one.name, *value, one.unit));
         let linear = family.linear().into_iter().zip(&self.linear);

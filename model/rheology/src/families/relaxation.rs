@@ -8,7 +8,7 @@
 //! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
 
 use super::exponential_step::chi_omega;
-use palpate_model::viscoelastic::{Compensated, psi, psi_first};
+use palpate_model::viscoelastic::{CompensatedSum, psi, psi_first};
 
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
@@ -178,7 +178,7 @@ impl DepthDrive {
 /// One term `y + tau y' = elastic(x) + d/dt rate(x)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationTerm {
-    /// Relaxation time in s; 0 for a term without memory.
+    /// StressRelaxation time in s; 0 for a term without memory.
     pub tau: f64,
     /// The limit when depth is held.
     pub elastic: DepthDrive,
@@ -279,7 +279,7 @@ pub(super) struct RelaxationState {
     pub term: RelaxationTerm,
     /// Whether its elastic part or its rate depends on the greatest depth so far.
     pub softens: bool,
-    value: Compensated,
+    value: CompensatedSum,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
     /// Highest power of depth in the drive along a straight piece.
@@ -296,7 +296,7 @@ impl RelaxationState {
         Self {
             term,
             softens: term.elastic.softens() || term.rate.softens(),
-            value: Compensated::new(term.elastic.at(depth, depth)),
+            value: CompensatedSum::new(term.elastic.at(depth, depth)),
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
             degree: term.degree(),

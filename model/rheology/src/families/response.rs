@@ -2,7 +2,7 @@
 
 use super::relaxation::{DepthPiece, RelaxationState, RelaxationTerm};
 use palpate_model::units::{Depth, Seconds};
-use palpate_model::viscoelastic::Pieces;
+use palpate_model::viscoelastic::ContactPieces;
 use thiserror::Error;
 
 /// A number as people write it, by powers of ten where it would be a row of zeros.
@@ -114,7 +114,8 @@ impl Response {
         if !((to - from) / dt).is_finite() {
             return Err(StepError::Speed { from, to, dt });
         }
-        if Pieces::of(from, to) == Pieces::Inside && !self.is_cut_by_softening(x0, x1) {
+        if ContactPieces::of(from, to) == ContactPieces::Inside && !self.is_cut_by_softening(x0, x1)
+        {
             let piece = self.piece(x0, x1 - x0, dt);
             return self.advance(&piece, [from, to, dt]).map(|()| self.arrive(to));
         }
@@ -173,13 +174,13 @@ impl Response {
 
     /// The parts of a step, in depth in contact and time.
     fn parts(&self, from: f64, to: f64, dt: f64) -> Vec<(f64, f64, f64)> {
-        let mut parts = match Pieces::of(from, to) {
-            Pieces::Inside => vec![(from, to, dt)],
-            Pieces::Outside => vec![(0.0, 0.0, dt)],
-            Pieces::Entering([outside, inside]) => {
+        let mut parts = match ContactPieces::of(from, to) {
+            ContactPieces::Inside => vec![(from, to, dt)],
+            ContactPieces::Outside => vec![(0.0, 0.0, dt)],
+            ContactPieces::Entering([outside, inside]) => {
                 vec![(0.0, 0.0, dt * outside), (0.0, to, dt * inside)]
             }
-            Pieces::Leaving([inside, outside]) => {
+            ContactPieces::Leaving([inside, outside]) => {
                 vec![(from, 0.0, dt * inside), (0.0, 0.0, dt * outside)]
             }
         };

@@ -39,7 +39,7 @@ pub struct UnknownFamily {
 /// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body;
 /// unloading of other orders than the third is there by its key.
 #[must_use]
-pub fn all() -> Vec<Arc<dyn Family>> {
+pub fn all_families() -> Vec<Arc<dyn Family>> {
     let members = |kind: &FamilyKind| -> Vec<Arc<dyn Family>> {
         match kind.compared.clone() {
             None => (kind.of)(None).into_iter().collect(),
@@ -50,7 +50,7 @@ pub fn all() -> Vec<Arc<dyn Family>> {
 }
 
 /// The family of a key such as `series-3`, `unloading-3` or `fung-8`.
-pub fn by_key(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
+pub fn find_family(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
     let find = |word: &str, number| {
         let kind = TABLE.iter().find(|kind| kind.word == word)?;
         (kind.of)(number)
@@ -61,7 +61,7 @@ pub fn by_key(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
     };
     found.ok_or_else(|| UnknownFamily {
         key: key.to_owned(),
-        known: all().iter().map(|family| family.key()).collect::<Vec<_>>().join(", "),
+        known: all_families().iter().map(|family| family.key()).collect::<Vec<_>>().join(", "),
     })
 }
 
@@ -71,20 +71,20 @@ mod tests {
 
     #[test]
     fn every_family_is_found_by_its_own_key() {
-        let all = all();
+        let all = all_families();
         assert!(all.len() >= TABLE.len());
         for family in &all {
-            assert_eq!(by_key(&family.key()).unwrap().key(), family.key());
+            assert_eq!(find_family(&family.key()).unwrap().key(), family.key());
             for (simpler, words) in family.adds_to() {
-                assert!(by_key(&simpler).is_ok() && words.len() > 5, "{simpler}");
+                assert!(find_family(&simpler).is_ok() && words.len() > 5, "{simpler}");
             }
         }
         // Keys of families that are compared only where they are named.
         for key in ["prony-1", "prony-40", "unloading-1", "fung-8", "fractional-12"] {
-            assert_eq!(by_key(key).unwrap().key(), key);
+            assert_eq!(find_family(key).unwrap().key(), key);
         }
         for key in ["", "voigt-1", "series", "series-0", "series-x", "prony-41", "fung-0"] {
-            let refused = by_key(key).unwrap_err();
+            let refused = find_family(key).unwrap_err();
             assert!(refused.known.starts_with("voigt, maxwell, kelvin, series-1"));
         }
     }

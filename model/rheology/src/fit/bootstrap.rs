@@ -7,7 +7,7 @@
 use super::record::Record;
 use super::refine::{StopRule, refine};
 use super::sample::{FitError, FitSample};
-use super::solve::Fitted;
+use super::solve::FitSolution;
 use super::system::Rows;
 use super::uncertainty::Uncertainty;
 use palpate_model::random::SplitMix;
@@ -38,7 +38,7 @@ pub struct BootstrapInterval {
     pub ci95: [f64; 2],
 }
 
-impl Fitted<'_> {
+impl FitSolution<'_> {
     /// Bootstrap intervals of the free parameters of one record; `progress` gets how many fits are
     /// done. Refused where the correlation time is so long that the record has too few blocks.
     pub fn bootstrap(

@@ -35,10 +35,11 @@ pub use live::{LiveFit, ResidualBlocks};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
-pub use report::{FitReport, JointReport, NamedReport, NoiseEstimate, Parameter};
+pub use report::{FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate};
 pub use sample::{FitError, FitSample};
-pub use solve::{Fitted, fit, fit_body, fit_coefficients, fit_joint};
+pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
-    Systematic, SystematicError, TermError, Traced, systematic, systematic_joint,
+    SystematicError, SystematicUncertainty, TermError, TracedRecord, estimate_systematic,
+    estimate_systematic_jointly,
 };
 pub(crate) use triangle::{CONDITION_MAX, dominant_entries};

@@ -1,7 +1,7 @@
 //! Which family a fit takes, and which of its parameters it may move.
 
 use super::sample::FitError;
-use crate::families::{Family, OuterRange, PowerSeries, UnknownFamily, by_key};
+use crate::families::{Family, OuterRange, PowerSeries, UnknownFamily, find_family};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -136,7 +136,7 @@ impl FitOptions {
 
     /// The family of a key such as `prony-2`.
     pub fn by_key(key: &str) -> Result<Self, UnknownFamily> {
-        by_key(key).map(Self::of)
+        find_family(key).map(Self::of)
     }
 
     pub fn family(&self) -> &dyn Family {

@@ -8,7 +8,7 @@ use super::record::Record;
 use super::sample::FitSample;
 use super::system::{Rows, System};
 use super::triangle::{Factor, Triangle};
-use crate::vectors::wide;
+use crate::vectors::run_wide;
 
 /// One record, triangularised at a point.
 #[derive(Clone, Debug)]
@@ -206,7 +206,7 @@ impl System<'_> {
         let mut sums = NoiseSums::new(samples.len(), width);
         let mut lanes = vec![[0.0; LANES]; width];
         self.source.walk(samples, scale, point, &slopes, |block, filled| {
-            wide(
+            run_wide(
                 #[inline(always)]
                 || {
                     filled.write(&mut lanes, point, &slopes);

@@ -14,13 +14,13 @@ use super::columns::{OuterPoint, ParameterPoint};
 use super::refine::{GAIN_THIN, StopRule, refine};
 use super::report::student_t975;
 use super::sample::FitError;
-use super::solve::Fitted;
+use super::solve::FitSolution;
 use super::system::Rows;
 use super::uncertainty::{Uncertainty, UncertaintyEstimate};
 use crate::families::OuterRange;
 use serde::{Deserialize, Serialize};
 
-/// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
+/// StressRelaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
 /// leave less than a thousandth of an interval.
 const NODES: usize = 7;
 const NODES_WIDE: usize = 15;
@@ -29,7 +29,7 @@ const NARROW: f64 = 0.5;
 const REACH: f64 = 1.3;
 /// Times the range is widened before an end counts as open.
 const WIDENINGS: usize = 6;
-/// Relaxation times at which the maximum is looked for before it is refined.
+/// StressRelaxation times at which the maximum is looked for before it is refined.
 const LOOKS: usize = 400;
 
 /// Values tried for one end where a parameter is kept at one after another.
@@ -60,7 +60,7 @@ struct Profile {
     is_limit: [bool; 2],
 }
 
-impl Fitted<'_> {
+impl FitSolution<'_> {
     /// Profile-likelihood 95 % intervals of the free parameters of one record, widened for
     /// autocorrelated residuals as the standard errors are.
     pub fn profile(&self, record: usize) -> Result<Vec<ProfileInterval>, FitError> {

@@ -6,15 +6,15 @@ use super::noise::Memory;
 use super::options::Layout;
 use super::sample::FitSample;
 use super::sentences;
-use super::solve::Fitted;
+use super::solve::FitSolution;
 use super::uncertainty::{Uncertainty, UncertaintyEstimate};
 use crate::distinct;
-use crate::families::{Model, ModelParameter, OuterRange, by_key};
+use crate::families::{Model, ModelParameter, OuterRange, find_family};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::{Deserialize, Serialize};
 
-pub use palpate_model::estimate::Parameter;
+pub use palpate_model::estimate::FittedParameter;
 
 /// Autocorrelation of the residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ pub struct FitReport {
     pub body: Model,
     /// All parameters, in the order of [`FitOptions::names`](super::FitOptions::names), then what the family derives
     /// from them.
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<FittedParameter>,
     /// Share of the variance of the force that the model explains, unweighted.
     pub r2: f64,
     /// Root mean square of measured minus modelled force in N, unweighted.
@@ -102,7 +102,7 @@ impl FitReport {
         self.parameter(name).map(|parameter| parameter.value)
     }
 
-    pub fn parameter(&self, name: &str) -> Option<&Parameter> {
+    pub fn parameter(&self, name: &str) -> Option<&FittedParameter> {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
@@ -141,7 +141,7 @@ impl FitReport {
     }
 
     fn forces(&self, samples: &[FitSample]) -> Option<Vec<f64>> {
-        let family = by_key(&self.body.family).ok()?;
+        let family = find_family(&self.body.family).ok()?;
         let layout = Layout::of(&*family);
         let value = |k: usize| self.parameters[k].value;
         let source = ColumnSource::new(family, self.is_at_rest);
@@ -156,7 +156,7 @@ impl FitReport {
     }
 }
 
-impl Fitted<'_> {
+impl FitSolution<'_> {
     /// The report of a fit of one record; of several, that of the first.
     pub fn report(&self) -> FitReport {
         self.record_report(&Uncertainty::of(&self.system, &self.refined), 0)
@@ -276,7 +276,7 @@ impl Fitted<'_> {
     }
 
     /// Values with their errors and intervals.
-    fn parameters(&self, uncertainty: &Uncertainty, record: usize) -> Vec<Parameter> {
+    fn parameters(&self, uncertainty: &Uncertainty, record: usize) -> Vec<FittedParameter> {
         let system = &self.system;
         let values = system.physical_values(record, &self.refined.points[record]);
         let derived = self.derived(&values);
@@ -288,7 +288,7 @@ impl Fitted<'_> {
         let derived = derived.into_iter().map(|one| (one.name, one.unit, one.value, None, false));
         let errors = self.errors(uncertainty, record);
         let all = own.chain(derived).zip(errors);
-        all.map(|((name, unit, value, range, is_fixed), error)| Parameter {
+        all.map(|((name, unit, value, range, is_fixed), error)| FittedParameter {
             name,
             value,
             unit,

@@ -1,7 +1,7 @@
 //! Warnings and findings of a fit; window, command line and files use the same sentences.
 
-use super::report::{FitReport, Parameter};
-use super::solve::Fitted;
+use super::report::{FitReport, FittedParameter};
+use super::solve::FitSolution;
 use super::uncertainty::RangeEnd;
 use crate::families::OuterRange;
 use palpate_model::viscoelastic::admissibility;
@@ -18,7 +18,7 @@ const LONGEST_SHARE: f64 = 0.45;
 const UNCERTAIN_SHARE: f64 = 0.5;
 
 /// Warnings without which the numbers would be misread.
-pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
+pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut warnings = Vec::new();
     let layout = fitted.system.layout();
     for outer in 0..layout.outers {
@@ -47,7 +47,7 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
             fitted.inseparable.join(", ")
         ));
     }
-    let times: Vec<&Parameter> = (0..layout.outers)
+    let times: Vec<&FittedParameter> = (0..layout.outers)
         .filter(|&k| fitted.system.source.range_kind(k) == OuterRange::Time)
         .map(|k| &report.parameters[k])
         .collect();
@@ -98,7 +98,7 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
 }
 
 /// Findings that are not numbers.
-pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
+pub(super) fn findings(fitted: &FitSolution<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut findings = Vec::new();
     if report.censored > 0 {
         findings.push(format!(
@@ -131,11 +131,11 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
 
 /// That an outer parameter ended where its search does.
 fn edge_warning(
-    fitted: &Fitted<'_>,
+    fitted: &FitSolution<'_>,
     record: usize,
     outer: usize,
     end: RangeEnd,
-    found: &Parameter,
+    found: &FittedParameter,
 ) -> String {
     let name = &found.name;
     if fitted.system.source.range_kind(outer) != OuterRange::Time {

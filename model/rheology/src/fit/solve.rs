@@ -45,7 +45,7 @@ use std::sync::Arc;
 /// # Ok::<(), palpate_rheology::fit::FitError>(())
 /// ```
 pub fn fit(samples: &[FitSample], options: &FitOptions) -> Result<FitReport, FitError> {
-    Ok(Fitted::of(samples, options)?.report())
+    Ok(FitSolution::of(samples, options)?.report())
 }
 
 /// Identifies several records together, such as two speeds on one specimen or several specimens.
@@ -83,7 +83,7 @@ pub fn fit_joint(
     options: &FitOptions,
     shared: &[&str],
 ) -> Result<JointReport, FitError> {
-    Ok(Fitted::joint(records, options, shared)?.joint_report())
+    Ok(FitSolution::fit_jointly(records, options, shared)?.joint_report())
 }
 
 /// One body for all records from the thinned records alone, a small share of a standard error from that of
@@ -151,21 +151,21 @@ pub fn fit_coefficients(
 /// # Ok::<(), palpate_rheology::fit::FitError>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Fitted<'a> {
+pub struct FitSolution<'a> {
     pub(super) system: System<'a>,
     pub(super) refined: RefinedFit,
     /// Parameters that the redrawn path hardly separates, although the measured depths hide it.
     pub(super) inseparable: Vec<String>,
 }
 
-impl<'a> Fitted<'a> {
+impl<'a> FitSolution<'a> {
     /// Fits one record; [`fit`] says how.
     pub fn of(samples: &'a [FitSample], options: &FitOptions) -> Result<Self, FitError> {
-        Self::joint(&[("the record", samples)], options, &[])
+        Self::fit_jointly(&[("the record", samples)], options, &[])
     }
 
     /// Fits several records together; [`fit_joint`] says how.
-    pub fn joint(
+    pub fn fit_jointly(
         records: &[(&'a str, &'a [FitSample])],
         options: &FitOptions,
         shared: &[&str],
@@ -177,16 +177,19 @@ impl<'a> Fitted<'a> {
 
     /// Fits other records of the same kind that differ little. What takes more than a scan to find is not searched
     /// again.
-    pub(super) fn refit<'b>(&self, records: &[NamedSamples<'b>]) -> Result<Fitted<'b>, FitError>
+    pub(super) fn refit<'b>(
+        &self,
+        records: &[NamedSamples<'b>],
+    ) -> Result<FitSolution<'b>, FitError>
     where
         'a: 'b,
     {
         let system = self.system.with_records(records)?;
         if system.source.has_one_time() {
             let points = search_start(&system)?;
-            return Fitted::refined(system, &points);
+            return FitSolution::refined(system, &points);
         }
-        Fitted::refined(system, &self.refined.points)
+        FitSolution::refined(system, &self.refined.points)
     }
 
     fn refined(system: System<'a>, start: &[ParameterPoint]) -> Result<Self, FitError> {

@@ -5,7 +5,7 @@
 //! condition of 1e2 costs two digits and not four.
 
 use super::design::{LANES, Lane};
-use crate::vectors::wide;
+use crate::vectors::run_wide;
 
 /// A scaled design worse than this does not separate its parameters. Useful protocols lie between 20 and 1e4, a single
 /// ramp drawn as one straight piece above 1e10.
@@ -75,7 +75,7 @@ impl Triangle {
             column[self.waiting..].fill(0.0);
         }
         self.waiting = 0;
-        wide(
+        run_wide(
             #[inline(always)]
             || reduce(&mut self.r, self.width, &mut self.block),
         );

@@ -3,7 +3,7 @@
 use super::noise::{self, Blocks, Memory};
 use super::passes::{RecordFactor, UnknownPlace};
 use super::refine::RefinedFit;
-use super::solve::Fitted;
+use super::solve::FitSolution;
 use super::system::System;
 use super::triangle::Factor;
 
@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-24;
 /// Share of a parameter over which what is derived from it is differenced.
 const DIFFERENCE: f64 = 1e-6;
 
-/// Scatter and autocorrelation of the residuals of all records.
+/// ScatterPlot and autocorrelation of the residuals of all records.
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
@@ -179,7 +179,7 @@ pub(super) enum RangeEnd {
     High,
 }
 
-impl Fitted<'_> {
+impl FitSolution<'_> {
     /// Which end of its searched range an outer parameter of a record lies at.
     pub(super) fn range_end(&self, record: usize, outer: usize) -> Option<RangeEnd> {
         let (low, high) = self.system.ranges[record].outers[outer];

@@ -4,13 +4,13 @@
 
 use super::body::SeriesBody;
 use super::real::{CompensatedForce, Real};
-use super::{Integrator, Start, check_finite};
+use super::{Integrator, IntegratorStart, check_finite};
 use crate::families::{POWER_MAX, StepError};
-use palpate_model::viscoelastic::{Pieces, psi_first};
+use palpate_model::viscoelastic::{ContactPieces, psi_first};
 
 /// Exact whatever the step; steps across the surface are cut where they cross it.
 #[derive(Clone, Copy, Debug)]
-pub struct Exact<R, const N: usize> {
+pub struct ExactIntegrator<R, const N: usize> {
     body: SeriesBody<N>,
     dt: f64,
     table: Table<R, N>,
@@ -85,8 +85,8 @@ fn across<R: Real, const N: usize>(
     force
 }
 
-impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
-    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self {
+impl<R: Real, const N: usize> Integrator<R, N> for ExactIntegrator<R, N> {
+    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: IntegratorStart<R>) -> Self {
         let settled = super::drive::SeriesDrive::new(body, dt, start.depth).settled();
         Self {
             body: *body,
@@ -104,16 +104,18 @@ impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
             let weighted = self.table.weighted(from, depth - from);
             self.force.relaxed(weighted, self.table.psi_0)
         } else {
-            match Pieces::of(from.to_f64(), depth.to_f64()) {
-                Pieces::Entering([outside, inside]) => {
+            match ContactPieces::of(from.to_f64(), depth.to_f64()) {
+                ContactPieces::Entering([outside, inside]) => {
                     let pieces = [(R::ZERO, R::ZERO, outside), (R::ZERO, depth, inside)];
                     across(self.body, self.dt, self.force, pieces)
                 }
-                Pieces::Leaving([inside, outside]) => {
+                ContactPieces::Leaving([inside, outside]) => {
                     let pieces = [(from, -from, inside), (R::ZERO, R::ZERO, outside)];
                     across(self.body, self.dt, self.force, pieces)
                 }
-                Pieces::Outside | Pieces::Inside => self.force.relaxed(R::ZERO, self.table.psi_0),
+                ContactPieces::Outside | ContactPieces::Inside => {
+                    self.force.relaxed(R::ZERO, self.table.psi_0)
+                }
             }
         };
         self.force = check_finite(force, [from, depth], self.dt)?;

@@ -28,11 +28,11 @@ mod real;
 mod rule;
 
 pub use body::SeriesBody;
-pub use exact::Exact;
+pub use exact::ExactIntegrator;
 pub use real::Real;
 pub use rule::{
-    ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Rule, RungeKutta,
-    Stepped, Trapezoid, Weights,
+    ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Rule, RuleIntegrator,
+    RuleWeights, RungeKutta, Trapezoid,
 };
 
 use crate::families::StepError;
@@ -44,7 +44,7 @@ use thiserror::Error;
 /// One way to step a body of `N` elastic terms in precision `R`, `dt` apart.
 pub trait Integrator<R: Real, const N: usize>: Sized {
     /// With its coefficients ready, even where it would be unstable; [`Scheme::check`] refuses that.
-    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self;
+    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: IntegratorStart<R>) -> Self;
 
     /// Moves to `depth` mm in the step's time and returns the force in N. On an error nothing moved.
     fn step(&mut self, depth: R) -> Result<R, StepError>;
@@ -52,7 +52,7 @@ pub trait Integrator<R: Real, const N: usize>: Sized {
 
 /// Where an integration begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start<R> {
+pub struct IntegratorStart<R> {
     /// Depth in mm.
     pub depth: R,
     /// Force in N; `None` for a body relaxed at that depth.
@@ -129,7 +129,7 @@ impl Scheme {
     /// Weights, in a step of `h` relaxation times, of the force and of the forcing at its start, middle and
     /// end. The exact step of a linear forcing is the exponential one with the forcing straight.
     #[must_use]
-    pub fn weights(self, h: f64) -> Weights {
+    pub fn weights(self, h: f64) -> RuleWeights {
         match self {
             Self::ExplicitEuler => ExplicitEuler::weights(h),
             Self::ImplicitEuler => ImplicitEuler::weights(h),
@@ -172,20 +172,24 @@ impl Scheme {
         forces.clear();
         match self {
             Self::ExplicitEuler => {
-                run::<R, N, Stepped<R, N, ExplicitEuler>>(body, dt, depths, forces)
+                run::<R, N, RuleIntegrator<R, N, ExplicitEuler>>(body, dt, depths, forces)
             }
             Self::ImplicitEuler => {
-                run::<R, N, Stepped<R, N, ImplicitEuler>>(body, dt, depths, forces)
+                run::<R, N, RuleIntegrator<R, N, ImplicitEuler>>(body, dt, depths, forces)
             }
-            Self::Trapezoid => run::<R, N, Stepped<R, N, Trapezoid>>(body, dt, depths, forces),
+            Self::Trapezoid => {
+                run::<R, N, RuleIntegrator<R, N, Trapezoid>>(body, dt, depths, forces)
+            }
             Self::ExponentialLeft => {
-                run::<R, N, Stepped<R, N, ExponentialLeft>>(body, dt, depths, forces)
+                run::<R, N, RuleIntegrator<R, N, ExponentialLeft>>(body, dt, depths, forces)
             }
             Self::ExponentialFirstOrder => {
-                run::<R, N, Stepped<R, N, ExponentialFirstOrder>>(body, dt, depths, forces)
+                run::<R, N, RuleIntegrator<R, N, ExponentialFirstOrder>>(body, dt, depths, forces)
             }
-            Self::Exact => run::<R, N, Exact<R, N>>(body, dt, depths, forces),
-            Self::RungeKutta => run::<R, N, Stepped<R, N, RungeKutta>>(body, dt, depths, forces),
+            Self::Exact => run::<R, N, ExactIntegrator<R, N>>(body, dt, depths, forces),
+            Self::RungeKutta => {
+                run::<R, N, RuleIntegrator<R, N, RungeKutta>>(body, dt, depths, forces)
+            }
         }
     }
 }
@@ -202,7 +206,7 @@ fn run<R: Real, const N: usize, I: Integrator<R, N>>(
     if !depth.is_finite() {
         return Err(StepError::Depth(depth.to_f64()).into());
     }
-    let start = Start { depth, force: None };
+    let start = IntegratorStart { depth, force: None };
     let mut integrator = I::at_any_step(body, dt, start);
     // A step of no movement from rest changes nothing; the first force is where the body rests.
     forces.push(drive::SeriesDrive::new(body, dt, depth).settled());

@@ -4,14 +4,14 @@
 use super::body::SeriesBody;
 use super::drive::SeriesDrive;
 use super::real::{CompensatedForce, Real};
-use super::{Integrator, Start, check_finite};
+use super::{Integrator, IntegratorStart, check_finite};
 use crate::families::StepError;
 use palpate_model::viscoelastic::psi;
 use std::marker::PhantomData;
 
 /// The numbers of a rule for one step length.
 #[derive(Clone, Copy, Debug)]
-pub struct Weights {
+pub struct RuleWeights {
     /// Weights of the forcing at the start, in the middle and at the end of the step.
     pub forcing: [f64; 3],
     /// The share of the force that goes, `a`.
@@ -23,12 +23,12 @@ pub trait Rule {
     /// Which of the three weights are not zero at every step: the others cost nothing.
     const USES: [bool; 3];
 
-    fn weights(h: f64) -> Weights;
+    fn weights(h: f64) -> RuleWeights;
 }
 
 /// A body stepped by a rule.
 #[derive(Clone, Copy, Debug)]
-pub struct Stepped<R, const N: usize, T> {
+pub struct RuleIntegrator<R, const N: usize, T> {
     drive: SeriesDrive<R, N>,
     force: CompensatedForce<R>,
     forcing: [R; 3],
@@ -36,8 +36,8 @@ pub struct Stepped<R, const N: usize, T> {
     rule: PhantomData<T>,
 }
 
-impl<R: Real, const N: usize, T: Rule> Integrator<R, N> for Stepped<R, N, T> {
-    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self {
+impl<R: Real, const N: usize, T: Rule> Integrator<R, N> for RuleIntegrator<R, N, T> {
+    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: IntegratorStart<R>) -> Self {
         let weights = T::weights(dt / body.tau_eps);
         let drive = SeriesDrive::new(body, dt, start.depth);
         Self {
@@ -79,8 +79,8 @@ pub struct ExplicitEuler;
 impl Rule for ExplicitEuler {
     const USES: [bool; 3] = [true, false, false];
 
-    fn weights(h: f64) -> Weights {
-        Weights { forcing: [h, 0.0, 0.0], share: h }
+    fn weights(h: f64) -> RuleWeights {
+        RuleWeights { forcing: [h, 0.0, 0.0], share: h }
     }
 }
 
@@ -93,9 +93,9 @@ pub struct ImplicitEuler;
 impl Rule for ImplicitEuler {
     const USES: [bool; 3] = [false, false, true];
 
-    fn weights(h: f64) -> Weights {
+    fn weights(h: f64) -> RuleWeights {
         let share = h / (1.0 + h);
-        Weights { forcing: [0.0, 0.0, share], share }
+        RuleWeights { forcing: [0.0, 0.0, share], share }
     }
 }
 
@@ -108,9 +108,9 @@ pub struct Trapezoid;
 impl Rule for Trapezoid {
     const USES: [bool; 3] = [true, false, true];
 
-    fn weights(h: f64) -> Weights {
+    fn weights(h: f64) -> RuleWeights {
         let half = h / (2.0 + h);
-        Weights { forcing: [half, 0.0, half], share: 2.0 * half }
+        RuleWeights { forcing: [half, 0.0, half], share: 2.0 * half }
     }
 }
 
@@ -123,9 +123,9 @@ pub struct ExponentialLeft;
 impl Rule for ExponentialLeft {
     const USES: [bool; 3] = [true, false, false];
 
-    fn weights(h: f64) -> Weights {
+    fn weights(h: f64) -> RuleWeights {
         let share = psi(0, h);
-        Weights { forcing: [share, 0.0, 0.0], share }
+        RuleWeights { forcing: [share, 0.0, 0.0], share }
     }
 }
 
@@ -139,15 +139,15 @@ pub struct ExponentialFirstOrder;
 impl Rule for ExponentialFirstOrder {
     const USES: [bool; 3] = [true, false, true];
 
-    fn weights(h: f64) -> Weights {
+    fn weights(h: f64) -> RuleWeights {
         let (psi_0, psi_1) = (psi(0, h), psi(1, h));
-        Weights { forcing: [psi_0 - psi_1, 0.0, psi_1], share: psi_0 }
+        RuleWeights { forcing: [psi_0 - psi_1, 0.0, psi_1], share: psi_0 }
     }
 }
 
 /// The classical Runge-Kutta rule of fourth order (Kutta 1901), its four stages joined: the equation is linear in the force, so they are three weights of the forcing and one of the force.
 ///
-/// Stable below `h = 2.785`. Fourth order. Needs the depth in mid-step, which a sampled path does not
+/// Stable below `h = 2.785`. Fourth order. SceneRequirements the depth in mid-step, which a sampled path does not
 /// have: taken from the straight line between the samples.
 #[derive(Clone, Copy, Debug)]
 pub struct RungeKutta;
@@ -155,8 +155,8 @@ pub struct RungeKutta;
 impl Rule for RungeKutta {
     const USES: [bool; 3] = [true, true, true];
 
-    fn weights(h: f64) -> Weights {
-        Weights {
+    fn weights(h: f64) -> RuleWeights {
+        RuleWeights {
             forcing: [
                 h / 6.0 * (1.0 - h + h * h / 2.0 - h * h * h / 4.0),
                 h / 6.0 * (4.0 - 2.0 * h + h * h / 2.0),

@@ -22,19 +22,21 @@ fn one_step<R: Real, const N: usize>(
         (force, depth, to): (R, R, R),
     ) -> R {
         let force = Some(force);
-        I::at_any_step(body, dt, Start { depth, force }).step(to).unwrap()
+        I::at_any_step(body, dt, IntegratorStart { depth, force }).step(to).unwrap()
     }
     let ends = (force, from, to);
     match scheme {
-        Scheme::ExplicitEuler => step::<R, N, Stepped<R, N, ExplicitEuler>>(body, dt, ends),
-        Scheme::ImplicitEuler => step::<R, N, Stepped<R, N, ImplicitEuler>>(body, dt, ends),
-        Scheme::Trapezoid => step::<R, N, Stepped<R, N, Trapezoid>>(body, dt, ends),
-        Scheme::ExponentialLeft => step::<R, N, Stepped<R, N, ExponentialLeft>>(body, dt, ends),
-        Scheme::ExponentialFirstOrder => {
-            step::<R, N, Stepped<R, N, ExponentialFirstOrder>>(body, dt, ends)
+        Scheme::ExplicitEuler => step::<R, N, RuleIntegrator<R, N, ExplicitEuler>>(body, dt, ends),
+        Scheme::ImplicitEuler => step::<R, N, RuleIntegrator<R, N, ImplicitEuler>>(body, dt, ends),
+        Scheme::Trapezoid => step::<R, N, RuleIntegrator<R, N, Trapezoid>>(body, dt, ends),
+        Scheme::ExponentialLeft => {
+            step::<R, N, RuleIntegrator<R, N, ExponentialLeft>>(body, dt, ends)
         }
-        Scheme::Exact => step::<R, N, Exact<R, N>>(body, dt, ends),
-        Scheme::RungeKutta => step::<R, N, Stepped<R, N, RungeKutta>>(body, dt, ends),
+        Scheme::ExponentialFirstOrder => {
+            step::<R, N, RuleIntegrator<R, N, ExponentialFirstOrder>>(body, dt, ends)
+        }
+        Scheme::Exact => step::<R, N, ExactIntegrator<R, N>>(body, dt, ends),
+        Scheme::RungeKutta => step::<R, N, RuleIntegrator<R, N, RungeKutta>>(body, dt, ends),
     }
 }
 

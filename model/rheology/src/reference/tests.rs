@@ -8,7 +8,7 @@ use std::str::FromStr;
 const DIGITS: Digits = Digits::decimal(REFERENCE_DIGITS);
 
 fn thesis(tau: f64) -> (Model, Vec<RelaxationTerm>) {
-    let family = families::by_key("series-3").unwrap();
+    let family = families::find_family("series-3").unwrap();
     let model = family.model(&[tau], &[0.05333, -0.0086, 0.000_434_5, 0.06]).unwrap();
     let terms = model.terms().unwrap();
     (model, terms)
@@ -95,7 +95,7 @@ fn agrees_with_the_file_of_quadratures() {
         if !exact_kinds.iter().any(|kind| fields[0].starts_with(kind)) {
             continue;
         }
-        let family = families::by_key(fields[0]).unwrap();
+        let family = families::find_family(fields[0]).unwrap();
         let model = family.model(&numbers(fields[1]), &numbers(fields[2]));
         let mut reference = Reference::new(&model.unwrap().terms().unwrap(), Depth(0.0)).unwrap();
         let until: f64 = fields[3].parse().unwrap();

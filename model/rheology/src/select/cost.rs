@@ -70,10 +70,10 @@ fn operations(term: &RelaxationTerm) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::families::{all, by_key};
+    use crate::families::{all_families, find_family};
 
     fn cost(key: &str, outer: &[f64], linear: &[f64]) -> StepCost {
-        let model = by_key(key).unwrap().model(outer, linear).unwrap();
+        let model = find_family(key).unwrap().model(outer, linear).unwrap();
         StepCost::of(&model.terms().unwrap())
     }
 
@@ -90,6 +90,6 @@ mod tests {
         assert_eq!(two.states, 2);
         let fung = cost("fung", &[0.1, 300.0, 0.15], &[0.15, 0.06]);
         assert_eq!(fung.states, 24);
-        assert!(fung > fifth && all().len() > 10);
+        assert!(fung > fifth && all_families().len() > 10);
     }
 }

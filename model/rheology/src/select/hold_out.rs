@@ -60,7 +60,7 @@ palpate_model::named! {
     /// Difference of a held-out record from the fitted ones.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "kebab-case")]
-    pub enum Unseen {
+    pub enum HeldOutKind {
         Speed = "an unseen speed",
         Depth = "an unseen depth",
         SpeedAndDepth = "an unseen speed and depth",
@@ -89,7 +89,7 @@ pub struct HoldOutPrediction {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordPrediction {
     pub record: String,
-    pub unseen: Unseen,
+    pub unseen: HeldOutKind,
     /// Root mean square error in N.
     pub rms_n: f64,
     /// Largest error in N.
@@ -179,17 +179,17 @@ fn cut(facts: &RecordFacts, samples: &[FitSample]) -> Option<usize> {
 }
 
 /// Difference of a record from those that a fold leaves.
-fn classify_unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> Unseen {
+fn classify_unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> HeldOutKind {
     let train = || (0..facts.len()).filter(|index| !test.contains(index));
     let one = &facts[record];
     let is_new = |value: fn(&RecordFacts) -> f64| {
         train().all(|index| are_unlike(value(&facts[index]), value(one)))
     };
     match (is_new(|one| one.speed_mm_per_s), is_new(|one| one.depth_mm)) {
-        (true, true) => Unseen::SpeedAndDepth,
-        (true, false) => Unseen::Speed,
-        (false, true) => Unseen::Depth,
-        (false, false) => Unseen::Specimen,
+        (true, true) => HeldOutKind::SpeedAndDepth,
+        (true, false) => HeldOutKind::Speed,
+        (false, true) => HeldOutKind::Depth,
+        (false, false) => HeldOutKind::Specimen,
     }
 }
 
@@ -222,7 +222,7 @@ pub(super) fn predict_fold(
         Ok(RecordPrediction {
             record: name.to_owned(),
             unseen: match fold.cut {
-                Some(_) => Unseen::Rest,
+                Some(_) => HeldOutKind::Rest,
                 None => classify_unseen(facts, index, &fold.test),
             },
             rms_n: predicted.rms,
@@ -293,9 +293,9 @@ mod tests {
         for (one, specimen) in facts.iter_mut().zip(["A", "B", "A", "B"]) {
             one.specimen = Some(specimen.into());
         }
-        assert_eq!(classify_unseen(&facts, 0, &[0]), Unseen::Depth);
-        assert_eq!(classify_unseen(&facts, 1, &[1]), Unseen::Specimen);
-        assert_eq!(classify_unseen(&facts, 2, &[2]), Unseen::Speed);
+        assert_eq!(classify_unseen(&facts, 0, &[0]), HeldOutKind::Depth);
+        assert_eq!(classify_unseen(&facts, 1, &[1]), HeldOutKind::Specimen);
+        assert_eq!(classify_unseen(&facts, 2, &[2]), HeldOutKind::Speed);
         let tests = |hold_out| -> Vec<Vec<usize>> {
             let folds = folds(hold_out, &facts, &[&[] as &[FitSample]; 4]).unwrap();
             folds.into_iter().map(|fold| fold.test).collect()

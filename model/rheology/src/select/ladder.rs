@@ -1,8 +1,8 @@
 //! Gain and cost of each extra term.
 
 use super::cost::StepCost;
-use super::run::Candidate;
-use crate::families::by_key;
+use super::run::ModelCandidate;
+use crate::families::find_family;
 use serde::Serialize;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -22,12 +22,12 @@ pub struct LadderStep {
 }
 
 /// The steps between families that were fitted, in the order of those they lead to.
-pub(super) fn steps(candidates: &[Candidate]) -> Vec<LadderStep> {
+pub(super) fn steps(candidates: &[ModelCandidate]) -> Vec<LadderStep> {
     let rungs = candidates.iter().flat_map(|after| {
-        let simpler = by_key(&after.family).map_or(Vec::new(), |family| family.adds_to());
+        let simpler = find_family(&after.family).map_or(Vec::new(), |family| family.adds_to());
         simpler.into_iter().map(move |(key, adds)| (key, adds, after))
     });
-    let step = |(key, adds, after): (String, &'static str, &Candidate)| {
+    let step = |(key, adds, after): (String, &'static str, &ModelCandidate)| {
         let before = candidates.iter().find(|one| one.family == key)?;
         let predictions = before.prediction.as_ref().zip(after.prediction.as_ref());
         Some(LadderStep {

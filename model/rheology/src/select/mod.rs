@@ -15,9 +15,10 @@ mod verdict;
 
 pub use cost::StepCost;
 pub use facts::RecordFacts;
-pub use hold_out::{HoldOut, HoldOutError, HoldOutPrediction, RecordPrediction, Unseen};
+pub use hold_out::{HeldOutKind, HoldOut, HoldOutError, HoldOutPrediction, RecordPrediction};
 pub use ladder::LadderStep;
 pub use run::{
-    Candidate, RefusedFamily, SelectError, SelectOptions, SelectProgress, Selection, select,
+    ModelCandidate, ModelSelection, RefusedFamily, SelectError, SelectOptions, SelectProgress,
+    select,
 };
-pub use verdict::{Outcome, SelectionVerdict};
+pub use verdict::{SelectionOutcome, SelectionVerdict};

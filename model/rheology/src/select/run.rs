@@ -6,7 +6,7 @@ use super::facts::{RecordFacts, peak_force};
 use super::hold_out::{Fold, HoldOut, HoldOutError, HoldOutPrediction, folds, predict_fold};
 use super::ladder::{LadderStep, steps};
 use super::verdict::{SampleCounts, SelectionVerdict, decide};
-use crate::families::{Family, Model, all};
+use crate::families::{Family, Model, all_families};
 use crate::fit::{FitError, FitOptions, FitSample, JointReport, fit_joint};
 use crate::tolerance::Tolerance;
 use palpate_model::units::Newtons;
@@ -28,7 +28,12 @@ pub struct SelectOptions {
 
 impl Default for SelectOptions {
     fn default() -> Self {
-        Self { families: all(), tolerance: None, hold_out: HoldOut::Auto, specimens: Vec::new() }
+        Self {
+            families: all_families(),
+            tolerance: None,
+            hold_out: HoldOut::Auto,
+            specimens: Vec::new(),
+        }
     }
 }
 
@@ -56,7 +61,7 @@ pub enum SelectError {
 
 /// A family fitted to all records, and judged.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Candidate {
+pub struct ModelCandidate {
     pub family: String,
     pub name: String,
     pub parameters: usize,
@@ -84,7 +89,7 @@ pub struct Candidate {
     pub warnings: Vec<String>,
 }
 
-impl Candidate {
+impl ModelCandidate {
     /// The error that a tolerance is compared with: of prediction where `is_predicted`, else of the fit.
     pub(super) fn error(&self, is_predicted: bool) -> Option<f64> {
         if is_predicted { self.prediction.as_ref().map(|one| one.rms_n) } else { Some(self.rms_n) }
@@ -99,7 +104,7 @@ pub struct RefusedFamily {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Selection {
+pub struct ModelSelection {
     pub records: Vec<RecordFacts>,
     /// Samples whose force counts.
     pub samples: usize,
@@ -110,7 +115,7 @@ pub struct Selection {
     /// Whether something was held out and predicted.
     pub is_predicted: bool,
     /// Families in the order given.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<ModelCandidate>,
     /// Families that the records do not hold.
     pub refused: Vec<RefusedFamily>,
     /// Gain of each extra term.
@@ -160,7 +165,7 @@ pub fn select(
     records: &[(&str, &[FitSample])],
     options: &SelectOptions,
     progress: &dyn Fn(&SelectProgress) -> ControlFlow<()>,
-) -> Result<Selection, SelectError> {
+) -> Result<ModelSelection, SelectError> {
     if records.is_empty() {
         return Err(SelectError::NoRecords);
     }
@@ -190,7 +195,7 @@ pub fn select(
             facts.peak_n = peak_force(samples, own.report.value("f_offset").unwrap_or(0.0));
         }
     }
-    let mut candidates: Vec<Candidate> = fitted
+    let mut candidates: Vec<ModelCandidate> = fitted
         .into_iter()
         .map(|(family, fit, predicted)| candidate(family, records, fit, predicted, effective))
         .collect::<Result<_, FitError>>()?;
@@ -200,7 +205,7 @@ pub fn select(
     compare(&mut candidates, tolerance_n, is_predicted);
     let counts = SampleCounts { records: records.len(), samples, effective };
     let verdict = decide(&candidates, tolerance_n, is_predicted, counts);
-    Ok(Selection {
+    Ok(ModelSelection {
         steps: steps(&candidates),
         verdict,
         records: facts,
@@ -266,9 +271,10 @@ fn fit_families<'a>(
 }
 
 /// Criteria above the lowest, and errors against the tolerance.
-fn compare(candidates: &mut [Candidate], tolerance_n: Option<f64>, is_predicted: bool) {
-    let lowest =
-        |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
+fn compare(candidates: &mut [ModelCandidate], tolerance_n: Option<f64>, is_predicted: bool) {
+    let lowest = |value: fn(&ModelCandidate) -> f64| {
+        candidates.iter().map(value).fold(f64::INFINITY, f64::min)
+    };
     let (bic, aicc) =
         (lowest(|one| one.bic), lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)));
     for one in candidates {
@@ -301,7 +307,7 @@ fn candidate(
     fit: JointReport,
     predicted: Result<Vec<super::RecordPrediction>, String>,
     effective: f64,
-) -> Result<Candidate, FitError> {
+) -> Result<ModelCandidate, FitError> {
     let first = fit.records.first().ok_or(FitError::Overflow)?;
     let model = first.report.body.clone();
     let terms = model.terms().map_err(|_| FitError::Overflow)?;
@@ -313,7 +319,7 @@ fn candidate(
     };
     let pairs = fit.records.iter().zip(records);
     let worst = pairs.map(|(one, (_, samples))| one.report.worst(samples).0);
-    Ok(Candidate {
+    Ok(ModelCandidate {
         family: family.key(),
         name: family.name(),
         parameters: model.outer.len() + model.linear.len(),

@@ -1,6 +1,6 @@
 //! The choice of a family, or the reason why there is none.
 
-use super::run::Candidate;
+use super::run::ModelCandidate;
 use serde::Serialize;
 
 /// A difference of BIC below this is "not worth more than a bare mention" (Kass & Raftery, J. Am. Stat.
@@ -16,7 +16,7 @@ const WHITE_SHARE: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum SelectionOutcome {
     /// One family is recommended.
     Recommended,
     /// Several do equally well; the simplest of them is the choice to use.
@@ -29,7 +29,7 @@ pub enum Outcome {
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SelectionVerdict {
-    pub outcome: Outcome,
+    pub outcome: SelectionOutcome,
     /// The family to use; null where none is within the tolerance or adequate.
     pub family: Option<String>,
     /// The families that are as good, itself included; or the nearest where none is good enough.
@@ -54,7 +54,7 @@ impl SampleCounts {
 }
 
 pub(super) fn decide(
-    candidates: &[Candidate],
+    candidates: &[ModelCandidate],
     tolerance_n: Option<f64>,
     is_predicted: bool,
     counts: SampleCounts,
@@ -66,14 +66,14 @@ pub(super) fn decide(
 }
 
 /// By fewer numbers, then by cost.
-fn simplest<'a>(candidates: &[&'a Candidate]) -> Option<&'a Candidate> {
-    let order = |one: &&&Candidate| (one.free, one.cost);
+fn simplest<'a>(candidates: &[&'a ModelCandidate]) -> Option<&'a ModelCandidate> {
+    let order = |one: &&&ModelCandidate| (one.free, one.cost);
     candidates.iter().min_by_key(order).copied()
 }
 
 /// The lowest BIC, if no other family comes near it and it describes the records.
-fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> SelectionVerdict {
-    let near: Vec<&Candidate> =
+fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> SelectionVerdict {
+    let near: Vec<&ModelCandidate> =
         candidates.iter().filter(|one| one.bic_above < BARE_MENTION).collect();
     let among: Vec<String> = near.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&near);
@@ -84,7 +84,7 @@ fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> Select
                 format!("the residuals of {}, {} rms,", one.family, newtons(one.rms_n))
             });
             (
-                Outcome::NoneAdequate,
+                SelectionOutcome::NoneAdequate,
                 format!(
                     "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} of them carry the information of {:.0} independent ones), so the lowest criterion proves nothing; state a tolerance, the error that does not matter",
                     counts.samples, counts.effective
@@ -92,7 +92,7 @@ fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> Select
             )
         }
         Some(one) if near.len() > 1 => (
-            Outcome::NoWinner,
+            SelectionOutcome::NoWinner,
             format!(
                 "no winner among {}: their BIC differ by less than {BARE_MENTION}; use {}, the simplest of them",
                 list(&among),
@@ -110,14 +110,14 @@ fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> Select
             } else {
                 ", the only family compared".to_owned()
             };
-            (Outcome::Recommended, format!("use {} ({}){lead}", one.family, one.name))
+            (SelectionOutcome::Recommended, format!("use {} ({}){lead}", one.family, one.name))
         }
         None => (
-            Outcome::NoneAdequate,
+            SelectionOutcome::NoneAdequate,
             "no family has a criterion; check the units of force and depth".to_owned(),
         ),
     };
-    let is_chosen = matches!(outcome, Outcome::Recommended | Outcome::NoWinner);
+    let is_chosen = matches!(outcome, SelectionOutcome::Recommended | SelectionOutcome::NoWinner);
     SelectionVerdict {
         outcome,
         family: chosen.filter(|_| is_chosen).map(|one| one.family.clone()),
@@ -127,11 +127,16 @@ fn choose_by_criterion(candidates: &[Candidate], counts: SampleCounts) -> Select
 }
 
 /// The cheapest within the tolerance.
-fn choose_within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> SelectionVerdict {
-    let error = |one: &Candidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
+fn choose_within(
+    candidates: &[ModelCandidate],
+    tolerance: f64,
+    is_predicted: bool,
+) -> SelectionVerdict {
+    let error = |one: &ModelCandidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
     let what = if is_predicted { "predicts what was held out" } else { "describes the records" };
-    let good: Vec<&Candidate> = candidates.iter().filter(|one| error(one) <= tolerance).collect();
-    let by_cost = |one: &&&Candidate| (one.cost, one.free);
+    let good: Vec<&ModelCandidate> =
+        candidates.iter().filter(|one| error(one) <= tolerance).collect();
+    let by_cost = |one: &&&ModelCandidate| (one.cost, one.free);
     let Some(cheapest) = good.iter().min_by_key(by_cost) else {
         let nearest = candidates.iter().min_by(|a, b| error(a).total_cmp(&error(b)));
         let nearest = nearest.filter(|one| error(one).is_finite());
@@ -147,14 +152,14 @@ fn choose_within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -
             }
         };
         return SelectionVerdict {
-            outcome: Outcome::NoneWithin,
+            outcome: SelectionOutcome::NoneWithin,
             family: None,
             among: nearest.map(|one| one.family.clone()).into_iter().collect(),
             sentences: vec![sentence],
         };
     };
     let cost_max = cheapest.cost.operations as f64 * (1.0 + SAME_COST);
-    let equals: Vec<&Candidate> = good
+    let equals: Vec<&ModelCandidate> = good
         .iter()
         .filter(|one| one.cost.operations as f64 <= cost_max && are_equal(one, cheapest))
         .copied()
@@ -180,7 +185,11 @@ fn choose_within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -
     }];
     sentences.extend(remarks(candidates, chosen, tolerance, is_predicted));
     SelectionVerdict {
-        outcome: if equals.len() > 1 { Outcome::NoWinner } else { Outcome::Recommended },
+        outcome: if equals.len() > 1 {
+            SelectionOutcome::NoWinner
+        } else {
+            SelectionOutcome::Recommended
+        },
         family: Some(chosen.family.clone()),
         among,
         sentences,
@@ -188,7 +197,7 @@ fn choose_within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -
 }
 
 /// Whether two families do equally well: by their predictions over records, or else by their BIC.
-fn are_equal(one: &Candidate, other: &Candidate) -> bool {
+fn are_equal(one: &ModelCandidate, other: &ModelCandidate) -> bool {
     let by_records = one
         .prediction
         .as_ref()
@@ -200,7 +209,7 @@ fn are_equal(one: &Candidate, other: &Candidate) -> bool {
     }
 }
 
-fn worst(one: &Candidate, is_predicted: bool) -> f64 {
+fn worst(one: &ModelCandidate, is_predicted: bool) -> f64 {
     match &one.prediction {
         Some(prediction) if is_predicted => prediction.worst_n,
         _ => one.worst_n,
@@ -208,13 +217,13 @@ fn worst(one: &Candidate, is_predicted: bool) -> f64 {
 }
 
 fn remarks(
-    candidates: &[Candidate],
-    chosen: &Candidate,
+    candidates: &[ModelCandidate],
+    chosen: &ModelCandidate,
     tolerance: f64,
     is_predicted: bool,
 ) -> Vec<String> {
     let mut remarks = Vec::new();
-    let error = |one: &Candidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
+    let error = |one: &ModelCandidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
     if worst(chosen, is_predicted) > tolerance {
         remarks.push(format!(
             "the tolerance holds on average, not everywhere; the error of single samples is up to {}",

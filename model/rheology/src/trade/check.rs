@@ -1,6 +1,6 @@
 //! Validity of stored curves.
 
-use super::{Cost, FamilyRow, IntegratorRow, TRADE_FORMAT, TradeCurves};
+use super::{FamilyRow, IntegratorRow, MeasuredCost, TRADE_FORMAT, TradeCurves};
 use crate::integrators::Precision;
 use thiserror::Error;
 
@@ -34,7 +34,7 @@ const LAST_DIGITS_F32: f64 = 1e-6;
 
 /// Share of the force below which an error in this precision is rounding.
 #[must_use]
-pub const fn last_digits(precision: Precision) -> f64 {
+pub const fn rounding_share(precision: Precision) -> f64 {
     match precision {
         Precision::F64 => LAST_DIGITS,
         Precision::F32 => LAST_DIGITS_F32,
@@ -58,7 +58,7 @@ impl TradeCurves {
         for peak in [self.peak.ramp_hold_n, self.peak.poke_n] {
             positive("a peak force", peak)?;
         }
-        for Cost { ns, spread, halves } in self.costs() {
+        for MeasuredCost { ns, spread, halves } in self.costs() {
             positive("a time in ns", *ns)?;
             error("a spread", *spread)?;
             error("a difference of halves", *halves)?;
@@ -138,7 +138,7 @@ impl TradeCurves {
             match (stored.error, row.error) {
                 (None, None) => {}
                 (Some(stored), Some(found)) => {
-                    let share = last_digits(row.precision);
+                    let share = rounding_share(row.precision);
                     same(&name, stored.ramp_hold_n, found.ramp_hold_n, share * peak.ramp_hold_n)?;
                     same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
                 }

@@ -10,9 +10,9 @@ mod machine;
 mod pareto;
 
 pub use advice::{Advice, AdvisedSetting, Recommendation};
-pub use check::{CurveError, last_digits};
+pub use check::{CurveError, rounding_share};
 pub use machine::{Machine, STALE_DAYS};
-pub use pareto::{front, pareto};
+pub use pareto::{find_pareto_front, mark_pareto_optimal};
 
 use crate::integrators::{Precision, Scheme};
 use palpate_model::units::Newtons;
@@ -23,7 +23,7 @@ pub const TRADE_FORMAT: u32 = 1;
 
 /// A measured time and its repeatability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cost {
+pub struct MeasuredCost {
     /// Time of one in ns: the least over all rounds, since other work on the machine only adds.
     pub ns: f64,
     /// By how much the middle round was above the least, as a share of it.
@@ -51,7 +51,7 @@ pub struct IntegratorRow {
     /// Its error; null where it has none.
     pub error: Option<ForceError>,
     pub refused: Option<String>,
-    pub cost: Cost,
+    pub cost: MeasuredCost,
     /// Cost of a second of simulated time, in ns.
     pub second_ns: f64,
     /// Whether nothing is both cheaper and more exact.
@@ -68,7 +68,7 @@ pub struct FamilyRow {
     /// Largest error of force in N.
     pub error_n: f64,
     /// Cost of a step at any rate.
-    pub cost: Cost,
+    pub cost: MeasuredCost,
     /// Whether nothing for this target is both cheaper and more exact.
     pub front: bool,
 }
@@ -83,7 +83,7 @@ pub struct FitRow {
     pub tau_error: f64,
     /// Root mean square over the seeds of the largest error of the fitted force, in N.
     pub error_n: f64,
-    pub cost: Cost,
+    pub cost: MeasuredCost,
     /// Whether nothing is both cheaper and more exact.
     pub front: bool,
 }
@@ -95,7 +95,7 @@ pub struct LiveRow {
     /// How far its last answer is from the fit of record on a noiseless recording, as a share of the
     /// relaxation time; null where it has no answer.
     pub tau_error: Option<f64>,
-    pub cost: Cost,
+    pub cost: MeasuredCost,
     /// Whether nothing is both cheaper and more exact.
     pub front: bool,
 }
@@ -145,7 +145,7 @@ impl TradeCurves {
             let error = row.error.map(|error| error.share_of(&peak));
             (error, row.second_ns)
         });
-        let front = pareto(&points.collect::<Vec<_>>());
+        let front = mark_pareto_optimal(&points.collect::<Vec<_>>());
         self.integrators.iter_mut().zip(front).for_each(|(row, front)| row.front = front);
         for index in 0..self.families.len() {
             let target = &self.families[index].target;
@@ -157,12 +157,18 @@ impl TradeCurves {
         }
         let points: Vec<_> =
             self.fit.iter().map(|row| (Some(row.tau_error), row.cost.ns)).collect();
-        self.fit.iter_mut().zip(pareto(&points)).for_each(|(row, front)| row.front = front);
+        self.fit
+            .iter_mut()
+            .zip(mark_pareto_optimal(&points))
+            .for_each(|(row, front)| row.front = front);
         let points: Vec<_> = self.live.iter().map(|row| (row.tau_error, row.cost.ns)).collect();
-        self.live.iter_mut().zip(pareto(&points)).for_each(|(row, front)| row.front = front);
+        self.live
+            .iter_mut()
+            .zip(mark_pareto_optimal(&points))
+            .for_each(|(row, front)| row.front = front);
     }
 
-    pub fn costs(&self) -> impl Iterator<Item = &Cost> {
+    pub fn costs(&self) -> impl Iterator<Item = &MeasuredCost> {
         let integrators = self.integrators.iter().map(|row| &row.cost);
         let families = self.families.iter().map(|row| &row.cost);
         let fits = self.fit.iter().map(|row| &row.cost);

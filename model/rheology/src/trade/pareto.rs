@@ -8,7 +8,7 @@ pub(super) fn beats(one: (f64, f64), other: (f64, f64)) -> bool {
 /// For points of `(error, cost)`, whether no other is both at least as exact and at least as cheap.
 /// A point without an error is never on the front.
 #[must_use]
-pub fn pareto(points: &[(Option<f64>, f64)]) -> Vec<bool> {
+pub fn mark_pareto_optimal(points: &[(Option<f64>, f64)]) -> Vec<bool> {
     let is_beaten = |error: f64, cost: f64| {
         points.iter().any(|&(other, other_cost)| {
             other.is_some_and(|other| beats((other, other_cost), (error, cost)))
@@ -19,10 +19,10 @@ pub fn pareto(points: &[(Option<f64>, f64)]) -> Vec<bool> {
 
 /// The front of points of `[cost, error]`: indices of those that nothing beats, the cheapest first.
 #[must_use]
-pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
+pub fn find_pareto_front(points: &[[f64; 2]]) -> Vec<usize> {
     let pairs: Vec<(Option<f64>, f64)> =
         points.iter().map(|&[cost, error]| (Some(error), cost)).collect();
-    let on_front = pareto(&pairs);
+    let on_front = mark_pareto_optimal(&pairs);
     let mut front: Vec<usize> = (0..points.len()).filter(|&index| on_front[index]).collect();
     front.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
     front
@@ -35,7 +35,7 @@ mod tests {
     #[test]
     fn the_front_begins_with_the_cheapest() {
         let points = [[4.0, 1.0], [1.0, 9.0], [2.0, 9.5], [3.0, 2.0], [4.0, 0.5]];
-        assert_eq!(front(&points), [1, 3, 4]);
-        assert!(front(&[]).is_empty());
+        assert_eq!(find_pareto_front(&points), [1, 3, 4]);
+        assert!(find_pareto_front(&[]).is_empty());
     }
 }

@@ -1,8 +1,8 @@
 use super::*;
 use crate::tolerance::Tolerance;
 
-fn cost(ns: f64) -> Cost {
-    Cost { ns, spread: 0.02, halves: 0.01 }
+fn cost(ns: f64) -> MeasuredCost {
+    MeasuredCost { ns, spread: 0.02, halves: 0.01 }
 }
 
 fn integrator(scheme: Scheme, step_s: f64, error: f64, ns: f64) -> IntegratorRow {
@@ -92,7 +92,7 @@ fn the_front_is_what_nothing_beats() {
         (None, 0.1),
         (Some(1.0), 1.0),
     ];
-    assert_eq!(pareto(&points), [true, true, false, true, false, true]);
+    assert_eq!(mark_pareto_optimal(&points), [true, true, false, true, false, true]);
     let curves = curves();
     let fronts: Vec<bool> = curves.integrators.iter().map(|row| row.front).collect();
     // A second of the exact step at 10 ms costs 600 ns and errs by nothing; only the trapezoid there

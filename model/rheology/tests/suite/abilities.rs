@@ -5,7 +5,8 @@ use palpate_test_support::record as support;
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{self, Model};
 use palpate_rheology::fit::{
-    Bootstrap, FitError, FitOptions, FitSample, Fitted, Traced, fit, fit_joint, systematic,
+    Bootstrap, FitError, FitOptions, FitSample, FitSolution, TracedRecord, estimate_systematic,
+    fit, fit_joint,
 };
 use support::Noise;
 
@@ -15,7 +16,7 @@ const NOISE: f64 = 0.002;
 /// A body of each family whose force over 20 mm is a few newtons.
 fn bodies() -> Vec<Model> {
     let model = |key: &str, outer: &[f64], linear: &[f64]| {
-        let family = families::by_key(key).unwrap();
+        let family = families::find_family(key).unwrap();
         family.model(outer, linear).unwrap()
     };
     vec![
@@ -186,7 +187,7 @@ fn every_family_shares_what_is_to_be_shared() {
 fn every_family_states_what_it_does_not_know() {
     for model in bodies() {
         let samples = record(&model, 2.0, 0.0, NOISE, 7);
-        let fitted = Fitted::of(&samples, &options(&model)).unwrap();
+        let fitted = FitSolution::of(&samples, &options(&model)).unwrap();
         let report = fitted.report();
         for (name, exact) in truth(&model) {
             let one = report.parameter(&name).unwrap();
@@ -209,7 +210,7 @@ fn every_family_states_what_it_does_not_know() {
 fn profiles_of_every_family_are_the_symmetric_intervals_where_noise_is_small() {
     for model in quick_bodies() {
         let samples = record(&model, 2.0, 0.0, NOISE, 7);
-        let fitted = Fitted::of(&samples, &options(&model)).unwrap();
+        let fitted = FitSolution::of(&samples, &options(&model)).unwrap();
         let report = fitted.report();
         let profile = fitted.profile(0).unwrap();
         assert_eq!(profile.len(), options(&model).free_count());
@@ -232,7 +233,7 @@ fn bootstraps_of_every_family_spread_like_their_standard_errors() {
     let choice = Bootstrap { seed: 3, repeats: 60 };
     for model in quick_bodies() {
         let samples = record(&model, 2.0, 0.0, NOISE, 7);
-        let fitted = Fitted::of(&samples, &options(&model)).unwrap();
+        let fitted = FitSolution::of(&samples, &options(&model)).unwrap();
         let report = fitted.report();
         for one in fitted.bootstrap(0, choice, |_| ()).unwrap() {
             let error = report.parameter(&one.name).unwrap().std_error.unwrap();
@@ -247,14 +248,14 @@ fn bootstraps_of_every_family_spread_like_their_standard_errors() {
 fn every_family_reports_the_systematic_error_of_the_compliance() {
     for model in bodies() {
         let samples = record(&model, 2.0, 0.0, 0.0, 1);
-        let traced = |error| Traced {
+        let traced = |error| TracedRecord {
             name: "record",
             samples: &samples,
             calibration: None,
             compliance: Some(("stand", error)),
         };
         let [one, two] =
-            [1e-3, 2e-3].map(|error| systematic(traced(error), &options(&model)).unwrap());
+            [1e-3, 2e-3].map(|error| estimate_systematic(traced(error), &options(&model)).unwrap());
         let moved = one.parameters.iter().zip(&two.parameters);
         let ratios: Vec<f64> = moved
             .filter(|(one, _)| one.error > 0.0)

@@ -6,7 +6,7 @@
 
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
-use palpate_test_support::record::{ramp_hold, remembering, respond};
+use palpate_test_support::record::{ramp_hold, respond, with_correlated_noise};
 
 const TRUTH: [(&str, f64); 5] =
     [("tau_eps", 1.023), ("mu1", 0.05333), ("mu2", -0.0086), ("mu3", 0.0004345), ("tau_sig", 0.06)];
@@ -32,7 +32,7 @@ fn draws() -> u64 {
 fn covered(clean: &[FitSample], noise: (f64, f64, f64), seeds: std::ops::Range<u64>) -> [u64; 5] {
     let mut covered = [0; 5];
     for seed in seeds {
-        let record = remembering(clean, seed, noise);
+        let record = with_correlated_noise(clean, seed, noise);
         let report = fit(&record, &FitOptions::default()).unwrap();
         for (count, (name, truth)) in covered.iter_mut().zip(TRUTH) {
             let [low, high] = report.parameter(name).unwrap().ci95.unwrap();

@@ -4,7 +4,7 @@ use palpate_model::random::SplitMix;
 use palpate_model::rig::Phase;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
-use palpate_rheology::cycles::{CycleSample, SteadyRule, analyse, by_depth};
+use palpate_rheology::cycles::{CycleSample, SteadyRule, analyse_cycles, split_by_depth};
 
 /// Thesis body behind a surface that has receded by so much in each cycle: in at 3 mm/s to 30 mm, `hold` seconds, back;
 /// two hundred samples a second.
@@ -45,7 +45,7 @@ fn receding(count: i32) -> Vec<f64> {
 fn shifts_peaks_and_the_steady_cycle_are_found() {
     for noise in [0.0, 0.02] {
         let sets = receding(10);
-        let found = analyse(&cycles(&sets, 0.0, noise), None, None);
+        let found = analyse_cycles(&cycles(&sets, 0.0, noise), None, None);
         assert_eq!(found.len(), 10);
         let steady = SteadyRule::default().judge(&found);
         for (k, change) in steady.changes.iter().enumerate() {
@@ -88,7 +88,7 @@ fn peak_and_stiffness_are_those_of_the_body() {
     };
     let slope = (exact(24.01) - exact(23.99)) / 0.02;
     for (noise, at_most) in [(0.0, 1e-3), (0.02, 4.0)] {
-        let one = &analyse(&cycles(&[0.0], 0.0, noise), None, None)[0];
+        let one = &analyse_cycles(&cycles(&[0.0], 0.0, noise), None, None)[0];
         let stiffness = one.stiffness.unwrap();
         assert!((stiffness.depth.0 - 24.0).abs() < 1e-9);
         let misses = [
@@ -101,10 +101,13 @@ fn peak_and_stiffness_are_those_of_the_body() {
             assert!(miss.abs() < at_most * unit, "{noise}: {miss} {error}");
         }
     }
-    let at = analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(12.0)), None)[0].stiffness;
+    let at = analyse_cycles(&cycles(&[0.0], 0.0, 0.0), Some(Depth(12.0)), None)[0].stiffness;
     let slope = (exact(12.01) - exact(11.99)) / 0.02;
     assert!((at.unwrap().slope.value - slope).abs() < 1e-3);
-    assert_eq!(analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)), None)[0].stiffness, None);
+    assert_eq!(
+        analyse_cycles(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)), None)[0].stiffness,
+        None
+    );
 }
 
 #[test]
@@ -129,7 +132,7 @@ fn energies_are_those_of_straight_lines() {
     all.extend(line(500, Phase::Ramp, &|s| 10.0 * s, 0.5, 2));
     // Moves between cycles are no part of one.
     all.extend(line(500, Phase::Retract, &|s| 10.0 * (1.0 - s), 0.1, 2));
-    let found = analyse(&all, None, None);
+    let found = analyse_cycles(&all, None, None);
     assert!((found[0].work_loading - 25.0).abs() < 1e-12);
     assert!((found[0].work_loop.unwrap() - 5.0).abs() < 1e-12);
     assert!((found[0].loss_share().unwrap() - 0.2).abs() < 1e-12);
@@ -143,7 +146,7 @@ fn energies_are_those_of_straight_lines() {
 
 #[test]
 fn a_hold_relaxes_or_creeps() {
-    let found = &analyse(&cycles(&[0.0], 12.0, 0.0), None, None)[0];
+    let found = &analyse_cycles(&cycles(&[0.0], 12.0, 0.0), None, None)[0];
     let relaxation = found.relaxation.unwrap();
     let settled = ModifiedKelvin::THESIS.elastic(Depth(30.0)).0;
     let equilibrium = relaxation.equilibrium.unwrap();
@@ -159,7 +162,7 @@ fn a_hold_relaxes_or_creeps() {
         one.depth = Depth(30.0 + 0.1 * (one.t.0 - 10.0));
         one.force = Newtons(5.0);
     }
-    let found = &analyse(&creeping, None, None)[0];
+    let found = &analyse_cycles(&creeping, None, None)[0];
     assert!(found.relaxation.is_none());
     let creep = found.creep[0];
     assert!((creep.rate_end.value - 0.1).abs() < 1e-9);
@@ -190,7 +193,7 @@ fn two_forces(extra: Phase) -> Vec<CycleSample> {
 
 #[test]
 fn each_hold_of_a_force_has_its_own_row() {
-    let found = &analyse(&two_forces(Phase::Creep), None, Some(Depth(0.015)))[0];
+    let found = &analyse_cycles(&two_forces(Phase::Creep), None, Some(Depth(0.015)))[0];
     let rows: Vec<[f64; 4]> = found
         .creep
         .iter()
@@ -203,7 +206,7 @@ fn each_hold_of_a_force_has_its_own_row() {
 #[test]
 fn a_cycle_with_more_than_a_hold_in_it_is_no_loop() {
     for (extra, is_loop) in [(Phase::Hold, true), (Phase::Creep, false), (Phase::Sine, false)] {
-        let found = &analyse(&two_forces(extra), None, None)[0];
+        let found = &analyse_cycles(&two_forces(extra), None, None)[0];
         assert_eq!(
             (found.work_loop.is_some(), found.loss_share().is_some()),
             (is_loop, is_loop),
@@ -218,21 +221,26 @@ fn a_cycle_with_more_than_a_hold_in_it_is_no_loop() {
     for one in all.iter_mut().filter(|one| one.step == 5) {
         one.phase = Phase::Sine;
     }
-    assert!(analyse(&all, None, None)[0].relaxation.is_none());
+    assert!(analyse_cycles(&all, None, None)[0].relaxation.is_none());
 }
 
 #[test]
 fn a_record_without_phases_has_the_same_cycles() {
     let named = cycles(&receding(4), 5.0, 0.0);
     let column = |value: fn(&CycleSample) -> f64| -> Vec<f64> { named.iter().map(value).collect() };
-    let split =
-        by_depth(&column(|one| one.t.0), &column(|one| one.depth.0), &column(|one| one.force.0));
-    let (one, other) = (analyse(&named, None, None), analyse(&split, None, None));
+    let split = split_by_depth(
+        &column(|one| one.t.0),
+        &column(|one| one.depth.0),
+        &column(|one| one.force.0),
+    );
+    let (one, other) = (analyse_cycles(&named, None, None), analyse_cycles(&split, None, None));
     assert_eq!(one.len(), other.len());
     for (a, b) in one.iter().zip(&other) {
         assert!((a.force_peak.value.0 - b.force_peak.value.0).abs() < 1e-9);
         assert!((a.work_loop.unwrap() - b.work_loop.unwrap()).abs() < 1e-9);
-        assert!((a.at_half().unwrap().0 - b.at_half().unwrap().0).abs() < 1e-9);
+        assert!(
+            (a.depth_at_half_peak().unwrap().0 - b.depth_at_half_peak().unwrap().0).abs() < 1e-9
+        );
         let percent =
             |one: &palpate_rheology::cycles::CycleAnalysis| one.relaxation.unwrap().percent.value;
         assert!((percent(a) - percent(b)).abs() < 1e-6);

@@ -3,22 +3,25 @@
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 use palpate_rheology::expected::{
-    ExpectedError, ExpectedPrecision, Family, Memory, Noise, ProtocolPath, Rig, Target, Unknowns,
-    intervals, shortest,
+    CorrelatedNoise, DesignLimits, ExpectedError, ExpectedPrecision, FreeOffsets, MeasurementNoise,
+    PrecisionTarget, ProtocolFamily, ProtocolPath, find_shortest_protocols, intervals,
 };
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_test_support::record;
 
 const BODY: ModifiedKelvin = ModifiedKelvin::THESIS;
 const DEPTH: Depth = Depth(30.0);
-const WITHOUT_OFFSET: Unknowns = Unknowns { f0: true, f_offset: false };
+const WITHOUT_OFFSET: FreeOffsets = FreeOffsets { f0: true, f_offset: false };
 
-fn slow(white: f64, sd: f64, time: f64) -> Noise {
-    Noise { white: Newtons(white), memory: Some(Memory { sd: Newtons(sd), time: Seconds(time) }) }
+fn slow(white: f64, sd: f64, time: f64) -> MeasurementNoise {
+    MeasurementNoise {
+        white: Newtons(white),
+        memory: Some(CorrelatedNoise { sd: Newtons(sd), time: Seconds(time) }),
+    }
 }
 
 /// Relative standard deviations in percent.
-fn percents(protocol: &ProtocolPath, noise: &Noise, unknowns: Unknowns) -> [f64; 5] {
+fn percents(protocol: &ProtocolPath, noise: &MeasurementNoise, unknowns: FreeOffsets) -> [f64; 5] {
     relative(&intervals(&BODY, protocol, noise, unknowns).unwrap())
 }
 
@@ -38,12 +41,12 @@ fn published_figures_are_reproduced() {
     let triangle = ProtocolPath::cycles(MmPerS(0.75), [Depth(0.0), DEPTH], 1, 1e3);
     let cases = [
         (&one, WITHOUT_OFFSET, [0.158, 0.111, 0.073, 0.036, 0.068]),
-        (&one, Unknowns::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
+        (&one, FreeOffsets::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
         (&two, WITHOUT_OFFSET, [0.072, 0.086, 0.056, 0.027, 0.027]),
         (&triangle, WITHOUT_OFFSET, [0.060, 0.078, 0.051, 0.025, 0.018]),
     ];
     for (protocol, unknowns, published) in cases {
-        let found = percents(protocol, &Noise::white(Newtons(0.02)), unknowns);
+        let found = percents(protocol, &MeasurementNoise::white(Newtons(0.02)), unknowns);
         for (found, published) in found.into_iter().zip(published) {
             // Published to three decimals.
             assert!((found - published).abs() < 6e-4, "{found} {published}");
@@ -105,7 +108,7 @@ fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 /// The same intervals the long way: derivatives by finite differences of simulated forces, every
 /// pair of samples, normal equations.
-fn brute_force(protocol: &ProtocolPath, noise: &Noise) -> [f64; 5] {
+fn brute_force(protocol: &ProtocolPath, noise: &MeasurementNoise) -> [f64; 5] {
     let path = path(protocol);
     let force = |body: &ModifiedKelvin| -> Vec<f64> {
         let samples = record::respond(body, &path);
@@ -172,7 +175,7 @@ fn quadrature_and_recursions_agree_with_every_pair_of_samples() {
     {
         let noise = slow(0.01, 0.02, time);
         let long_way = brute_force(protocol, &noise);
-        let short_way = percents(protocol, &noise, Unknowns::default());
+        let short_way = percents(protocol, &noise, FreeOffsets::default());
         for (long, short) in long_way.into_iter().zip(short_way) {
             // (dt / tau)^2 / 6 of a sum at dt / tau = 0.05 and 0.065 is 4e-4 and 7e-4; combinations
             // that the path tells little about have that several times over (measured: 1.2e-3).
@@ -187,11 +190,11 @@ fn quadrature_and_recursions_agree_with_every_pair_of_samples() {
 
 #[test]
 fn a_single_ramp_is_refused_by_name() {
-    let noise = Noise::white(Newtons(0.02));
+    let noise = MeasurementNoise::white(Newtons(0.02));
     for (speed, rate, unknowns) in [
-        (0.75, 1e3, Unknowns::default()),
+        (0.75, 1e3, FreeOffsets::default()),
         (0.75, 1e3, WITHOUT_OFFSET),
-        (3.0, 50.0, Unknowns::default()),
+        (3.0, 50.0, FreeOffsets::default()),
         (0.03, 7.0, WITHOUT_OFFSET),
     ] {
         let ramp = ProtocolPath::ramp_hold(MmPerS(speed), DEPTH, Seconds(0.0), rate);
@@ -206,15 +209,15 @@ fn a_single_ramp_is_refused_by_name() {
 #[test]
 fn a_record_shorter_than_its_unknowns_is_refused() {
     let protocol = ProtocolPath::ramp_hold(MmPerS(10.0), DEPTH, Seconds(2.0), 1.0);
-    let noise = Noise::white(Newtons(0.02));
-    assert!(intervals(&BODY, &protocol, &noise, Unknowns::default()).is_err());
+    let noise = MeasurementNoise::white(Newtons(0.02));
+    assert!(intervals(&BODY, &protocol, &noise, FreeOffsets::default()).is_err());
 }
 
 #[test]
 fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
     let hasty = ModifiedKelvin { tau_eps: 1e-3, ..BODY };
-    let noise = Noise::white(Newtons(0.02));
-    let refusal = intervals(&hasty, &thesis_protocol(1e3), &noise, Unknowns::default());
+    let noise = MeasurementNoise::white(Newtons(0.02));
+    let refusal = intervals(&hasty, &thesis_protocol(1e3), &noise, FreeOffsets::default());
     let text = refusal.unwrap_err().to_string();
     assert!(text.contains("sample at 2000 per second"), "{text}");
     // At a rate that resolves it, the plan is the same question on another scale of time: speeds
@@ -224,19 +227,21 @@ fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
         ModifiedKelvin { tau_eps: slow.tau_eps * quick, tau_sig: slow.tau_sig * quick, ..slow };
     let fast =
         ProtocolPath::ramp_hold(MmPerS(0.75 / quick), DEPTH, Seconds(50.0 * quick), 1e3 / quick);
-    let one = intervals(&scaled, &fast, &noise, Unknowns::default()).unwrap();
-    for (one, other) in
-        relative(&one).into_iter().zip(percents(&thesis_protocol(1e3), &noise, Unknowns::default()))
-    {
+    let one = intervals(&scaled, &fast, &noise, FreeOffsets::default()).unwrap();
+    for (one, other) in relative(&one).into_iter().zip(percents(
+        &thesis_protocol(1e3),
+        &noise,
+        FreeOffsets::default(),
+    )) {
         // The same numbers but for rounding through a condition of some hundreds.
         assert!((one / other - 1.0).abs() < 1e-9, "{one} {other}");
     }
 }
 
 /// Observed over expected variance of real fits, per parameter.
-fn variance_ratios(clean: &[FitSample], noise: &Noise, draws: u32) -> [f64; 5] {
+fn variance_ratios(clean: &[FitSample], noise: &MeasurementNoise, draws: u32) -> [f64; 5] {
     let rate = 1.0 / (clean[1].t.0 - clean[0].t.0);
-    let expected = intervals(&BODY, &thesis_protocol(rate), noise, Unknowns::default()).unwrap();
+    let expected = intervals(&BODY, &thesis_protocol(rate), noise, FreeOffsets::default()).unwrap();
     let mut sums = [0.0; 5];
     for seed in 0..draws {
         let mut random = record::Noise::seeded(u64::from(seed) + 77);
@@ -268,15 +273,17 @@ fn real_fits_scatter_as_expected() {
     let clean = record::respond(&BODY, &record::ramp_hold(0.75, 50.0, 1e-2));
     // 100 draws: the variance of a variance ratio is 2 / 100, so these bounds are 3.5 standard
     // deviations wide; seeds are fixed.
-    for noise in [Noise::white(Newtons(0.02)), slow(0.0, 0.02, 0.5), slow(0.02, 0.01, 0.05)] {
+    for noise in
+        [MeasurementNoise::white(Newtons(0.02)), slow(0.0, 0.02, 0.5), slow(0.02, 0.01, 0.05)]
+    {
         let ratios = variance_ratios(&clean, &noise, 100);
         println!("{noise:?}: {ratios:.2?}");
         assert!(ratios.iter().all(|ratio| (0.5..1.5).contains(ratio)), "{ratios:?}");
     }
 }
 
-fn rig() -> Rig {
-    Rig {
+fn rig() -> DesignLimits {
+    DesignLimits {
         speed_quantum: MmPerS(0.03),
         speed_max: MmPerS(20.0),
         depth: DEPTH,
@@ -288,12 +295,13 @@ fn rig() -> Rig {
 
 #[test]
 fn the_proposals_reach_the_target_and_nothing_shorter_does() {
-    let noise = Noise::white(Newtons(0.02));
+    let noise = MeasurementNoise::white(Newtons(0.02));
     for (name, percent) in [("tau", 1.0), ("tau", 0.3), ("mu1", 0.5), ("mu3", 0.05)] {
-        let target = Target::new(name, percent).unwrap();
-        let unknowns = Unknowns::default();
-        let proposals = shortest(&BODY, &noise, unknowns, &[target], &rig()).unwrap();
-        assert!(matches!(proposals[0].family, Family::RampHold { .. }));
+        let target = PrecisionTarget::new(name, percent).unwrap();
+        let unknowns = FreeOffsets::default();
+        let proposals =
+            find_shortest_protocols(&BODY, &noise, unknowns, &[target], &rig()).unwrap();
+        assert!(matches!(proposals[0].family, ProtocolFamily::RampHold { .. }));
         let reached = |protocol: &ProtocolPath| {
             let expected = intervals(&BODY, protocol, &noise, unknowns).ok()?;
             let mut all = expected.parameters.iter();
@@ -307,7 +315,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
         }
         // A plain scan over speeds and holds, finer than the search, finds no shorter ramp and hold
         // by more than a twentieth: the distance between the search's speeds.
-        let Family::RampHold { .. } = proposals[0].family else { unreachable!() };
+        let ProtocolFamily::RampHold { .. } = proposals[0].family else { unreachable!() };
         let best = proposals[0].expected.duration.0;
         for multiple in (20..=70).step_by(2) {
             let speed = MmPerS(0.03 * f64::from(multiple));
@@ -325,10 +333,10 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
 
 #[test]
 fn impossible_targets_are_refused_in_words() {
-    let noise = Noise::white(Newtons(0.02));
-    let ask = |name: &str, percent: f64, rig: Rig| {
-        let targets = [Target::new(name, percent).unwrap()];
-        let found = shortest(&BODY, &noise, Unknowns::default(), &targets, &rig);
+    let noise = MeasurementNoise::white(Newtons(0.02));
+    let ask = |name: &str, percent: f64, rig: DesignLimits| {
+        let targets = [PrecisionTarget::new(name, percent).unwrap()];
+        let found = find_shortest_protocols(&BODY, &noise, FreeOffsets::default(), &targets, &rig);
         found.unwrap_err().to_string()
     };
     let text = ask("tau", 0.001, rig());
@@ -336,9 +344,9 @@ fn impossible_targets_are_refused_in_words() {
         text.contains("tau_eps") && text.contains("0.001 %") && text.contains("3600 s"),
         "{text}"
     );
-    let gentle = Rig { force_max: Newtons(4.0), ..rig() };
+    let gentle = DesignLimits { force_max: Newtons(4.0), ..rig() };
     let text = ask("tau", 1.0, gentle);
     assert!(text.contains("allow more force"), "{text}");
-    let hasty = Rig { duration_max: Seconds(2.0), ..rig() };
+    let hasty = DesignLimits { duration_max: Seconds(2.0), ..rig() };
     assert!(ask("tau", 1.0, hasty).contains("allow more time"));
 }

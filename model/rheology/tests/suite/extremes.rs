@@ -2,8 +2,8 @@
 
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::extremes::{
-    ExpectedAnswer, Extent, ExtremesSubject, FamilyBody, PathCase, SubjectAnswer, Verdict, judge,
-    make_member, parts,
+    ExpectedAnswer, ExtremesExtent, ExtremesSubject, ExtremesVerdict, FamilyBody, PathCase,
+    SubjectAnswer, judge, list_extremes, make_member,
 };
 use palpate_rheology::families::{self, Family, Model, OuterParameter, RelaxationTerm};
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 fn nothing_is_wrong_at_the_extremes() {
     let mut groups = BTreeSet::new();
     let mut subjects = BTreeSet::new();
-    for part in parts(Extent::Quick, None).unwrap() {
+    for part in list_extremes(ExtremesExtent::Quick, None).unwrap() {
         let mut heard = 0.0;
         let rows = part.rows(|share| {
             assert!(share >= heard && share <= 1.0);
@@ -23,9 +23,9 @@ fn nothing_is_wrong_at_the_extremes() {
         });
         assert!(!rows.is_empty(), "{} {}", part.group, part.subject);
         for row in rows {
-            assert_ne!(row.verdict, Verdict::Wrong, "{row:?}");
+            assert_ne!(row.verdict, ExtremesVerdict::Wrong, "{row:?}");
             match row.verdict {
-                Verdict::Right => {
+                ExtremesVerdict::Right => {
                     assert!(row.relative_error.unwrap() <= row.tolerance, "{row:?}");
                 }
                 _ => assert!(row.sentence.len() > 20, "{row:?}"),
@@ -35,13 +35,13 @@ fn nothing_is_wrong_at_the_extremes() {
         }
     }
     assert_eq!(groups.len(), 8, "{groups:?}");
-    for family in families::all() {
+    for family in families::all_families() {
         assert!(
             subjects.contains(&family.key())
                 && subjects.contains(&format!("fit of {}", family.key()))
         );
     }
-    assert!(parts(Extent::Quick, Some("no such family")).is_err());
+    assert!(list_extremes(ExtremesExtent::Quick, Some("no such family")).is_err());
 }
 
 type Forces = Result<Vec<f64>, String>;
@@ -86,7 +86,7 @@ fn a_broken_step_is_judged_wrong() {
         path.run_on(&Spoilt { right, spoil }).verdict
     };
     let good = poke(10.0);
-    assert_eq!(verdict(|forces| forces, &good), Verdict::Right);
+    assert_eq!(verdict(|forces| forces, &good), ExtremesVerdict::Right);
     // Off by little more than the tolerance, in one sample.
     let off = |forces: Forces| {
         forces.map(|mut all| {
@@ -94,27 +94,27 @@ fn a_broken_step_is_judged_wrong() {
             all
         })
     };
-    assert_eq!(verdict(off, &good), Verdict::Wrong);
+    assert_eq!(verdict(off, &good), ExtremesVerdict::Wrong);
     let nan = |forces: Forces| {
         forces.map(|mut all| {
             all[0] = f64::NAN;
             all
         })
     };
-    assert_eq!(verdict(nan, &good), Verdict::Wrong);
+    assert_eq!(verdict(nan, &good), ExtremesVerdict::Wrong);
     let short = |forces: Forces| {
         forces.map(|mut all| {
             all.pop();
             all
         })
     };
-    assert_eq!(verdict(short, &good), Verdict::Wrong);
+    assert_eq!(verdict(short, &good), ExtremesVerdict::Wrong);
     // A refusal of what has an answer, an answer to what has none, a refusal without a reason.
-    assert_eq!(verdict(|_| Err("no".into()), &good), Verdict::Wrong);
+    assert_eq!(verdict(|_| Err("no".into()), &good), ExtremesVerdict::Wrong);
     let bad = poke(f64::NAN);
-    assert_eq!(verdict(|_| Ok(vec![0.0; 4]), &bad), Verdict::Wrong);
-    assert_eq!(verdict(|_| Err(String::new()), &bad), Verdict::Wrong);
-    assert_eq!(verdict(|forces| forces, &bad), Verdict::Refused);
+    assert_eq!(verdict(|_| Ok(vec![0.0; 4]), &bad), ExtremesVerdict::Wrong);
+    assert_eq!(verdict(|_| Err(String::new()), &bad), ExtremesVerdict::Wrong);
+    assert_eq!(verdict(|forces| forces, &bad), ExtremesVerdict::Refused);
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn a_broken_weight_is_judged_wrong() {
             self.1.forces(path)
         }
     }
-    for family in families::all() {
+    for family in families::all_families() {
         let right = make_member(&*family, 1.0, 20.0, 2.0);
         for index in 0..right.outer.len() + right.linear.len() {
             let mut other = right.clone();
@@ -144,7 +144,7 @@ fn a_broken_weight_is_judged_wrong() {
                 None => other.linear[index - right.outer.len()] *= 1.0 + 1e-5,
             }
             let row = poke(10.0).run_on(&OtherFamily(FamilyBody(right.clone()), FamilyBody(other)));
-            assert_eq!(row.verdict, Verdict::Wrong, "{} {index}: {row:?}", family.key());
+            assert_eq!(row.verdict, ExtremesVerdict::Wrong, "{} {index}: {row:?}", family.key());
         }
     }
 }
@@ -156,11 +156,11 @@ fn a_fit_is_judged_by_its_parameters_and_warnings() {
         let answer = SubjectAnswer::Number { error, warnings };
         judge("test", "case", "fit", expected, 1e-6, answer).verdict
     };
-    assert_eq!(verdict(ExpectedAnswer::Number, 1e-7, &["slow"]), Verdict::Right);
-    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &["slow"]), Verdict::Flagged);
-    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &[]), Verdict::Wrong);
-    assert_eq!(verdict(ExpectedAnswer::Either, f64::NAN, &["slow"]), Verdict::Wrong);
-    assert_eq!(verdict(ExpectedAnswer::Refusal, 0.0, &["slow"]), Verdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-7, &["slow"]), ExtremesVerdict::Right);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &["slow"]), ExtremesVerdict::Flagged);
+    assert_eq!(verdict(ExpectedAnswer::Number, 1e-5, &[]), ExtremesVerdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Either, f64::NAN, &["slow"]), ExtremesVerdict::Wrong);
+    assert_eq!(verdict(ExpectedAnswer::Refusal, 0.0, &["slow"]), ExtremesVerdict::Wrong);
 }
 
 /// A family that counts how often a fit asks for its columns.
@@ -217,7 +217,7 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
         |i, noise| if i == 33 { 1e9 } else { 1e-9 * noise },
         |i, _| f64::from(i).powi(5) * if i % 2 == 0 { 1.0 } else { -1.0 },
     ];
-    for family in families::all() {
+    for family in families::all_families() {
         let counted = Arc::new(CountingFamily { family, calls: AtomicUsize::new(0) });
         let options = FitOptions::of(counted.clone());
         let limit = bound(counted.outer().len());

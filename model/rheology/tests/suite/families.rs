@@ -47,7 +47,7 @@ fn record(model: &Model, path: &[(Seconds, Depth)]) -> Vec<FitSample> {
 /// A body of each family whose force over 20 mm is a few newtons.
 fn bodies() -> Vec<Model> {
     let model = |key: &str, outer: &[f64], linear: &[f64]| {
-        let family = families::by_key(key).expect("a family");
+        let family = families::find_family(key).expect("a family");
         family.model(outer, linear).expect("a model")
     };
     vec![
@@ -73,7 +73,7 @@ fn bodies() -> Vec<Model> {
 #[test]
 fn families_recover_themselves() {
     for model in bodies() {
-        let family = families::by_key(&model.family).unwrap();
+        let family = families::find_family(&model.family).unwrap();
         let path = match model.family.starts_with("unloading") {
             true => ramp_hold_unload,
             false => ramp_hold,
@@ -104,7 +104,7 @@ fn families_recover_themselves() {
 
 #[test]
 fn unloading_is_not_fitted_where_nothing_unloads() {
-    let series = families::by_key("series-3").unwrap();
+    let series = families::find_family("series-3").unwrap();
     let body = [0.05333, -0.0086, 0.0004345, 0.06];
     let model = series.model(&[1.023], &body).unwrap();
     let options = FitOptions::by_key("unloading-3").unwrap();
@@ -233,7 +233,7 @@ fn responses_agree_with_quadrature_in_many_digits() {
         let fields: Vec<&str> = line.split('/').map(str::trim).collect();
         let (t, exact): (f64, f64) = (fields[3].parse().unwrap(), fields[4].parse().unwrap());
         let mut check = |key: &str, tolerance: f64| {
-            let family = families::by_key(key).unwrap();
+            let family = families::find_family(key).unwrap();
             let model = family.model(&numbers(fields[1]), &numbers(fields[2])).unwrap();
             for parts in [1, 100] {
                 let force = model.along(corners(parts, t)).unwrap();

@@ -3,7 +3,7 @@
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::fit::{FitError, FitOptions, FitReport, FitSample, fit};
-use palpate_test_support::record::{self, noisy, ramp_hold, respond};
+use palpate_test_support::record::{self, ramp_hold, respond, with_white_noise};
 
 const BODY: [(&str, f64); 5] =
     [("tau_eps", 1.023), ("mu1", 0.05333), ("mu2", -0.0086), ("mu3", 0.0004345), ("tau_sig", 0.06)];
@@ -42,7 +42,7 @@ fn standard_errors_match_the_published_ones_of_this_protocol() {
         (FitOptions::default(), [0.166, 0.271, 0.126, 0.053, 0.068]),
         (without_offset(), [0.158, 0.111, 0.073, 0.036, 0.068]),
     ];
-    let record = noisy(&thesis_record(1e-3), 1);
+    let record = with_white_noise(&thesis_record(1e-3), 1);
     for (options, percent) in cases {
         let report = fit(&record, &options).unwrap();
         for ((name, exact), percent) in BODY.into_iter().zip(percent) {
@@ -65,7 +65,7 @@ fn thirty_noise_draws_scatter_as_their_errors_say() {
     let mut chi_square = [0.0; 5];
     let mut covered = 0;
     for seed in 0..draws {
-        let report = fit(&noisy(&clean, 100 + seed), &FitOptions::default()).unwrap();
+        let report = fit(&with_white_noise(&clean, 100 + seed), &FitOptions::default()).unwrap();
         for (slot, (name, exact)) in chi_square.iter_mut().zip(BODY) {
             let parameter = report.parameter(name).unwrap();
             let z = (parameter.value - exact) / parameter.std_error.unwrap();
@@ -93,7 +93,7 @@ fn weights_matter_where_the_noise_is_uneven() {
     }
     let (mut weighted, mut unweighted) = (0.0, 0.0);
     for seed in 0..12 {
-        let record = noisy(&clean, 500 + seed);
+        let record = with_white_noise(&clean, 500 + seed);
         let flat: Vec<FitSample> =
             record.iter().map(|sample| FitSample { sigma: Newtons(0.02), ..*sample }).collect();
         let miss = |samples: &[FitSample]| {
@@ -147,7 +147,7 @@ fn every_relaxation_time_the_record_can_show_is_found() {
 
 #[test]
 fn any_parameter_may_be_fixed() {
-    let record = noisy(&thesis_record(1e-2), 77);
+    let record = with_white_noise(&thesis_record(1e-2), 77);
     for (name, exact) in BODY {
         let mut options = FitOptions::default();
         options.fix(name, exact).unwrap();
@@ -207,7 +207,7 @@ fn an_unknown_contact_is_found() {
     assert!(worst_error(&report) < 1e-6, "{report:#?}");
 
     for seed in 0..6 {
-        let report = fit(&noisy(&clean, 40 + seed), &options).unwrap();
+        let report = fit(&with_white_noise(&clean, 40 + seed), &options).unwrap();
         for (name, exact) in BODY.into_iter().chain([("x_contact", 0.37)]) {
             let parameter = report.parameter(name).unwrap();
             let z = (parameter.value - exact) / parameter.std_error.unwrap();
@@ -235,7 +235,7 @@ fn one_ramp_cannot_separate_stiffness_from_viscosity_not_even_in_stairs() {
             ..*sample
         })
         .collect();
-    for record in [clean.clone(), stairs, noisy(&shaken, 8)] {
+    for record in [clean.clone(), stairs, with_white_noise(&shaken, 8)] {
         let err = fit(&record, &FitOptions::default()).unwrap_err();
         assert!(
             matches!(&err, FitError::Inseparable { names, .. } if names == &["mu1", "tau_sig"]),
@@ -245,7 +245,7 @@ fn one_ramp_cannot_separate_stiffness_from_viscosity_not_even_in_stairs() {
     // With the viscosity known the same ramp is enough.
     let mut options = FitOptions::default();
     options.fix("tau_sig", 0.06).unwrap();
-    let report = fit(&noisy(&clean, 5), &options).unwrap();
+    let report = fit(&with_white_noise(&clean, 5), &options).unwrap();
     let mu1 = report.parameter("mu1").unwrap();
     assert!(((mu1.value - 0.05333) / mu1.std_error.unwrap()).abs() < 4.5);
 }
@@ -286,7 +286,7 @@ fn a_body_without_relaxation_is_reported_at_the_edge() {
             sigma: Newtons(0.02),
         })
         .collect();
-    let report = fit(&noisy(&record, 4), &FitOptions::default()).unwrap();
+    let report = fit(&with_white_noise(&record, 4), &FitOptions::default()).unwrap();
     let tau = report.parameter("tau_eps").unwrap();
     assert!(
         report.warnings.iter().any(|text| text.contains("tau_eps"))

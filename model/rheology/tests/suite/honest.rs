@@ -3,9 +3,11 @@
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons};
 use palpate_rheology::fit::{
-    Bootstrap, FitError, FitOptions, FitSample, Fitted, LiveFit, fit, fit_joint,
+    Bootstrap, FitError, FitOptions, FitSample, FitSolution, LiveFit, fit, fit_joint,
 };
-use palpate_test_support::record::{Noise, noisy, ramp_hold, remembering, respond};
+use palpate_test_support::record::{
+    Noise, ramp_hold, respond, with_correlated_noise, with_white_noise,
+};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
@@ -29,13 +31,13 @@ fn censored_stretches_do_not_pass_for_quiet_noise() {
         let mut covered = 0;
         let mut found = 0;
         for seed in 0..draws {
-            let slow = remembering(&clean, 300 + seed, (0.02, 0.5, 0.0));
+            let slow = with_correlated_noise(&clean, 300 + seed, (0.02, 0.5, 0.0));
             let report = fit(&censored(slow, gap), &FitOptions::default()).unwrap();
             for (name, truth) in BODY.into_iter().zip([1.023, 0.05333, -0.0086, 0.0004345, 0.06]) {
                 let [low, high] = report.parameter(name).unwrap().ci95.unwrap();
                 covered += u64::from(low <= truth && truth <= high);
             }
-            let white = censored(noisy(&clean, 700 + seed), gap);
+            let white = censored(with_white_noise(&clean, 700 + seed), gap);
             let noise = fit(&white, &FitOptions::default()).unwrap().noise.unwrap();
             found += u64::from(noise.correlation_time_s.is_some());
         }
@@ -49,7 +51,7 @@ fn censored_stretches_do_not_pass_for_quiet_noise() {
 
 #[test]
 fn a_hold_without_forces_identifies_nothing_live() {
-    let record = noisy(&respond(&THESIS, &ramp_hold(0.75, 50.0, 1e-2)), 4);
+    let record = with_white_noise(&respond(&THESIS, &ramp_hold(0.75, 50.0, 1e-2)), 4);
     let record = censored(record, |t| t > 39.9);
     let mut live = LiveFit::new(Depth(30.0));
     for sample in &record {
@@ -57,7 +59,7 @@ fn a_hold_without_forces_identifies_nothing_live() {
     }
     let estimate = live.estimate().unwrap();
     for name in ["mu1", "tau_sig"] {
-        assert_eq!(estimate.identified(name), None, "{estimate:?}");
+        assert_eq!(estimate.identified_parameter(name), None, "{estimate:?}");
     }
     assert!(fit(&record, &FitOptions::default()).is_err());
 }
@@ -84,7 +86,7 @@ fn a_ramp_read_with_much_depth_noise_is_still_one_ramp() {
     let mut noise = Noise::seeded(8);
     for micrometres in [2.0, 10.0, 20.0, 30.0] {
         for seed in 0..10 {
-            let mut samples = noisy(&ramp, seed);
+            let mut samples = with_white_noise(&ramp, seed);
             for sample in &mut samples {
                 sample.depth = Depth(sample.depth.0 + 1e-3 * micrometres * noise.normal());
             }
@@ -96,10 +98,10 @@ fn a_ramp_read_with_much_depth_noise_is_still_one_ramp() {
 
 #[test]
 fn the_order_of_records_does_not_matter() {
-    let short = noisy(&respond(&THESIS, &ramp_hold(15.0, 0.5, 1e-2)), 1);
+    let short = with_white_noise(&respond(&THESIS, &ramp_hold(15.0, 0.5, 1e-2)), 1);
     let slow = ModifiedKelvin { tau_eps: 60.0, ..THESIS };
 
-    let long = noisy(&respond(&slow, &ramp_hold(0.75, 400.0, 1e-1)), 2);
+    let long = with_white_noise(&respond(&slow, &ramp_hold(0.75, 400.0, 1e-1)), 2);
     let fit_of = |records: [(&str, &[FitSample]); 2]| {
         let report = fit_joint(&records, &FitOptions::default(), &["tau_eps"]).unwrap();
         let tau = report.records[0].report.parameter("tau_eps").unwrap().clone();
@@ -130,8 +132,8 @@ fn records_without_content_are_refused_in_words() {
 #[test]
 fn a_bootstrap_of_one_block_is_refused() {
     let clean = respond(&THESIS, &ramp_hold(0.75, 50.0, 1e-2));
-    let record = remembering(&clean, 9, (0.05, 40.0, 0.001));
-    let fitted = Fitted::of(&record, &FitOptions::default()).unwrap();
+    let record = with_correlated_noise(&clean, 9, (0.05, 40.0, 0.001));
+    let fitted = FitSolution::of(&record, &FitOptions::default()).unwrap();
     let choice = Bootstrap { seed: 1, repeats: 50 };
     let err = fitted.bootstrap(0, choice, |_| ()).unwrap_err();
     assert!(err.to_string().contains("independent block(s)"), "{err}");
@@ -139,7 +141,7 @@ fn a_bootstrap_of_one_block_is_refused() {
 
 #[test]
 fn few_samples_are_not_called_a_wrong_model() {
-    let record = noisy(&respond(&THESIS, &ramp_hold(0.75, 20.0, 1.5)), 3);
+    let record = with_white_noise(&respond(&THESIS, &ramp_hold(0.75, 20.0, 1.5)), 3);
     let report = fit(&record, &FitOptions::default()).unwrap();
     assert!(report.samples < 70);
     let sentences: Vec<&str> = report.sentences().collect();

@@ -2,8 +2,12 @@
 
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons};
-use palpate_rheology::fit::{Bootstrap, FitError, FitOptions, FitSample, Fitted, fit, fit_joint};
-use palpate_test_support::record::{self, noisy, ramp_hold, remembering, respond};
+use palpate_rheology::fit::{
+    Bootstrap, FitError, FitOptions, FitSample, FitSolution, fit, fit_joint,
+};
+use palpate_test_support::record::{
+    self, ramp_hold, respond, with_correlated_noise, with_white_noise,
+};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
@@ -41,7 +45,7 @@ fn two_ramps_identify_what_neither_does_alone() {
 fn specimens_may_share_some_parameters_and_keep_others() {
     let stiff = ModifiedKelvin { mu: [0.08, -0.011, 0.0006], ..THESIS };
     let (one, two) = (record(&THESIS, 0.75, 20.0), record(&stiff, 0.75, 20.0));
-    let (one, two) = (noisy(&one, 1), noisy(&two, 2));
+    let (one, two) = (with_white_noise(&one, 1), with_white_noise(&two, 2));
     let records = [("one", one.as_slice()), ("two", two.as_slice())];
     let options = FitOptions::default();
     let joint = fit_joint(&records, &options, &["tau_eps", "tau_sig"]).unwrap();
@@ -66,8 +70,10 @@ fn specimens_may_share_some_parameters_and_keep_others() {
 
 #[test]
 fn a_joint_fit_that_shares_nothing_is_both_fits() {
-    let (one, two) =
-        (noisy(&record(&THESIS, 0.75, 20.0), 3), noisy(&record(&THESIS, 1.5, 20.0), 4));
+    let (one, two) = (
+        with_white_noise(&record(&THESIS, 0.75, 20.0), 3),
+        with_white_noise(&record(&THESIS, 1.5, 20.0), 4),
+    );
     let options = FitOptions::default();
     let records = [("one", one.as_slice()), ("two", two.as_slice())];
     let joint = fit_joint(&records, &options, &[]).unwrap();
@@ -128,9 +134,9 @@ fn censored_forces_do_not_count_but_their_depths_do() {
 
 #[test]
 fn profiles_agree_with_the_sum_of_squares_they_describe() {
-    let samples = noisy(&record(&THESIS, 0.75, 20.0), 11);
+    let samples = with_white_noise(&record(&THESIS, 0.75, 20.0), 11);
     let options = FitOptions::default();
-    let fitted = Fitted::of(&samples, &options).unwrap();
+    let fitted = FitSolution::of(&samples, &options).unwrap();
     let report = fitted.report();
     let square =
         |report: &palpate_rheology::fit::FitReport| report.rmse_n.powi(2) * samples.len() as f64;
@@ -159,10 +165,10 @@ fn profiles_agree_with_the_sum_of_squares_they_describe() {
 #[test]
 fn a_relaxation_too_slow_for_the_record_has_an_open_profile() {
     let body = ModifiedKelvin { tau_eps: 400.0, ..THESIS };
-    let samples = noisy(&record(&body, 1.5, 2.0), 5);
+    let samples = with_white_noise(&record(&body, 1.5, 2.0), 5);
     let mut options = FitOptions::default();
     options.fix("f_offset", 0.0).unwrap();
-    let fitted = Fitted::of(&samples, &options).unwrap();
+    let fitted = FitSolution::of(&samples, &options).unwrap();
     let profile = fitted.profile(0).unwrap();
     let tau = profile.iter().find(|interval| interval.name == "tau_eps").unwrap();
     assert!(tau.high.is_none(), "{tau:?}");
@@ -171,10 +177,11 @@ fn a_relaxation_too_slow_for_the_record_has_an_open_profile() {
 #[test]
 fn bootstrap_agrees_with_the_standard_errors_and_repeats() {
     let clean = record(&THESIS, 0.75, 50.0);
-    for (samples, allowed) in
-        [(noisy(&clean, 21), 1.35), (remembering(&clean, 22, (0.02, 0.3, 0.005)), 1.8)]
-    {
-        let fitted = Fitted::of(&samples, &FitOptions::default()).unwrap();
+    for (samples, allowed) in [
+        (with_white_noise(&clean, 21), 1.35),
+        (with_correlated_noise(&clean, 22, (0.02, 0.3, 0.005)), 1.8),
+    ] {
+        let fitted = FitSolution::of(&samples, &FitOptions::default()).unwrap();
         let report = fitted.report();
         let choice = Bootstrap { seed: 7, repeats: 100 };
         let mut heard = 0;
@@ -198,7 +205,7 @@ fn depth_in_stairs_or_with_noise_never_passes_for_a_second_speed() {
     for seed in 0..40 {
         let stair = seed % 2 == 0;
         let shift = noise.uniform() * 0.015;
-        let samples: Vec<FitSample> = noisy(&ramp, 100 + seed)
+        let samples: Vec<FitSample> = with_white_noise(&ramp, 100 + seed)
             .into_iter()
             .map(|sample| {
                 let depth = if stair {

@@ -4,7 +4,7 @@ use palpate_model::estimate::LiveEstimate;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::fit::{FitOptions, FitSample, LiveFit, fit};
-use palpate_test_support::record::{self, noisy, ramp_hold, respond};
+use palpate_test_support::record::{self, ramp_hold, respond, with_white_noise};
 
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
@@ -54,7 +54,7 @@ fn other_bodies_too_are_the_exact_ones_without_noise() {
 #[test]
 fn last_answer_is_within_a_hundredth_of_a_standard_error_with_noise() {
     for seed in 1..=3 {
-        let record = noisy(&thesis_record(), seed);
+        let record = with_white_noise(&thesis_record(), seed);
         let live = live_of(&record).estimate().unwrap();
         let exact = fit(&record, &FitOptions::default()).unwrap();
         for parameter in &live.parameters {
@@ -139,14 +139,14 @@ fn ramp_reports_unidentified_parameters_and_hold_identifies_all() {
             ..*sample
         })
         .collect();
-    for record in [clean, stairs, shaken].map(|record| noisy(&record, 11)) {
+    for record in [clean, stairs, shaken].map(|record| with_white_noise(&record, 11)) {
         for end in [10_000, 25_000, 40_000] {
             let live = live_of(&record[..end]).estimate().unwrap();
             for name in ["mu1", "tau_sig"] {
                 let verdict = live.verdicts.iter().find(|found| found.parameter == name);
                 let reason = verdict.unwrap().reason.clone().unwrap();
                 assert!(reason.contains("one speed"), "{end}: {reason}");
-                assert_eq!(live.identified(name), None);
+                assert_eq!(live.identified_parameter(name), None);
             }
         }
         let live = live_of(&record).estimate().unwrap();
@@ -170,7 +170,7 @@ fn live_fit_has_no_estimate_before_enough_samples() {
     }
     // From the first sample in the tissue on, answers come without a panic and without a number
     // that is not one.
-    for (i, sample) in noisy(&thesis_record()[..3000], 2).iter().enumerate() {
+    for (i, sample) in with_white_noise(&thesis_record()[..3000], 2).iter().enumerate() {
         let t = Seconds(sample.t.0 + 1.0);
         live.push(t, sample.depth, sample.force, sample.sigma);
         if i % 37 == 0
@@ -184,7 +184,7 @@ fn live_fit_has_no_estimate_before_enough_samples() {
 #[test]
 fn answers_know_of_every_sample() {
     // Samples wait in batches; answers must not depend on where a batch ends.
-    let record = noisy(&thesis_record()[..60_040], 3);
+    let record = with_white_noise(&thesis_record()[..60_040], 3);
     for end in 60_000..60_040 {
         let live = live_of(&record[..end]).estimate().unwrap();
         assert_eq!(live.samples, end as u64);
@@ -200,7 +200,7 @@ fn answers_know_of_every_sample() {
 
 #[test]
 fn residual_blocks_are_means_of_the_residuals() {
-    let record = noisy(&thesis_record(), 21);
+    let record = with_white_noise(&thesis_record(), 21);
     let live = live_of(&record);
     let exact = fit(&record, &FitOptions::default()).unwrap();
     let linear: Vec<f64> = exact.parameters[1..7].iter().map(|found| found.value).collect();
@@ -251,7 +251,7 @@ fn a_bank_may_have_more_or_fewer_relaxation_times() {
         for sample in respond(&ModifiedKelvin::THESIS, &ramp_hold(0.75, 50.0, 0.01)) {
             live.push(sample.t, sample.depth, sample.force, Newtons(0.02));
         }
-        let tau = live.estimate().unwrap().identified("tau_eps").unwrap().value;
+        let tau = live.estimate().unwrap().identified_parameter("tau_eps").unwrap().value;
         let miss = (tau / ModifiedKelvin::THESIS.tau_eps - 1.0).abs();
         assert!(miss < before, "{count}: {miss:e} after {before:e}");
         before = miss.max(1e-7);

@@ -3,7 +3,7 @@
 
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
-use palpate_rheology::select::{Outcome, SelectOptions, select};
+use palpate_rheology::select::{SelectOptions, SelectionOutcome, select};
 use palpate_test_support::skip;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -64,11 +64,11 @@ fn no_family_wins_on_tissue_and_a_tolerance_decides() {
     };
     let plain = tolerated(None);
     // What the best family leaves wanders over the record: a criterion proves nothing.
-    assert_eq!(plain.verdict.outcome, Outcome::NoneAdequate, "{:?}", plain.verdict);
+    assert_eq!(plain.verdict.outcome, SelectionOutcome::NoneAdequate, "{:?}", plain.verdict);
     assert_eq!(plain.verdict.family, None);
     // Tighter than any family predicts the hold, and as wide as a press shallower than a hand feels.
     let tight = tolerated(Some("0.5%")).verdict;
-    assert_eq!(tight.outcome, Outcome::NoneWithin, "{tight:?}");
+    assert_eq!(tight.outcome, SelectionOutcome::NoneWithin, "{tight:?}");
     let wide = tolerated(Some("10%")).verdict;
     assert!(wide.family.is_some(), "{wide:?}");
 }

@@ -1,4 +1,4 @@
-//! Selection finds the family that made the records.
+//! ModelSelection finds the family that made the records.
 //!
 //! Each family in turn makes three records of one body: a slow deep press and a fast shallow one, both
 //! held for eight hours, and a press that comes back; samples are 10 ms apart after every corner of the path
@@ -9,8 +9,8 @@
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families::{self, Model};
 use palpate_rheology::fit::{FitOptions, FitSample, fit_joint};
-use palpate_rheology::select::{HoldOut, SelectOptions, Selection, select};
-use palpate_test_support::record::{Noise, noisy};
+use palpate_rheology::select::{HoldOut, ModelSelection, SelectOptions, select};
+use palpate_test_support::record::{Noise, with_white_noise};
 use std::ops::ControlFlow;
 
 /// A family is equivalent to the truth if its best fit to the truth without noise leaves a sum of squares
@@ -27,7 +27,7 @@ const NOISE: f64 = 0.01;
 /// A body of each family whose force over 20 mm is a few newtons; relaxation times a decade apart.
 fn members() -> Vec<Model> {
     let model = |key: &str, outer: &[f64], linear: &[f64]| {
-        let family = families::by_key(key).expect("a family");
+        let family = families::find_family(key).expect("a family");
         family.model(outer, linear).expect("a model")
     };
     vec![
@@ -108,7 +108,7 @@ fn named(records: &[Vec<FitSample>]) -> Vec<(&str, &[FitSample])> {
     names.into_iter().zip(records.iter().map(Vec::as_slice)).collect()
 }
 
-fn selection(records: &[Vec<FitSample>]) -> Selection {
+fn selection(records: &[Vec<FitSample>]) -> ModelSelection {
     let options = SelectOptions { hold_out: HoldOut::None, ..SelectOptions::default() };
     select(&named(records), &options, &|_| ControlFlow::Continue(())).expect("a selection")
 }
@@ -140,11 +140,11 @@ fn the_family_that_made_the_records_is_picked() {
             let noisy: Vec<Vec<FitSample>> = exact
                 .iter()
                 .zip(1..)
-                .map(|(record, index)| noisy(record, 10 * seed + index))
+                .map(|(record, index)| with_white_noise(record, 10 * seed + index))
                 .collect();
             let found = selection(&noisy);
             let count = |key: &str| {
-                let known = families::by_key(key).expect("a family");
+                let known = families::find_family(key).expect("a family");
                 known.outer().len() + known.linear().len()
             };
             let is_good = |picked: &str| {
@@ -153,7 +153,7 @@ fn the_family_that_made_the_records_is_picked() {
                     || count(picked) <= count(key) && left_by(picked, &exact) <= INDISTINCT;
                 [is_same, is_same || is_equivalent()]
             };
-            let lowest = |value: &dyn Fn(&palpate_rheology::select::Candidate) -> f64| {
+            let lowest = |value: &dyn Fn(&palpate_rheology::select::ModelCandidate) -> f64| {
                 let order = |a: &&_, b: &&_| value(a).total_cmp(&value(b));
                 found.candidates.iter().min_by(order).map(|one| one.family.clone()).expect("one")
             };

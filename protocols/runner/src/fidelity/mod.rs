@@ -5,20 +5,20 @@
 
 mod quality;
 
-pub use quality::first_verdict;
+pub use quality::assess_data_quality;
 
 use palpate_model::rig::{AxisStatus, Phase, RigDescription};
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::{MeterSample, StepMeter, StepTarget};
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use serde::Serialize;
 
 /// A delay beyond this, in s, makes a sample late: two scheduler slices of a desktop host.
 pub const LATE_S: f64 = 0.020;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Achieved {
+pub struct TargetResult {
     pub step_index: usize,
     pub step: &'static str,
     /// Which repeat it belongs to; 0 where nothing is repeated.
@@ -35,7 +35,7 @@ pub struct Achieved {
     pub is_within: bool,
 }
 
-impl Achieved {
+impl TargetResult {
     fn of(step_index: usize, step: &'static str, cycle: u32, one: &StepTarget) -> Self {
         let error = one.achieved - one.target;
         Self {
@@ -53,7 +53,7 @@ impl Achieved {
     }
 }
 
-fn sample(row: &Row) -> MeterSample {
+fn sample(row: &SampleRow) -> MeterSample {
     MeterSample {
         tick: row.tick,
         status: AxisStatus(row.status),
@@ -108,7 +108,7 @@ impl TimeUse {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Fidelity {
     /// Every target of every completed step, in the order done.
-    pub targets: Vec<Achieved>,
+    pub targets: Vec<TargetResult>,
     pub samples: u64,
     /// Samples that are missing between them, by the controller's clock.
     pub dropped: u64,
@@ -125,7 +125,7 @@ pub struct Fidelity {
 }
 
 impl Fidelity {
-    pub fn missed(&self) -> impl Iterator<Item = &Achieved> {
+    pub fn missed_targets(&self) -> impl Iterator<Item = &TargetResult> {
         self.targets.iter().filter(|one| !one.is_within)
     }
 }
@@ -154,7 +154,7 @@ pub struct FidelityMeter {
     found: Fidelity,
     /// The step in progress, by its place in the plan.
     current: Option<(usize, StepMeter)>,
-    last: Option<Row>,
+    last: Option<SampleRow>,
 }
 
 impl FidelityMeter {
@@ -170,7 +170,7 @@ impl FidelityMeter {
     }
 
     /// The decisions that follow from a sample come before [`FidelityMeter::row`] of that sample.
-    pub fn effect(&mut self, effect: &Effect) {
+    pub fn push_effect(&mut self, effect: &Effect) {
         match effect {
             Effect::Record(record) => self.record(record),
             Effect::Finished(outcome) if outcome.ending == EndingKind::Finish => self.complete(),
@@ -242,14 +242,14 @@ impl FidelityMeter {
         let step = planned.step.phase().name();
         let achieved = targets
             .into_iter()
-            .map(|target| Achieved::of(step_index, step, planned.cycle, &target));
+            .map(|target| TargetResult::of(step_index, step, planned.cycle, &target));
         self.found.targets.extend(achieved);
         if let Some(doubt) = doubt {
             self.remark(format!("step {} ({step}): {doubt}", step_index + 1));
         }
     }
 
-    pub fn row(&mut self, row: &Row) {
+    pub fn push_row(&mut self, row: &SampleRow) {
         let tick_secs = self.rig.tick().0;
         self.found.samples += 1;
         let is_measuring = matches!(
@@ -286,7 +286,7 @@ impl FidelityMeter {
     }
 
     #[must_use]
-    pub fn into_found(self) -> Fidelity {
+    pub fn into_fidelity(self) -> Fidelity {
         self.found
     }
 }

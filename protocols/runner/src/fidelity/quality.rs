@@ -1,8 +1,8 @@
 //! Data quality of a session, assessed by the program when the run ends. A reviewer may change it.
 
-use super::{Achieved, Fidelity};
-use palpate_protocols::engine::{EndingKind, Outcome};
-use palpate_sessions::edits::Verdict;
+use super::{Fidelity, TargetResult};
+use palpate_protocols::engine::{EndingKind, RunOutcome};
+use palpate_sessions::edits::DataQuality;
 
 /// More reasons are in the report only.
 const REASONS_MAX: usize = 3;
@@ -14,12 +14,12 @@ const WIDE: f64 = 0.05;
 ///
 /// A run that did not finish is suspect, or rejected if nothing was measured.
 #[must_use]
-pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String) {
+pub fn assess_data_quality(outcome: &RunOutcome, fidelity: &Fidelity) -> (DataQuality, String) {
     if outcome.ending != EndingKind::Finish {
         let how = format!("ended by {}: {}", outcome.ending, outcome.reason);
         return match fidelity.measured {
-            0 => (Verdict::Rejected, format!("nothing was measured; {how}")),
-            _ => (Verdict::Suspect, how),
+            0 => (DataQuality::Rejected, format!("nothing was measured; {how}")),
+            _ => (DataQuality::Suspect, how),
         };
     }
     let mut reasons = Vec::new();
@@ -27,10 +27,10 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
         reasons.push(format!("{} samples are missing", fidelity.dropped));
     }
     reasons.extend(fidelity.remarks.iter().cloned());
-    reasons.extend(fidelity.missed().map(sentence));
+    reasons.extend(fidelity.missed_targets().map(sentence));
     match reasons.len() {
         0 => (
-            Verdict::Valid,
+            DataQuality::Valid,
             match fidelity.targets.len() {
                 0 => "finished, no sample missing".into(),
                 count => {
@@ -45,14 +45,14 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
             if count > REASONS_MAX {
                 text += &format!("; and {} more", count - REASONS_MAX);
             }
-            (Verdict::Suspect, text)
+            (DataQuality::Suspect, text)
         }
     }
 }
 
 /// The target with the largest relative tolerance, if that is above [`WIDE`].
 fn widest(fidelity: &Fidelity) -> Option<String> {
-    let share = |one: &Achieved| one.allowed / one.target.abs();
+    let share = |one: &TargetResult| one.allowed / one.target.abs();
     let known = fidelity.targets.iter().filter(|one| one.target != 0.0);
     let widest = known.max_by(|one, next| share(one).total_cmp(&share(next)))?;
     // Rounding must not name a force whose tolerance is exactly one in twenty.
@@ -67,7 +67,7 @@ fn widest(fidelity: &Fidelity) -> Option<String> {
     })
 }
 
-fn place(one: &Achieved) -> String {
+fn place(one: &TargetResult) -> String {
     let cycle = match one.cycle {
         0 => String::new(),
         cycle => format!(" of cycle {cycle}"),
@@ -76,7 +76,7 @@ fn place(one: &Achieved) -> String {
     format!("step {number} ({step}{cycle}): {}", one.quantity)
 }
 
-fn sentence(one: &Achieved) -> String {
+fn sentence(one: &TargetResult) -> String {
     format!(
         "{} {:.4} {unit} instead of {:.4} {unit}, which may be off by {:.4} {unit}",
         place(one),
@@ -91,12 +91,12 @@ fn sentence(one: &Achieved) -> String {
 mod tests {
     use super::*;
 
-    fn outcome(ending: EndingKind) -> Outcome {
-        Outcome { ending, reason: "because".into() }
+    fn outcome(ending: EndingKind) -> RunOutcome {
+        RunOutcome { ending, reason: "because".into() }
     }
 
-    fn target(achieved: f64) -> Achieved {
-        Achieved {
+    fn target(achieved: f64) -> TargetResult {
+        TargetResult {
             step_index: 4,
             step: "ramp",
             cycle: 2,
@@ -113,13 +113,13 @@ mod tests {
     #[test]
     fn data_quality_follows_ending_and_targets() {
         let fine = Fidelity { targets: vec![target(20.0)], measured: 1, ..Fidelity::default() };
-        let of = |ending, fidelity: &Fidelity| first_verdict(&outcome(ending), fidelity);
+        let of = |ending, fidelity: &Fidelity| assess_data_quality(&outcome(ending), fidelity);
         let (verdict, reason) = of(EndingKind::Finish, &fine);
-        assert_eq!(verdict, Verdict::Valid);
+        assert_eq!(verdict, DataQuality::Valid);
         assert!(reason.contains("1 targets"), "{reason}");
         // What may be off by a quarter of itself is said to be.
         let mut wide = fine.clone();
-        wide.targets.push(Achieved {
+        wide.targets.push(TargetResult {
             quantity: "force",
             unit: "N",
             target: 0.2,
@@ -127,7 +127,7 @@ mod tests {
             ..target(20.0)
         });
         let (verdict, reason) = of(EndingKind::Finish, &wide);
-        assert_eq!(verdict, Verdict::Valid);
+        assert_eq!(verdict, DataQuality::Valid);
         for fact in ["step 5", "cycle 2", "0.0500 N of 0.2000 N"] {
             assert!(reason.contains(fact), "{fact}: {reason}");
         }
@@ -138,16 +138,16 @@ mod tests {
             (Fidelity { targets: vec![target(1.0); 9], ..fine.clone() }, "6 more"),
         ] {
             let (verdict, reason) = of(EndingKind::Finish, &change);
-            assert_eq!(verdict, Verdict::Suspect);
+            assert_eq!(verdict, DataQuality::Suspect);
             assert!(reason.contains(expected), "{reason}");
         }
         for ending in [EndingKind::Stop, EndingKind::Abort, EndingKind::Halt, EndingKind::Interlock]
         {
             let (verdict, reason) = of(ending, &fine);
-            assert_eq!(verdict, Verdict::Suspect);
+            assert_eq!(verdict, DataQuality::Suspect);
             assert!(reason.contains(ending.name()) && reason.contains("because"), "{reason}");
             let nothing = Fidelity { measured: 0, ..fine.clone() };
-            assert_eq!(of(ending, &nothing).0, Verdict::Rejected);
+            assert_eq!(of(ending, &nothing).0, DataQuality::Rejected);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The simulated device with a hand that another thread moves, and the newest points of its motion.
 
-use super::{Simulated, Ticking};
+use super::{LoopTask, SimulatedMasterSlave};
 use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_haptics::{Flags, MasterSlaveError, Period};
 use palpate_model::units::{MmPerS, Seconds};
@@ -15,22 +15,22 @@ const APART: Seconds = Seconds(0.004);
 
 /// Target position of the hand, shared between threads; the loop never waits.
 #[derive(Clone, Debug)]
-pub struct Lead(Arc<AtomicU64>);
+pub struct HandTarget(Arc<AtomicU64>);
 
-impl Lead {
+impl HandTarget {
     fn at(place_mm: f64) -> Self {
         Self(Arc::new(AtomicU64::new(place_mm.to_bits())))
     }
 
     /// In mm, from the next tick on; a value that is not finite is ignored.
-    pub fn to(&self, place_mm: f64) {
+    pub fn set(&self, place_mm: f64) {
         if place_mm.is_finite() {
             self.0.store(place_mm.to_bits(), Ordering::Relaxed);
         }
     }
 
     /// In mm.
-    pub fn place(&self) -> f64 {
+    pub fn position(&self) -> f64 {
         f64::from_bits(self.0.load(Ordering::Relaxed))
     }
 }
@@ -51,7 +51,7 @@ pub struct TrailPoint {
 }
 
 #[derive(Clone, Debug)]
-pub struct Live {
+pub struct GuidedDeviceView {
     /// The newest tick.
     pub last: SimulationTick,
     count: u64,
@@ -59,7 +59,7 @@ pub struct Live {
     trail: [TrailPoint; TRAIL],
 }
 
-impl Live {
+impl GuidedDeviceView {
     pub fn count(&self) -> u64 {
         self.count
     }
@@ -71,30 +71,34 @@ impl Live {
     }
 }
 
-/// The simulated master-slave system with a hand that goes where its [`Lead`] says.
+/// The simulated master-slave system with a hand that goes where its [`HandTarget`] says.
 #[derive(Clone, Debug)]
-pub struct Led {
-    device: Simulated,
-    lead: Lead,
+pub struct GuidedDevice {
+    device: SimulatedMasterSlave,
+    lead: HandTarget,
     place: f64,
     speed: MmPerS,
     apart: u64,
     ticks: u64,
     flags: Flags,
-    live: Live,
+    live: GuidedDeviceView,
 }
 
-impl Led {
+impl GuidedDevice {
     /// At its start, the hand at rest where its path begins; it moves at `speed` above zero.
     pub fn new(settings: &SimulationSettings, speed: MmPerS) -> Result<Self, MasterSlaveError> {
         let place = settings.plant.hand.path.at(0.0);
-        let mut device = Simulated::new(settings)?;
+        let mut device = SimulatedMasterSlave::new(settings)?;
         device.lead(place, speed);
         let period: Period = settings.system.law.period;
-        let live = Live { last: *device.last(), count: 0, trail: [TrailPoint::default(); TRAIL] };
+        let live = GuidedDeviceView {
+            last: *device.last(),
+            count: 0,
+            trail: [TrailPoint::default(); TRAIL],
+        };
         Ok(Self {
             device,
-            lead: Lead::at(place),
+            lead: HandTarget::at(place),
             place,
             speed,
             apart: period.ticks_in(APART).max(1),
@@ -109,20 +113,20 @@ impl Led {
         self.place
     }
 
-    pub fn lead(&self) -> Lead {
+    pub fn hand_target(&self) -> HandTarget {
         self.lead.clone()
     }
 
-    pub fn live(&self) -> &Live {
+    pub fn view(&self) -> &GuidedDeviceView {
         &self.live
     }
 }
 
-impl Ticking for Led {
-    type View = Live;
+impl LoopTask for GuidedDevice {
+    type View = GuidedDeviceView;
 
     fn tick(&mut self, elapsed: u64) {
-        let place = self.lead.place();
+        let place = self.lead.position();
         if place != self.place {
             self.place = place;
             self.device.lead(place, self.speed);
@@ -147,7 +151,7 @@ impl Ticking for Led {
         }
     }
 
-    fn show(&self, view: &mut Live) {
+    fn show(&self, view: &mut GuidedDeviceView) {
         view.clone_from(&self.live);
     }
 }
@@ -155,59 +159,59 @@ impl Ticking for Led {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_haptics::rig::{Hand, HandPath};
+    use palpate_haptics::rig::{HandPath, SimulatedHand};
     use palpate_model::viscoelastic::ModifiedKelvin;
 
-    fn led() -> Led {
-        let hand = Hand::firm(HandPath::Still { at: 0.0 });
+    fn led() -> GuidedDevice {
+        let hand = SimulatedHand::firm(HandPath::Still { at: 0.0 });
         let settings = SimulationSettings::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
-        Led::new(&settings, MmPerS(50.0)).unwrap()
+        GuidedDevice::new(&settings, MmPerS(50.0)).unwrap()
     }
 
     #[test]
     fn the_hand_goes_where_it_is_led_at_its_speed_and_back() {
         let mut led = led();
-        let lead = led.lead();
-        let run = |led: &mut Led, ticks: u64| (0..ticks).for_each(|_| led.tick(1));
+        let lead = led.hand_target();
+        let run = |led: &mut GuidedDevice, ticks: u64| (0..ticks).for_each(|_| led.tick(1));
         run(&mut led, 500);
-        assert_eq!(led.live().last.snapshot.force.0, 0.0);
-        lead.to(20.0);
+        assert_eq!(led.view().last.snapshot.force.0, 0.0);
+        lead.set(20.0);
         // 20 mm at 50 mm/s take 0.4 s; by a quarter of it the hand has not even led it half the way.
         run(&mut led, 100);
-        assert!(led.live().last.x < 10.0, "{}", led.live().last.x);
+        assert!(led.view().last.x < 10.0, "{}", led.view().last.x);
         run(&mut led, 2_900);
-        let pressed = led.live().last;
+        let pressed = led.view().last;
         assert!(pressed.x > 8.0 && pressed.x < 20.0, "{}", pressed.x);
         assert!(pressed.snapshot.force.0 > 0.5);
         // Turned on the way, without a jump.
-        lead.to(-2.0);
+        lead.set(-2.0);
         run(&mut led, 50);
-        lead.to(f64::NAN);
-        let before = led.live().last.x;
+        lead.set(f64::NAN);
+        let before = led.view().last.x;
         run(&mut led, 1);
-        assert!((led.live().last.x - before).abs() < 0.2);
+        assert!((led.view().last.x - before).abs() < 0.2);
         run(&mut led, 3_000);
-        assert!(led.live().last.x < 0.5, "{}", led.live().last.x);
-        assert_eq!(led.live().last.snapshot.force.0, 0.0);
+        assert!(led.view().last.x < 0.5, "{}", led.view().last.x);
+        assert_eq!(led.view().last.snapshot.force.0, 0.0);
     }
 
     #[test]
     fn a_trail_looked_at_often_enough_has_every_point_once() {
         let mut led = led();
-        led.lead().to(20.0);
+        led.hand_target().set(20.0);
         let (mut known, mut times) = (0, Vec::new());
         for tick in 1..=2_000_u64 {
             led.tick(1);
             if tick % 250 == 0 {
-                times.extend(led.live().since(known).map(|point| point.t));
-                known = led.live().count();
+                times.extend(led.view().since(known).map(|point| point.t));
+                known = led.view().count();
             }
         }
         assert_eq!(times.len(), 500);
         let apart = |pair: &[f64]| (pair[1] - pair[0] - APART.0).abs() < 1e-9;
         assert!(times.windows(2).all(apart));
-        // Looked at late, the last ones are there.
-        let late: Vec<f64> = led.live().since(0).map(|point| point.t).collect();
+        // ReviewSource at late, the last ones are there.
+        let late: Vec<f64> = led.view().since(0).map(|point| point.t).collect();
         assert_eq!(late, times[times.len() - TRAIL..]);
     }
 }

@@ -1,8 +1,8 @@
 //! The real-time thread of a haptic loop.
 
-use super::timing::{Kept, LoopCounters};
+use super::timing::{LoopCounters, LoopTiming};
 use crate::Stopwatch;
-use palpate_drivers::priority::{Granted, ask};
+use palpate_drivers::priority::{GrantedPriority, request_real_time};
 use palpate_haptics::Period;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use triple_buffer::{Output, triple_buffer};
 /// keep the core from every thread that could stop it.
 const OVERRUNS_MAX: u32 = 10;
 
-pub trait Ticking: Send + 'static {
+pub trait LoopTask: Send + 'static {
     type View: Clone + Send + 'static;
 
     /// `elapsed` ticks are due: one, unless the loop was late. Must not allocate, lock or wait.
@@ -31,15 +31,15 @@ pub trait Ticking: Send + 'static {
 
 /// A running loop. Dropping it ends the loop after the tick in progress.
 #[derive(Debug)]
-pub struct Beat<T: Ticking> {
+pub struct RealTimeLoop<T: LoopTask> {
     thread: Option<JoinHandle<T>>,
     is_ending: Arc<AtomicBool>,
     timing: Arc<LoopCounters>,
     seen: Output<T::View>,
-    granted: Granted,
+    granted: GrantedPriority,
 }
 
-impl<T: Ticking> Beat<T> {
+impl<T: LoopTask> RealTimeLoop<T> {
     /// Begins to tick. `first` is what is seen before the first tick.
     pub fn start(task: T, period: Period, first: T::View) -> std::io::Result<Self> {
         let (shown, seen) = triple_buffer(&first);
@@ -49,24 +49,25 @@ impl<T: Ticking> Beat<T> {
         let (ending, times) = (Arc::clone(&is_ending), Arc::clone(&timing));
         let thread = std::thread::Builder::new().name("haptics".into()).spawn(move || {
             // `start` waits for this.
-            let _ = sender.try_send(ask());
+            let _ = sender.try_send(request_real_time());
             run(task, period, shown, &ending, &times)
         })?;
         let granted = receiver.recv();
-        let granted = granted.unwrap_or_else(|_| Granted::Ordinary("the thread ended".to_owned()));
+        let granted =
+            granted.unwrap_or_else(|_| GrantedPriority::Ordinary("the thread ended".to_owned()));
         Ok(Self { thread: Some(thread), is_ending, timing, seen, granted })
     }
 
-    pub fn granted(&self) -> &Granted {
+    pub fn granted_priority(&self) -> &GrantedPriority {
         &self.granted
     }
 
     /// The newest state that was handed over.
-    pub fn seen(&mut self) -> &T::View {
+    pub fn view(&mut self) -> &T::View {
         self.seen.read()
     }
 
-    pub fn kept(&self) -> Kept {
+    pub fn timing(&self) -> LoopTiming {
         self.timing.snapshot()
     }
 
@@ -82,7 +83,7 @@ impl<T: Ticking> Beat<T> {
     }
 }
 
-impl<T: Ticking> Drop for Beat<T> {
+impl<T: LoopTask> Drop for RealTimeLoop<T> {
     fn drop(&mut self) {
         self.is_ending.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
@@ -92,7 +93,7 @@ impl<T: Ticking> Drop for Beat<T> {
     }
 }
 
-fn run<T: Ticking>(
+fn run<T: LoopTask>(
     mut task: T,
     period: Period,
     mut shown: triple_buffer::Input<T::View>,

@@ -1,9 +1,10 @@
 //! The haptic loop: a thread that ticks at a fixed period, and how well it keeps to it.
 //!
-//! What happens in a tick is pure and lives in `palpate_haptics`; here are the thread ([`Beat`]), its
+//! What happens in a tick is pure and lives in `palpate_haptics`; here are the thread ([`RealTimeLoop`]), its
 //! priority ([`priority`]) and its measured times ([`timing`]). A tick neither allocates nor locks nor waits;
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
+pub mod device_recording;
 mod guided_device;
 mod loop_thread;
 pub mod scene;
@@ -11,12 +12,11 @@ pub mod scene_file;
 mod simulated;
 pub mod slave;
 mod stylus;
-pub mod taped;
 pub mod timing;
 
-pub use guided_device::{Lead, Led, Live, TRAIL, TrailPoint};
-pub use loop_thread::{Beat, Ticking};
+pub use guided_device::{GuidedDevice, GuidedDeviceView, HandTarget, TRAIL, TrailPoint};
+pub use loop_thread::{LoopTask, RealTimeLoop};
 pub use palpate_drivers::priority;
 pub use scene::{SceneEnd, SceneFrame, SceneLoop};
-pub use simulated::Simulated;
+pub use simulated::SimulatedMasterSlave;
 pub use stylus::Stylus;

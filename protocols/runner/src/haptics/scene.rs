@@ -1,13 +1,13 @@
 //! The virtual scene in a loop: a device, frames for graphics, and a recording of its ticks.
 
-use super::timing::Kept;
-use super::{Beat, Stylus, Ticking};
-use palpate_drivers::priority::Granted;
+use super::timing::LoopTiming;
+use super::{LoopTask, RealTimeLoop, Stylus};
+use palpate_drivers::priority::GrantedPriority;
 use palpate_haptics::Period;
 use palpate_haptics::device::HapticDevice;
-use palpate_haptics::scene::{Hand6, Pose, Scene, ScenePath, SceneTick};
-use palpate_haptics::surface::{HeightField, Rect};
-use palpate_sessions::ticks::{Recorded, Recorder, Row};
+use palpate_haptics::scene::{HandPose, Pose, Scene, ScenePath, SceneTick};
+use palpate_haptics::surface::{GridRect, HeightField};
+use palpate_sessions::ticks::{TickCounts, TickRecorder, TickRow};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use triple_buffer::Input;
@@ -38,17 +38,17 @@ pub const COLUMNS: Columns = columns(["hand_x_mm", "hand_y_mm", "hand_z_mm"]);
 pub const SENSED_COLUMNS: Columns = columns(["stylus_x_mm", "stylus_y_mm", "stylus_z_mm"]);
 
 /// A recorded tick of a scene.
-pub type SceneRow = Row<3, 10>;
+pub type SceneRow = TickRow<3, 10>;
 
 /// Writes the ticks of a scene.
-pub type SceneRecorder = Recorder<3, 10>;
+pub type SceneRecorder = TickRecorder<3, 10>;
 
 /// What is recorded of a tick: its inputs, then what they gave.
 #[must_use]
-pub fn scene_row(hand: Hand6, elapsed: u64, outcome: &SceneTick) -> SceneRow {
+pub fn scene_row(hand: HandPose, elapsed: u64, outcome: &SceneTick) -> SceneRow {
     let ([x, y, z], [yaw, pitch, roll]) = (hand.at, hand.turn);
     let [fx, fy, fz] = outcome.force;
-    Row {
+    TickRow {
         whole: [outcome.tick, elapsed, outcome.row_hash],
         real: [x, y, z, yaw, pitch, roll, fx, fy, fz, outcome.depth],
     }
@@ -56,9 +56,9 @@ pub fn scene_row(hand: Hand6, elapsed: u64, outcome: &SceneTick) -> SceneRow {
 
 /// The inputs of a recorded tick: the hand, and ticks since the one before.
 #[must_use]
-pub fn scene_input(row: &SceneRow) -> (Hand6, u64) {
+pub fn scene_input(row: &SceneRow) -> (HandPose, u64) {
     let [x, y, z, yaw, pitch, roll, ..] = row.real;
-    let hand = Hand6 { at: [x, y, z], turn: [yaw, pitch, roll] };
+    let hand = HandPose { at: [x, y, z], turn: [yaw, pitch, roll] };
     (hand, row.whole[1])
 }
 
@@ -76,7 +76,7 @@ pub struct SceneFrame {
     /// Nodes of the mesh from one of these to the next.
     stride: usize,
     /// Where heights are not at rest, in nodes of the mesh.
-    displaced: Rect,
+    displaced: GridRect,
 }
 
 impl SceneFrame {
@@ -103,7 +103,7 @@ impl SceneFrame {
         self.displaced = scene.dirty();
     }
 
-    fn copy(&mut self, field: &HeightField, part: Rect) {
+    fn copy(&mut self, field: &HeightField, part: GridRect) {
         let columns = field.grid().columns();
         let stride = self.stride;
         // The first and the last of them within the part.
@@ -160,15 +160,15 @@ impl SceneTask {
     }
 }
 
-impl Ticking for SceneTask {
+impl LoopTask for SceneTask {
     type View = SceneFrame;
 
     fn tick(&mut self, elapsed: u64) {
         let Pose { at, turn } = self.device.sense(elapsed);
-        let outcome = self.scene.feel(Pose { at, turn }, elapsed);
+        let outcome = self.scene.render(Pose { at, turn }, elapsed);
         self.device.give(outcome.force);
         if let Some(recorder) = &self.recorder {
-            let input = self.device.hand().unwrap_or(Hand6 { at, turn });
+            let input = self.device.hand().unwrap_or(HandPose { at, turn });
             recorder.push(scene_row(input, elapsed, &outcome));
         }
         self.since = if self.is_shown() { 1 } else { self.since + 1 };
@@ -186,16 +186,16 @@ impl Ticking for SceneTask {
 #[derive(Debug)]
 pub struct SceneEnd {
     pub scene: Scene,
-    pub kept: Kept,
-    pub recorded: Option<Result<Recorded, String>>,
+    pub timing: LoopTiming,
+    pub recorded: Option<Result<TickCounts, String>>,
 }
 
 /// A scene in real time. Dropping it ends the loop.
 #[derive(Debug)]
 pub struct SceneLoop {
-    beat: Beat<SceneTask>,
+    beat: RealTimeLoop<SceneTask>,
     /// The hand on the simulated device, and whether its path has come to its end.
-    hand: Option<(Mutex<Input<Hand6>>, Arc<AtomicBool>)>,
+    hand: Option<(Mutex<Input<HandPose>>, Arc<AtomicBool>)>,
 }
 
 impl SceneLoop {
@@ -216,13 +216,13 @@ impl SceneLoop {
         let made = Stylus::new(*scene.settings(), path);
         let (device, pointing) = made.map_err(|err| err.to_string())?;
         let hand = (Mutex::new(pointing), device.end_flag());
-        let mut live = Self::on(Box::new(device), scene, recorder)?;
+        let mut live = Self::start_on_device(Box::new(device), scene, recorder)?;
         live.hand = Some(hand);
         Ok(live)
     }
 
     /// Begins to tick on a device with the settings of the scene. Its recording has [`SENSED_COLUMNS`].
-    pub fn on(
+    pub fn start_on_device(
         device: Box<dyn HapticDevice>,
         scene: Scene,
         recorder: Option<SceneRecorder>,
@@ -235,7 +235,7 @@ impl SceneLoop {
         }
         let task = SceneTask::new(scene, device, recorder);
         let first = task.first();
-        let beat = Beat::start(task, period, first).map_err(|err| {
+        let beat = RealTimeLoop::start(task, period, first).map_err(|err| {
             format!("the thread of the scene cannot be started ({err}); end other programs")
         })?;
         Ok(Self { beat, hand: None })
@@ -243,7 +243,7 @@ impl SceneLoop {
 
     /// The hand on the simulated device goes there from the next tick on. Callers may wait for each other; the loop
     /// never waits.
-    pub fn point(&self, hand: Hand6) {
+    pub fn point(&self, hand: HandPose) {
         if let Some((pointing, _)) = &self.hand {
             let mut pointing = pointing.lock().unwrap_or_else(PoisonError::into_inner);
             pointing.write(hand);
@@ -252,15 +252,15 @@ impl SceneLoop {
 
     /// The newest frame.
     pub fn view(&mut self) -> &SceneFrame {
-        self.beat.seen()
+        self.beat.view()
     }
 
-    pub fn timing(&self) -> Kept {
-        self.beat.kept()
+    pub fn timing(&self) -> LoopTiming {
+        self.beat.timing()
     }
 
-    pub fn granted(&self) -> &Granted {
-        self.beat.granted()
+    pub fn granted_priority(&self) -> &GrantedPriority {
+        self.beat.granted_priority()
     }
 
     /// Whether the path has come to its end; without one it is over from the start.
@@ -276,9 +276,9 @@ impl SceneLoop {
 
     /// Ends it, and its recording after everything is written; `None` if its work failed.
     pub fn stop(self) -> Option<SceneEnd> {
-        let kept = self.beat.kept();
+        let kept = self.beat.timing();
         let task = self.beat.end()?;
         let recorded = task.recorder.map(|recorder| recorder.finish(task.scene.hash()));
-        Some(SceneEnd { scene: task.scene, kept, recorded })
+        Some(SceneEnd { scene: task.scene, timing: kept, recorded })
     }
 }

@@ -1,9 +1,9 @@
 //! Scene files: which tissue, mesh, device, loop and tolerances a scene has, as TOML.
 
-use palpate_drivers::rig_file::fields::{Fields, Mistake, in_words};
+use palpate_drivers::rig_file::fields::{Fields, Mistake, format_mistakes};
 use palpate_haptics::Period;
 use palpate_haptics::scene::{DeviceSettings, Scene, SceneSettings};
-use palpate_haptics::surface::{Cut, Method};
+use palpate_haptics::surface::{Cut, SurfaceMethod};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::Scheme;
 use std::fmt::Write;
@@ -89,7 +89,7 @@ impl Default for SceneFile {
 impl SceneFile {
     /// Reads the text of a scene file, which `file` is called.
     pub fn parse(file: &str, text: &str) -> Result<Self, String> {
-        let one = |mistake: Mistake| in_words(file, &[mistake]);
+        let one = |mistake: Mistake| format_mistakes(file, &[mistake]);
         if text.len() > BYTES_MAX {
             let message =
                 format!("the file is too large for a scene file; keep it below {BYTES_MAX} bytes");
@@ -98,7 +98,7 @@ impl SceneFile {
         let mut fields = Fields::read(text).map_err(one)?;
         let read = read(&mut fields);
         let mistakes = fields.finish();
-        if mistakes.is_empty() { Ok(read) } else { Err(in_words(file, &mistakes)) }
+        if mistakes.is_empty() { Ok(read) } else { Err(format_mistakes(file, &mistakes)) }
     }
 
     /// As a text that reads back to the same bits.
@@ -112,7 +112,7 @@ impl SceneFile {
         put("\n[tissue]".to_owned());
         match &self.source {
             Some(source) => put(format!("source = \"{}\"", plain(source))),
-            None => put(body_text(&self.body)),
+            None => put(format_body(&self.body)),
         }
         put(format!("side_mm = {:?}", self.side_mm));
         put(format!("slope = {:?}", self.slope));
@@ -160,7 +160,7 @@ impl SceneFile {
             friction: self.friction,
             period: Period::of_rate(self.rate_hz).map_err(|err| words(&err))?,
             scheme: self.scheme,
-            method: Method::Envelope,
+            method: SurfaceMethod::Envelope,
             cut: Cut::new(self.cut_nodes, self.cut_mm).map_err(|err| words(&err))?,
             ..SceneSettings::default()
         }
@@ -193,7 +193,7 @@ const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
 /// The parameters of a body as lines that read back to the same bits.
 #[must_use]
-pub fn body_text(body: &ModifiedKelvin) -> String {
+pub fn format_body(body: &ModifiedKelvin) -> String {
     let ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig } = *body;
     let values = [tau_eps, mu1, mu2, mu3, tau_sig];
     let line = |(name, value): (&str, f64)| format!("{name} = {value:?}");
@@ -254,7 +254,7 @@ fn read(fields: &mut Fields) -> SceneFile {
     set(&mut file.slope, fields.number("tissue.slope", 0.0, 1000.0));
     file.recovery_s = fields.number("tissue.recovery_s", 0.0, most);
     set(&mut file.friction, fields.number("tissue.friction", 0.0, 10.0));
-    let nodes = fields.whole("mesh.nodes", NODES[0], NODES[1]);
+    let nodes = fields.whole_number("mesh.nodes", NODES[0], NODES[1]);
     match (fields.flag("mesh.auto"), nodes) {
         (Some(true), Some(_)) => {
             fields.mistake("mesh.auto", "a mesh has a number of nodes or auto, not both");
@@ -263,7 +263,8 @@ fn read(fields: &mut Fields) -> SceneFile {
         (_, Some(nodes)) => file.nodes = Some(nodes as usize),
         (_, None) => {}
     }
-    file.cut_nodes = fields.whole("mesh.cut_nodes", 1, NODES[1] * 2).map(|range| range as u32);
+    file.cut_nodes =
+        fields.whole_number("mesh.cut_nodes", 1, NODES[1] * 2).map(|range| range as u32);
     set(&mut file.cut_mm, fields.number("mesh.cut_mm", 0.0, 1000.0));
     let [slowest, fastest] = Period::RATES_HZ;
     set(&mut file.rate_hz, fields.number("loop.rate_hz", slowest, fastest));

@@ -1,6 +1,6 @@
 //! The master-slave system on its simulated device, as a loop ticks it.
 
-use super::Ticking;
+use super::LoopTask;
 use palpate_haptics::MasterSlaveError;
 use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
@@ -10,12 +10,12 @@ const LED_MAX: u64 = 1000;
 
 /// A simulation, its hand pressing again and again where its path says so.
 #[derive(Clone, Copy, Debug)]
-pub struct Simulated {
+pub struct SimulatedMasterSlave {
     simulation: Simulation,
     last: SimulationTick,
 }
 
-impl Simulated {
+impl SimulatedMasterSlave {
     /// At the start, after one tick.
     pub fn new(settings: &SimulationSettings) -> Result<Self, MasterSlaveError> {
         let mut simulation = Simulation::new(settings)?;
@@ -34,12 +34,12 @@ impl Simulated {
     }
 }
 
-impl Ticking for Simulated {
+impl LoopTask for SimulatedMasterSlave {
     type View = SimulationTick;
 
     fn tick(&mut self, elapsed: u64) {
         for _ in 1..elapsed.min(LED_MAX) {
-            let _away = self.simulation.stalled();
+            let _away = self.simulation.tick_stalled();
         }
         self.last = self.simulation.tick();
     }

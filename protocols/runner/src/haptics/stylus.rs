@@ -2,7 +2,7 @@
 
 use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{
-    DeviceSettings, Hand6, Pose, SceneError, ScenePath, SceneSettings, SimulatedDevice,
+    DeviceSettings, HandPose, Pose, SceneError, ScenePath, SceneSettings, SimulatedDevice,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,10 +15,10 @@ pub struct Stylus {
     settings: SceneSettings,
     path: Option<ScenePath>,
     laps: u32,
-    pointed: Output<Hand6>,
+    pointed: Output<HandPose>,
     is_over: Arc<AtomicBool>,
     ticks: u64,
-    hand: Hand6,
+    hand: HandPose,
     force: [f64; 3],
 }
 
@@ -27,8 +27,8 @@ impl Stylus {
     pub fn new(
         settings: SceneSettings,
         (path, laps): (Option<ScenePath>, u32),
-    ) -> Result<(Self, Input<Hand6>), SceneError> {
-        let hand = Hand6 { at: settings.start(), turn: [0.0; 3] };
+    ) -> Result<(Self, Input<HandPose>), SceneError> {
+        let hand = HandPose { at: settings.start(), turn: [0.0; 3] };
         let (input, pointed) = triple_buffer(&hand);
         let stylus = Self {
             device: SimulatedDevice::of(&settings)?,
@@ -49,7 +49,7 @@ impl Stylus {
         Arc::clone(&self.is_over)
     }
 
-    fn next_pose(&mut self) -> Hand6 {
+    fn next_pose(&mut self) -> HandPose {
         let t = self.settings.period.time_of(self.ticks).seconds().0;
         match self.path {
             Some(path) if t <= path.seconds() * f64::from(self.laps) => {
@@ -79,7 +79,7 @@ impl HapticDevice for Stylus {
         self.force = force;
     }
 
-    fn hand(&self) -> Option<Hand6> {
+    fn hand(&self) -> Option<HandPose> {
         Some(self.hand)
     }
 }

@@ -50,7 +50,7 @@ impl DurationHistogram {
         self.longest.fetch_max(nanos, Ordering::Relaxed);
     }
 
-    pub fn spread(&self) -> Spread {
+    pub fn spread(&self) -> DurationPercentiles {
         let counts: Vec<u64> = self.bins.iter().map(|one| one.load(Ordering::Relaxed)).collect();
         let count: u64 = counts.iter().sum();
         let longest = self.longest.load(Ordering::Relaxed);
@@ -66,7 +66,13 @@ impl DurationHistogram {
             }
             seconds(longest)
         };
-        Spread { count, p50: at(0.5), p99: at(0.99), p99_9: at(0.999), max: seconds(longest) }
+        DurationPercentiles {
+            count,
+            p50: at(0.5),
+            p99: at(0.99),
+            p99_9: at(0.999),
+            max: seconds(longest),
+        }
     }
 }
 
@@ -76,7 +82,7 @@ fn seconds(nanos: u64) -> Seconds {
 
 /// Percentiles of durations: the longest exactly, the others rounded up by at most 0.8 %.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct DurationPercentiles {
     pub count: u64,
     #[serde(rename = "p50_s")]
     pub p50: Seconds,
@@ -103,20 +109,20 @@ pub struct LoopCounters {
 
 /// [`LoopCounters`] as it was at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Kept {
+pub struct LoopTiming {
     /// From one tick's begin to the next one's.
-    pub period: Spread,
+    pub period: DurationPercentiles,
     /// From when a tick was due to its begin.
-    pub late: Spread,
+    pub late: DurationPercentiles,
     /// From a tick's begin to its end.
-    pub work: Spread,
+    pub work: DurationPercentiles,
     pub overruns: u64,
     pub missed: u64,
 }
 
 impl LoopCounters {
-    pub fn snapshot(&self) -> Kept {
-        Kept {
+    pub fn snapshot(&self) -> LoopTiming {
+        LoopTiming {
             period: self.period.spread(),
             late: self.late.spread(),
             work: self.work.spread(),

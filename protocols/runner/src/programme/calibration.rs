@@ -1,9 +1,11 @@
 //! From a session of weight steps to the calibration it measured.
 
-use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, CalibrationError, Series};
+use palpate_model::calibration::{
+    CALIBRATION_FORMAT, Calibration, CalibrationError, CalibrationSeries,
+};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, PLAN_COMPLETE, Record};
-use palpate_protocols::weighed::Readings;
+use palpate_protocols::weight_readings::WeightReadings;
 use palpate_sessions::{EntryKind, Session};
 use thiserror::Error;
 
@@ -27,7 +29,7 @@ pub enum CalibrationSessionError {
 }
 
 /// The calibration that a session measured, with the curve that predicts left-out weights best.
-pub fn calibration_of(
+pub fn calibration_from_session(
     session: &Session,
     name: &str,
 ) -> Result<Calibration, CalibrationSessionError> {
@@ -47,14 +49,14 @@ pub fn calibration_of(
             _ => None,
         })
         .collect();
-    let readings = Readings::of(&records);
-    let mut series: Vec<Series> = Vec::new();
+    let readings = WeightReadings::of(&records);
+    let mut series: Vec<CalibrationSeries> = Vec::new();
     let mut empty: Vec<Volts> = Vec::new();
     for one in readings.all() {
         let (direction, repeat) = (one.direction, one.repeat);
-        let is_same = |one: &Series| (one.direction, one.repeat) == (direction, repeat);
+        let is_same = |one: &CalibrationSeries| (one.direction, one.repeat) == (direction, repeat);
         if !series.last().is_some_and(is_same) {
-            series.push(Series { direction, repeat, steps: Vec::new() });
+            series.push(CalibrationSeries { direction, repeat, steps: Vec::new() });
         }
         if one.mass_g() == 0.0 {
             empty.push(one.volts());

@@ -1,11 +1,11 @@
 //! Contradictions in a programme whose parts are all valid by themselves, found before anything moves.
 
-use super::document::Task;
+use super::document::ProgrammeTask;
 use palpate_protocols::plans::{Plan, Step};
 use std::collections::BTreeSet;
 
 /// Why a task cannot do what it declares; `before` are the tasks ahead of it.
-pub(super) fn find_contradictions(task: &Task, before: &[Task]) -> Vec<String> {
+pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]) -> Vec<String> {
     let mut find_contradictions = Vec::new();
     let plan = task.plan(1, None);
     if task.calibrates && !plan.as_ref().is_some_and(has_weighing) {
@@ -38,7 +38,7 @@ fn has_weighing(plan: &Plan) -> bool {
 }
 
 /// Why no session of a task is fitted, if so: the report fits sessions with one loading and no sine.
-fn reason_unfitted(task: &Task) -> Option<String> {
+fn reason_unfitted(task: &ProgrammeTask) -> Option<String> {
     let name = &task.protocol.name;
     if task.calibrates {
         return Some(format!("task '{}' calibrates", task.name));

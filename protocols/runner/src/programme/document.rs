@@ -1,10 +1,10 @@
 //! What a programme is; its text is read by `read`.
 
 use super::labels::LabelSettings;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
-use palpate_protocols::file::{Problem, Protocol};
+use palpate_protocols::file::{Protocol, ProtocolProblem};
 use palpate_protocols::plans::{OnTimeout, Plan, Prompt, Rest, Step};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -20,17 +20,17 @@ pub struct Programme {
     pub title: String,
     pub purpose: String,
     /// Labels of every session that sets no others.
-    pub usual: Labels,
+    pub default_labels: SessionLabels,
     /// Whether what previews ask to acknowledge is acknowledged; it is recorded in every session.
     pub is_acknowledged: bool,
     /// Settings of the simulated rig that differ from the usual ones.
     pub simulated: BTreeMap<String, String>,
-    pub tasks: Vec<Task>,
+    pub tasks: Vec<ProgrammeTask>,
     pub(super) label_settings: LabelSettings,
 }
 
 #[derive(Clone, Debug)]
-pub struct Task {
+pub struct ProgrammeTask {
     pub name: String,
     pub protocol: Protocol,
     pub values: BTreeMap<String, String>,
@@ -55,12 +55,12 @@ pub struct ModelReference {
 /// A programme that cannot be carried out, with every reason; prints as a sentence for each.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
-pub struct ProgrammeError(pub Vec<Problem>);
+pub struct ProgrammeError(pub Vec<ProtocolProblem>);
 
 impl Programme {
     /// Whether a text is meant as a programme rather than a protocol.
     #[must_use]
-    pub fn is_meant(text: &str) -> bool {
+    pub fn is_programme_text(text: &str) -> bool {
         let is_own = |line: &str| {
             let line = line.trim_start();
             line.starts_with("palpate-programme") || line.starts_with("[[task]]")
@@ -78,7 +78,7 @@ impl Programme {
     }
 }
 
-impl Task {
+impl ProgrammeTask {
     /// The plan of one repeat, counted from 1: the protocol's, behind the rest and the specimen it needs. `remount`
     /// is the specimen that the operator must check before an interrupted programme goes on.
     pub fn plan(&self, repeat: u32, remount: Option<u64>) -> Option<Plan> {

@@ -1,10 +1,10 @@
 //! What a programme will do, task by task, before anything moves.
 
 use super::document::{Programme, ProgrammeError};
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Newtons, Seconds};
-use palpate_protocols::file::Problem;
+use palpate_protocols::file::ProtocolProblem;
 use palpate_protocols::preview::preview;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -18,27 +18,27 @@ pub struct TaskForecast {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Foreseen {
+pub struct ProgrammeForecast {
     pub tasks: Vec<TaskForecast>,
     /// What to look at before the start: nothing that forbids it.
-    pub notes: Vec<Problem>,
+    pub notes: Vec<ProtocolProblem>,
     /// What must be acknowledged and is not yet.
-    pub to_acknowledge: Vec<Problem>,
+    pub to_acknowledge: Vec<ProtocolProblem>,
 }
 
-impl Foreseen {
+impl ProgrammeForecast {
     pub fn expected(&self) -> Seconds {
         Seconds(self.tasks.iter().map(|task| task.expected.0).sum())
     }
 }
 
 /// Previews every task on a rig; every reason why one cannot run, with its line.
-pub fn foresee(
+pub fn forecast_programme(
     programme: &Programme,
     rig: &RigDescription,
     limits: &Limits,
-    curve: &Curve,
-) -> Result<Foreseen, ProgrammeError> {
+    curve: &CalibrationCurve,
+) -> Result<ProgrammeForecast, ProgrammeError> {
     let mut refusals = Vec::new();
     let (mut notes, mut to_acknowledge) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -57,15 +57,15 @@ pub fn foresee(
             };
             let own = preview(&plan, rig, limits, curve, false);
             let refused = own.refusals.iter().map(for_task);
-            let refused = refused.map(|reason| Problem::error(task.line, reason));
+            let refused = refused.map(|reason| ProtocolProblem::error(task.line, reason));
             refusals.extend(refused);
-            let warned = |reason| Problem::warning(task.line, for_task(reason));
+            let warned = |reason| ProtocolProblem::warning(task.line, for_task(reason));
             notes.extend(plan.limits.unused(limits).iter().map(warned));
             if !programme.is_acknowledged {
                 to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
                     let message =
                         format!("{}; write acknowledge = true in the file", for_task(reason));
-                    Problem::warning(task.line, message)
+                    ProtocolProblem::warning(task.line, message)
                 }));
             }
             ahead.expected.0 += own.expected.0 * f64::from(times);
@@ -83,7 +83,7 @@ pub fn foresee(
         list.dedup();
     }
     if refusals.is_empty() {
-        Ok(Foreseen { tasks, notes, to_acknowledge })
+        Ok(ProgrammeForecast { tasks, notes, to_acknowledge })
     } else {
         Err(ProgrammeError(refusals))
     }

@@ -2,13 +2,13 @@
 //! override both.
 
 use super::document::Programme;
-use palpate_model::about::{AboutError, Labels};
-use palpate_protocols::file::Problem;
+use palpate_model::metadata::{MetadataError, SessionLabels};
+use palpate_protocols::file::ProtocolProblem;
 use palpate_protocols::file::problem::Problems;
 use palpate_protocols::file::tree::{DocumentEntry, DocumentTable, DocumentValue};
 use std::collections::BTreeMap;
 
-/// A key of [`palpate_model::about::KEYS`] with its value.
+/// A key of [`palpate_model::metadata::KEYS`] with its value.
 type Pair = (String, String);
 
 /// The label that says what is indented.
@@ -111,28 +111,28 @@ fn check_label(key: &str, value: &str) -> Result<(), String> {
     if key.trim().starts_with("series.") {
         return Err(format!("a programme counts its series itself; leave out {key}"));
     }
-    Labels::default().tell(key, value).map_err(|err| err.to_string())
+    SessionLabels::default().set(key, value).map_err(|err| err.to_string())
 }
 
 impl Programme {
     /// Sets a label of every session from the command line, which overrides the file.
-    pub fn tell(&mut self, key: &str, value: &str) -> Result<(), String> {
+    pub fn set_label(&mut self, key: &str, value: &str) -> Result<(), String> {
         check_label(key, value)?;
         self.label_settings.overrides.push((key.trim().to_owned(), value.to_owned()));
         Ok(())
     }
 
-    pub fn labels(&self, task: usize, repeat: u32) -> Result<Labels, AboutError> {
+    pub fn labels(&self, task: usize, repeat: u32) -> Result<SessionLabels, MetadataError> {
         let number = self.specimen_at(task);
         let own = number.and_then(|number| self.label_settings.specimens.get(&number));
         let own = own.map_or(&[][..], |(_, pairs)| pairs.as_slice());
-        let mut labels = self.usual.clone();
+        let mut labels = self.default_labels.clone();
         let pairs =
             self.label_settings.general.iter().chain(own).chain(&self.label_settings.overrides);
         // Weights are no specimen.
         let is_weighed = self.tasks[task].calibrates;
         for (key, value) in pairs.filter(|(key, _)| !(is_weighed && key.starts_with(SPECIMEN))) {
-            labels.tell(key, value)?;
+            labels.set(key, value)?;
         }
         let names = |pairs: &[Pair]| pairs.iter().any(|(key, _)| key == SPECIMEN);
         // A common name does not distinguish the specimens.
@@ -145,18 +145,18 @@ impl Programme {
             };
         }
         let task = &self.tasks[task];
-        labels.tell("series.id", &format!("{}/{}", self.name, task.name))?;
+        labels.set("series.id", &format!("{}/{}", self.name, task.name))?;
         // The simulated rig counts its own specimen as 0.
         if let Some(number) = number.filter(|number| *number > 0) {
-            labels.tell("series.specimen", &number.to_string())?;
+            labels.set("series.specimen", &number.to_string())?;
         }
-        labels.tell("series.repeat", &repeat.to_string())?;
-        labels.tell("series.repeats", &task.repeats.to_string())?;
+        labels.set("series.repeat", &repeat.to_string())?;
+        labels.set("series.repeats", &task.repeats.to_string())?;
         Ok(labels)
     }
 
     /// Labels that protocols ask for and that are not set: a sentence for each task. The meaning of a label is given once.
-    pub fn questions(&self) -> Vec<Problem> {
+    pub fn open_questions(&self) -> Vec<ProtocolProblem> {
         let mut explained: Vec<&str> = Vec::new();
         let mut questions = Vec::new();
         for (index, task) in self.tasks.iter().enumerate() {
@@ -174,7 +174,7 @@ impl Programme {
                 })
                 .collect();
             if !words.is_empty() {
-                questions.push(Problem::warning(
+                questions.push(ProtocolProblem::warning(
                     task.line,
                     format!("task '{}' asks for {}", task.name, words.join(", ")),
                 ));

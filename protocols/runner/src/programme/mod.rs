@@ -11,9 +11,11 @@ mod progress;
 mod read;
 mod run;
 
-pub use calibration::{CalibrationSessionError, calibration_of};
+pub use calibration::{CalibrationSessionError, calibration_from_session};
 pub use conditions::Conditions;
-pub use document::{ModelReference, Programme, ProgrammeError, Task};
-pub use forecast::{Foreseen, TaskForecast, foresee};
-pub use progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
-pub use run::{Done, Event, Laboratory, RunError, run};
+pub use document::{ModelReference, Programme, ProgrammeError, ProgrammeTask};
+pub use forecast::{ProgrammeForecast, TaskForecast, forecast_programme};
+pub use progress::{
+    FINISHED, ProgrammeEntry, ProgrammePosition, ProgrammeProgress, ProgressError, REFUSED,
+};
+pub use run::{ProgrammeEvent, ProgrammeResult, ProgrammeRunError, ProgrammeSetup, run_programme};

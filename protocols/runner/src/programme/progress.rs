@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// Ending of a complete run in the journal.
+/// FigureFormat of a complete run in the journal.
 pub const FINISHED: &str = "finish";
 
-/// Ending of a run that the rig or its preview refused: it has no session.
+/// FigureFormat of a run that the rig or its preview refused: it has no session.
 pub const REFUSED: &str = "refused";
 
 /// One line of a programme's journal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
-pub enum Entry {
+pub enum ProgrammeEntry {
     Programme {
         name: String,
         /// CRC-32 of its text, eight hexadecimal digits.
@@ -28,21 +28,21 @@ pub enum Entry {
     },
     /// A run began; without its end it was interrupted.
     Begun {
-        place: Place,
+        place: ProgrammePosition,
         /// Its session folder, from the journal's.
         session: PathBuf,
         /// When, RFC 3339.
         at: String,
     },
     Ended {
-        place: Place,
+        place: ProgrammePosition,
         outcome: String,
         reason: String,
     },
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Place {
+pub struct ProgrammePosition {
     pub task: usize,
     /// Repeat, from 1.
     pub repeat: u32,
@@ -51,9 +51,9 @@ pub struct Place {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Progress {
+pub struct ProgrammeProgress {
     /// Runs that began, with their folder and how they ended, if they did.
-    pub runs: Vec<(Place, PathBuf, Option<String>)>,
+    pub runs: Vec<(ProgrammePosition, PathBuf, Option<String>)>,
 }
 
 /// A journal that does not belong to the programme.
@@ -75,11 +75,11 @@ pub enum ProgressError {
     Headless,
 }
 
-impl Progress {
+impl ProgrammeProgress {
     /// Reads a journal's entries; `crc32` is that of the programme's text now, `conditions` are those it would go
     /// on under. A journal without conditions is from an older palpate, and nothing is compared.
     pub fn of(
-        entries: &[Entry],
+        entries: &[ProgrammeEntry],
         programme: &Programme,
         crc32: &str,
         conditions: &Conditions,
@@ -89,28 +89,30 @@ impl Progress {
             return Ok(progress);
         };
         match first {
-            Entry::Programme { name, .. } if *name != programme.name => {
+            ProgrammeEntry::Programme { name, .. } if *name != programme.name => {
                 return Err(ProgressError::Other(name.clone()));
             }
-            Entry::Programme { name, crc32: begun, .. } if begun != crc32 => {
+            ProgrammeEntry::Programme { name, crc32: begun, .. } if begun != crc32 => {
                 return Err(ProgressError::Changed(name.clone()));
             }
-            Entry::Programme { name, conditions: Some(begun), .. } if **begun != *conditions => {
+            ProgrammeEntry::Programme { name, conditions: Some(begun), .. }
+                if **begun != *conditions =>
+            {
                 return Err(ProgressError::Conditions {
                     programme: name.clone(),
                     changes: begun.changes(conditions),
                 });
             }
-            Entry::Programme { .. } => {}
+            ProgrammeEntry::Programme { .. } => {}
             _ => return Err(ProgressError::Headless),
         }
         for entry in rest {
             match entry {
-                Entry::Programme { .. } => {}
-                Entry::Begun { place, session, .. } => {
+                ProgrammeEntry::Programme { .. } => {}
+                ProgrammeEntry::Begun { place, session, .. } => {
                     progress.runs.push((place.clone(), session.clone(), None));
                 }
-                Entry::Ended { place, outcome, .. } => {
+                ProgrammeEntry::Ended { place, outcome, .. } => {
                     let own = progress.runs.iter_mut().rev().find(|run| run.0 == *place);
                     if let Some(run) = own {
                         run.2 = Some(outcome.clone());
@@ -122,14 +124,18 @@ impl Progress {
     }
 
     /// The next run: the first repeat that has not finished. None once all have.
-    pub fn next(&self, programme: &Programme) -> Option<Place> {
+    pub fn next(&self, programme: &Programme) -> Option<ProgrammePosition> {
         let tasks = programme.tasks.iter().enumerate();
         let mut repeats =
             tasks.flat_map(|(task, one)| (1..=one.repeats).map(move |repeat| (task, repeat)));
         repeats.find_map(|(task, repeat)| {
             let endings = self.attempts(task, repeat);
             let is_done = endings.contains(&Some(FINISHED));
-            (!is_done).then_some(Place { task, repeat, attempt: 1 + endings.len() as u32 })
+            (!is_done).then_some(ProgrammePosition {
+                task,
+                repeat,
+                attempt: 1 + endings.len() as u32,
+            })
         })
     }
 

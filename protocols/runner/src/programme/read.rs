@@ -1,9 +1,9 @@
 //! Reads the text of a programme and reports every mistake with its line.
 
 use super::consistency::find_contradictions;
-use super::document::{ModelReference, Programme, ProgrammeError, Task};
+use super::document::{ModelReference, Programme, ProgrammeError, ProgrammeTask};
 use super::labels::LabelSettings;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::units::Seconds;
 use palpate_protocols::file::problem::{Problems, nearest, suggestion};
 use palpate_protocols::file::tree::{
@@ -106,7 +106,7 @@ impl Reader {
             name,
             title: self.text(root, "title").unwrap_or_default(),
             purpose: self.text(root, "purpose").unwrap_or_default(),
-            usual: Labels::default(),
+            default_labels: SessionLabels::default(),
             is_acknowledged: self.flag(root, "acknowledge").unwrap_or_default(),
             simulated: self.simulated(root),
             tasks: tasks.read,
@@ -260,7 +260,7 @@ impl Reader {
         if self.problems.count() > before {
             return;
         }
-        let task = Task {
+        let task = ProgrammeTask {
             name,
             protocol,
             values,
@@ -352,7 +352,7 @@ impl Reader {
 
 #[derive(Default)]
 struct Tasks {
-    read: Vec<Task>,
+    read: Vec<ProgrammeTask>,
     names: Vec<String>,
     /// Specimens of all tasks that clip one in; `None` for one that is not a number.
     specimens: Vec<Option<u64>>,

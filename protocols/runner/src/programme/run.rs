@@ -1,17 +1,21 @@
 //! Carries a programme out on a runner: every run in its own session folder, every step of the way in the journal.
 
-use super::calibration::{CalibrationSessionError, calibration_of};
+use super::calibration::{CalibrationSessionError, calibration_from_session};
 use super::conditions::Conditions;
 use super::document::Programme;
-use super::progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
-use crate::{AfterStop, Answers, Request, RunRequest, RunView, Runner, StartError, wall_now};
+use super::progress::{
+    FINISHED, ProgrammeEntry, ProgrammePosition, ProgrammeProgress, ProgressError, REFUSED,
+};
+use crate::{
+    AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, StartError, wall_now,
+};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
-use palpate_protocols::engine::{EndingKind, Outcome, PLAN_COMPLETE};
+use palpate_protocols::engine::{EndingKind, PLAN_COMPLETE, RunOutcome};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
-use palpate_sessions::journal::{Journal, JournalError, stamp};
+use palpate_sessions::journal::{Journal, JournalError, format_time};
 use palpate_sessions::{HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -21,7 +25,7 @@ use thiserror::Error;
 /// How long the runner may be silent before its thread is checked.
 const SILENCE: Duration = Duration::from_millis(500);
 
-pub struct Laboratory<'a> {
+pub struct ProgrammeSetup<'a> {
     pub runner: &'a Runner,
     pub woken: &'a Receiver<()>,
     pub rig: &'a RigDescription,
@@ -30,31 +34,31 @@ pub struct Laboratory<'a> {
     /// Volts to newtons until a task measures it.
     pub calibration: Calibration,
     pub folder: &'a Path,
-    pub answers: Answers,
+    pub answers: PromptResponder,
     /// What must be acknowledged before a plan is run, such as a daily check that failed; or why that is unknown.
     pub gate: &'a dyn Fn(&Plan) -> Result<Vec<String>, String>,
 }
 
-pub enum Event<'a> {
+pub enum ProgrammeEvent<'a> {
     Begun {
-        place: &'a Place,
+        place: &'a ProgrammePosition,
         count: (u32, u32),
     },
     /// A run goes on; with the time left for the whole programme.
     Running(&'a RunView, Seconds),
-    Finished(&'a Place, &'a Path),
+    Finished(&'a ProgrammePosition, &'a Path),
     Calibrated(&'a Calibration),
 }
 
 #[derive(Clone, Debug)]
-pub struct Done {
-    pub progress: Progress,
+pub struct ProgrammeResult {
+    pub progress: ProgrammeProgress,
     pub calibration: Calibration,
     pub was_continued: bool,
 }
 
 #[derive(Debug, Error)]
-pub enum RunError {
+pub enum ProgrammeRunError {
     /// Another program uses the folder, or it is no folder for a programme.
     #[error("{0}")]
     Folder(String),
@@ -78,22 +82,23 @@ pub enum RunError {
 }
 
 /// Carries a programme out, or goes on where its journal ends.
-pub fn run(
+pub fn run_programme(
     programme: &Programme,
     crc32: &str,
-    laboratory: Laboratory<'_>,
-    tell: &mut dyn FnMut(Event<'_>),
-) -> Result<Done, RunError> {
+    laboratory: ProgrammeSetup<'_>,
+    tell: &mut dyn FnMut(ProgrammeEvent<'_>),
+) -> Result<ProgrammeResult, ProgrammeRunError> {
     let lock = laboratory.folder.join(LOCK_FILE);
-    let _lock = HolderLock::acquire(&lock).map_err(|err| RunError::Folder(err.to_string()))?;
+    let _lock =
+        HolderLock::acquire(&lock).map_err(|err| ProgrammeRunError::Folder(err.to_string()))?;
     if laboratory.folder.join(LOG_FILE).exists() {
         let reason = format!("{} is a session; choose a new folder", laboratory.folder.display());
-        return Err(RunError::Folder(reason));
+        return Err(ProgrammeRunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
     let conditions =
         Conditions::of(programme, laboratory.rig, &laboratory.limits, &laboratory.calibration);
-    let progress = Progress::of(&entries, programme, crc32, &conditions)?;
+    let progress = ProgrammeProgress::of(&entries, programme, crc32, &conditions)?;
     let was_continued = !progress.runs.is_empty();
     let mut work = ProgrammeRun {
         programme,
@@ -104,10 +109,10 @@ pub fn run(
         tell,
     };
     if entries.is_empty() {
-        work.journal.push(&Entry::Programme {
+        work.journal.push(&ProgrammeEntry::Programme {
             name: programme.name.clone(),
             crc32: crc32.to_owned(),
-            at: stamp(wall_now()),
+            at: format_time(wall_now()),
             conditions: Some(Box::new(conditions)),
         })?;
     }
@@ -120,23 +125,27 @@ pub fn run(
     while let Some(place) = work.progress.next(programme) {
         work.run_once(place)?;
     }
-    Ok(Done { progress: work.progress, calibration: work.laboratory.calibration, was_continued })
+    Ok(ProgrammeResult {
+        progress: work.progress,
+        calibration: work.laboratory.calibration,
+        was_continued,
+    })
 }
 
 struct ProgrammeRun<'a> {
     programme: &'a Programme,
     journal: Journal,
-    progress: Progress,
+    progress: ProgrammeProgress,
     /// The rig was unattended: the operator must check that the specimen is still the right one.
     is_remounting: bool,
-    laboratory: Laboratory<'a>,
-    tell: &'a mut dyn FnMut(Event<'_>),
+    laboratory: ProgrammeSetup<'a>,
+    tell: &'a mut dyn FnMut(ProgrammeEvent<'_>),
 }
 
 impl ProgrammeRun<'_> {
     /// Adds the last run's missing line to the journal after a crash between the end of its log and that line: the session
     /// has its ending. A session that cannot be read, or has no end, was interrupted.
-    fn complete_journal(&mut self) -> Result<(), RunError> {
+    fn complete_journal(&mut self) -> Result<(), ProgrammeRunError> {
         let Some((place, session, None)) = self.progress.runs.last().cloned() else {
             return Ok(());
         };
@@ -147,22 +156,28 @@ impl ProgrammeRun<'_> {
         self.end(place, final_outcome(&end.outcome, &end.reason), end.reason)
     }
 
-    fn end(&mut self, place: Place, outcome: String, reason: String) -> Result<(), RunError> {
+    fn end(
+        &mut self,
+        place: ProgrammePosition,
+        outcome: String,
+        reason: String,
+    ) -> Result<(), ProgrammeRunError> {
         if let Some(run) = self.progress.runs.last_mut() {
             run.2 = Some(outcome.clone());
         }
-        Ok(self.journal.push(&Entry::Ended { place, outcome, reason })?)
+        Ok(self.journal.push(&ProgrammeEntry::Ended { place, outcome, reason })?)
     }
 
     /// One run, from its entry in the journal to the next.
-    fn run_once(&mut self, mut place: Place) -> Result<(), RunError> {
+    fn run_once(&mut self, mut place: ProgrammePosition) -> Result<(), ProgrammeRunError> {
         let programme = self.programme;
         let task = &programme.tasks[place.task];
         // A folder that is there without its line in the journal is what a crash left of an attempt.
         while self.laboratory.folder.join(session_folder(&task.name, &place)).exists() {
             place.attempt += 1;
         }
-        let refused = |reason: String| RunError::Refused { task: task.name.clone(), reason };
+        let refused =
+            |reason: String| ProgrammeRunError::Refused { task: task.name.clone(), reason };
         let specimen = programme.specimen_at(place.task);
         let remount = specimen.filter(|_| std::mem::take(&mut self.is_remounting));
         let plan = task
@@ -182,8 +197,8 @@ impl ProgrammeRun<'_> {
             is_acknowledged: programme.is_acknowledged,
             to_acknowledge,
             after_stop: match self.laboratory.answers {
-                Answers::Operator => AfterStop::Ask,
-                Answers::Confirm => AfterStop::Close,
+                PromptResponder::Operator => AfterStop::Ask,
+                PromptResponder::Confirm => AfterStop::Close,
             },
             answers: self.laboratory.answers,
             leader: None,
@@ -192,57 +207,70 @@ impl ProgrammeRun<'_> {
         if let Some(reason) = self.begin(&place, session, request)? {
             return Err(refused(reason));
         }
-        let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some(FINISHED);
+        let finished = |run: &&(ProgrammePosition, PathBuf, Option<String>)| {
+            run.2.as_deref() == Some(FINISHED)
+        };
         let done = self.progress.runs.iter().filter(finished).count() as u32;
-        (self.tell)(Event::Begun { place: &place, count: (done, programme.session_count()) });
+        (self.tell)(ProgrammeEvent::Begun {
+            place: &place,
+            count: (done, programme.session_count()),
+        });
         let (ending, reason) = self.wait(&folder, later)?;
         self.end(place.clone(), ending.clone(), reason.clone())?;
         if ending != FINISHED {
             let (task, repeat) = (task.name.clone(), place.repeat);
-            return Err(RunError::Ended { task, repeat, ending, reason });
+            return Err(ProgrammeRunError::Ended { task, repeat, ending, reason });
         }
-        (self.tell)(Event::Finished(&place, &folder));
+        (self.tell)(ProgrammeEvent::Finished(&place, &folder));
         self.calibrate(place.task, &folder)
     }
 
     /// Begins a run; or why it is refused.
     fn begin(
         &mut self,
-        place: &Place,
+        place: &ProgrammePosition,
         session: PathBuf,
         request: RunRequest,
-    ) -> Result<Option<String>, RunError> {
-        self.journal.push(&Entry::Begun {
+    ) -> Result<Option<String>, ProgrammeRunError> {
+        self.journal.push(&ProgrammeEntry::Begun {
             place: place.clone(),
             session: session.clone(),
-            at: stamp(wall_now()),
+            at: format_time(wall_now()),
         })?;
         self.progress.runs.push((place.clone(), session, None));
         let (reply, answer) = sync_channel(1);
-        let request = Request::Run(Box::new(request), reply);
+        let request = RunnerRequest::Run(Box::new(request), reply);
         let sent = self.laboratory.runner.request(request);
-        sent.map_err(|_| RunError::NoRunner)?;
+        sent.map_err(|_| ProgrammeRunError::NoRunner)?;
         match answer.recv() {
             Ok(Ok(())) => Ok(None),
             Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
                 let (place, outcome) = (place.clone(), REFUSED.into());
-                self.journal.push(&Entry::Ended { place, outcome, reason: reason.clone() })?;
+                self.journal.push(&ProgrammeEntry::Ended {
+                    place,
+                    outcome,
+                    reason: reason.clone(),
+                })?;
                 Ok(Some(reason))
             }
-            Err(_) => Err(RunError::NoRunner),
+            Err(_) => Err(ProgrammeRunError::NoRunner),
         }
     }
 
     /// Waits until the run in a folder has ended and its log is closed.
-    fn wait(&mut self, folder: &Path, later: Seconds) -> Result<(String, String), RunError> {
+    fn wait(
+        &mut self,
+        folder: &Path,
+        later: Seconds,
+    ) -> Result<(String, String), ProgrammeRunError> {
         loop {
             let is_woken = self.laboratory.woken.recv_timeout(SILENCE).is_ok();
             let snapshot = self.laboratory.runner.snapshot();
             let own = snapshot.run.as_ref().filter(|run| run.folder == folder);
             if let Some(view) = own {
                 let remaining = Seconds(view.time_left.0 + later.0);
-                (self.tell)(Event::Running(view, remaining));
-                if let Some(Outcome { ending, reason }) = &view.outcome {
+                (self.tell)(ProgrammeEvent::Running(view, remaining));
+                if let Some(RunOutcome { ending, reason }) = &view.outcome {
                     // What is not on disk did not happen.
                     let broken = view.log_error.as_ref().map(|err| ("abort".into(), err.clone()));
                     return Ok(broken.unwrap_or_else(|| {
@@ -251,26 +279,26 @@ impl ProgrammeRun<'_> {
                 }
             }
             if !is_woken && !self.laboratory.runner.is_alive() {
-                return Err(RunError::NoRunner);
+                return Err(ProgrammeRunError::NoRunner);
             }
         }
     }
 
     /// The calibration that a finished task measured, if it is one that calibrates.
-    fn calibrate(&mut self, task: usize, folder: &Path) -> Result<(), RunError> {
+    fn calibrate(&mut self, task: usize, folder: &Path) -> Result<(), ProgrammeRunError> {
         let task = &self.programme.tasks[task];
         if !task.calibrates {
             return Ok(());
         }
         let session = Session::open(folder)?;
-        let calibration = calibration_of(&session, &task.name)
-            .map_err(|source| RunError::Calibrating { task: task.name.clone(), source })?;
-        (self.tell)(Event::Calibrated(&calibration));
+        let calibration = calibration_from_session(&session, &task.name)
+            .map_err(|source| ProgrammeRunError::Calibrating { task: task.name.clone(), source })?;
+        (self.tell)(ProgrammeEvent::Calibrated(&calibration));
         self.laboratory.calibration = calibration;
         Ok(())
     }
 
-    fn time_after(&self, place: &Place) -> Result<Seconds, String> {
+    fn time_after(&self, place: &ProgrammePosition) -> Result<Seconds, String> {
         let curve = self.laboratory.calibration.curve();
         let curve = curve.map_err(|err| err.to_string())?;
         let (rig, limits) = (self.laboratory.rig, &self.laboratory.limits);
@@ -293,7 +321,7 @@ fn final_outcome(outcome: &str, reason: &str) -> String {
 }
 
 /// Where a run's session goes: `TASK/REPEAT`, and `TASK/REPEAT-ATTEMPT` where it is made again.
-fn session_folder(task: &str, place: &Place) -> PathBuf {
+fn session_folder(task: &str, place: &ProgrammePosition) -> PathBuf {
     let name = match place.attempt {
         1 => format!("{:02}", place.repeat),
         attempt => format!("{:02}-{attempt}", place.repeat),

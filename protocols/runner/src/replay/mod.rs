@@ -6,9 +6,9 @@
 use crate::{LiveFeed, to_json};
 use palpate_model::Nanos;
 use palpate_model::estimate::LiveEstimate;
-use palpate_protocols::engine::{self, ENGINE_VERSION, Effect, Input, State};
+use palpate_protocols::engine::{self, ENGINE_VERSION, Effect, EngineInput, EngineState};
 use palpate_sessions::log::Session;
-use palpate_sessions::record::{Entry, EntryKind, Row};
+use palpate_sessions::record::{EntryKind, LogEntry, SampleRow};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::VecDeque;
@@ -71,7 +71,7 @@ pub enum ReplayError {
 
 /// The first place where recorded and recomputed differ.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Difference {
+pub struct ReplayDifference {
     pub at_s: f64,
     /// Samples before it.
     pub after_sample: u64,
@@ -84,7 +84,7 @@ pub struct Difference {
     pub now: Value,
 }
 
-impl Difference {
+impl ReplayDifference {
     pub fn recorded_words(&self) -> String {
         wording::describe_value(&self.recorded)
     }
@@ -113,7 +113,7 @@ pub struct ReplayReport {
     pub force_difference_n: f64,
     /// Largest difference of a derived depth, in mm.
     pub depth_difference_mm: f64,
-    pub first_difference: Option<Difference>,
+    pub first_difference: Option<ReplayDifference>,
 }
 
 /// The blessings of a session, from `blessed.json` in its folder; none if there is no such file.
@@ -142,7 +142,7 @@ pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport,
     let mut inputs = read_inputs(session)?;
     let mut run = Replay {
         live: LiveFeed::new(&config),
-        state: Some(State::new(config)),
+        state: Some(EngineState::new(config)),
         recorded: session
             .entries
             .iter()
@@ -171,9 +171,9 @@ pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport,
 }
 
 struct Replay<'a> {
-    state: Option<State>,
+    state: Option<EngineState>,
     live: LiveFeed,
-    recorded: Vec<&'a Entry>,
+    recorded: Vec<&'a LogEntry>,
     is_finished: bool,
     expected_live: VecDeque<LiveEstimate>,
     blessings: &'a [Blessing],
@@ -184,7 +184,7 @@ impl Replay<'_> {
     /// Feeds the inputs that came before sample `index`.
     fn feed_inputs(&mut self, inputs: &mut VecDeque<RecordedInput>, index: u64) {
         while let Some(next) = inputs.pop_front_if(|next| next.after_sample <= index) {
-            if let Input::LiveFit(estimate) = &next.input {
+            if let EngineInput::LiveFit(estimate) = &next.input {
                 // Before there were verdicts, an answer waited until all parameters were known.
                 while estimate.verdicts.is_empty()
                     && self
@@ -204,11 +204,11 @@ impl Replay<'_> {
         }
     }
 
-    fn feed_row(&mut self, index: u64, row: &Row) {
+    fn feed_row(&mut self, index: u64, row: &SampleRow) {
         let Some(reading) = read_sample(row) else {
             return;
         };
-        self.step(row.host, index + 1, Input::Reading(reading));
+        self.step(row.host, index + 1, EngineInput::Reading(reading));
         let Some(state) = &self.state else { return };
         let derived = *state.derived();
         let (phase, cycle) = (state.phase(), state.cycle());
@@ -237,7 +237,7 @@ impl Replay<'_> {
         }
     }
 
-    fn step(&mut self, now: Nanos, after_sample: u64, input: Input) {
+    fn step(&mut self, now: Nanos, after_sample: u64, input: EngineInput) {
         let Some(state) = self.state.take() else {
             return;
         };
@@ -292,7 +292,7 @@ impl Replay<'_> {
         now: Value,
     ) {
         let step = self.state.as_ref().map_or(String::new(), wording::describe_step);
-        self.report.first_difference.get_or_insert(Difference {
+        self.report.first_difference.get_or_insert(ReplayDifference {
             step,
             at_s: at.seconds().0,
             after_sample,

@@ -2,12 +2,12 @@
 
 use super::ReplayError;
 use super::source::{RecordedInput, read_config, read_inputs, read_sample};
-use crate::{Board, LogState, RigView, Snapshot};
+use crate::{Board, LogState, RigView, RunnerSnapshot};
 use palpate_model::Nanos;
-use palpate_protocols::engine::{self, Effect, Input, State};
+use palpate_protocols::engine::{self, Effect, EngineInput, EngineState};
 use palpate_protocols::preview::preview;
 use palpate_sessions::log::Session;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const FRAMES_MAX: usize = 64;
 const FRAME_SAMPLES_MIN: usize = 5000;
 
 pub struct Player {
-    rows: Vec<Row>,
+    rows: Vec<SampleRow>,
     inputs: Vec<RecordedInput>,
     end: Nanos,
     current: PlaybackPosition,
@@ -33,7 +33,7 @@ struct PlaybackPosition {
     rows: usize,
     inputs: usize,
     /// `None` only while [`engine::step`] has it.
-    state: Option<State>,
+    state: Option<EngineState>,
     board: Board,
 }
 
@@ -50,7 +50,7 @@ impl Player {
             rows: 0,
             inputs: 0,
             board: Board::new(&config, expected.steps, folder),
-            state: Some(State::new(Arc::new(config))),
+            state: Some(EngineState::new(Arc::new(config))),
         };
         Ok(Self {
             every: (session.rows.len() / FRAMES_MAX).max(FRAME_SAMPLES_MIN),
@@ -118,7 +118,7 @@ impl Player {
             (None, Some(row)) => {
                 current.rows += 1;
                 match read_sample(row) {
-                    Some(reading) => (row.host, Input::Reading(reading)),
+                    Some(reading) => (row.host, EngineInput::Reading(reading)),
                     None => return,
                 }
             }
@@ -132,12 +132,12 @@ impl Player {
     }
 
     /// What a window shows of it.
-    pub fn snapshot(&self, sequence: u64) -> Option<Snapshot> {
+    pub fn snapshot(&self, sequence: u64) -> Option<RunnerSnapshot> {
         let PlaybackPosition { rows, board, .. } = &self.current;
         let state = self.current.state.as_ref()?;
         let log = LogState { saved_through: board.now(), ..LogState::default() };
         let reading = rows.checked_sub(1).and_then(|last| self.rows.get(last));
-        Some(Snapshot {
+        Some(RunnerSnapshot {
             rig: RigView {
                 description: Arc::new(state.config().rig.clone()),
                 reading: reading.and_then(read_sample),
@@ -153,9 +153,9 @@ impl Player {
 }
 
 impl PlaybackPosition {
-    fn push(&mut self, now: Nanos, input: Input) {
+    fn push(&mut self, now: Nanos, input: EngineInput) {
         self.board.push_input(now, &input);
-        let is_sample = matches!(input, Input::Reading(_));
+        let is_sample = matches!(input, EngineInput::Reading(_));
         let Some(state) = self.state.take() else {
             return;
         };

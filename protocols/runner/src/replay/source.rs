@@ -5,14 +5,14 @@ use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_model::units::Volts;
-use palpate_protocols::engine::{Config, Input};
+use palpate_protocols::engine::{EngineConfig, EngineInput};
 use palpate_protocols::plans::Plan;
 use palpate_sessions::log::Session;
-use palpate_sessions::record::{EntryKind, Row};
+use palpate_sessions::record::{EntryKind, SampleRow};
 use std::collections::VecDeque;
 
 /// The engine's configuration at the start of the session.
-pub(super) fn read_config(session: &Session) -> Result<Config, ReplayError> {
+pub(super) fn read_config(session: &Session) -> Result<EngineConfig, ReplayError> {
     let manifest = &session.manifest;
     let bad = |what, detail: String| ReplayError::Manifest { what, detail };
     if let Some(imported) = &manifest.imported {
@@ -29,7 +29,7 @@ pub(super) fn read_config(session: &Session) -> Result<Config, ReplayError> {
     let is_homed = manifest.settings["is_homed_at_start"].as_bool();
     let is_homed =
         is_homed.ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
-    Ok(Config {
+    Ok(EngineConfig {
         rig,
         limits: plan.limits.tighten(limits),
         curve: calibration.curve().map_err(|err| bad("calibration", err.to_string()))?,
@@ -43,7 +43,7 @@ pub(super) struct RecordedInput {
     /// Samples before it.
     pub after_sample: u64,
     pub now: Nanos,
-    pub input: Input,
+    pub input: EngineInput,
 }
 
 /// Every input that is no sample, in order.
@@ -62,7 +62,7 @@ pub(super) fn read_inputs(session: &Session) -> Result<VecDeque<RecordedInput>, 
 }
 
 /// The sample as the rig sent it. Every row of a session with a rig has all of it.
-pub(super) fn read_sample(row: &Row) -> Option<Reading> {
+pub(super) fn read_sample(row: &SampleRow) -> Option<Reading> {
     Some(Reading {
         tick: row.tick,
         counts: row.counts,

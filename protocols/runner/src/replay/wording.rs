@@ -1,10 +1,10 @@
 //! Decisions and numbers of a replay in words.
 
 use palpate_model::rig::{HandAction, RigCommand};
-use palpate_protocols::engine::{Effect, State};
+use palpate_protocols::engine::{Effect, EngineState};
 use serde_json::Value;
 
-pub(super) fn describe_step(state: &State) -> String {
+pub(super) fn describe_step(state: &EngineState) -> String {
     let (index, _) = state.step_progress();
     let steps = &state.config().plan.steps;
     let Some(planned) = steps.get(index) else {

@@ -2,21 +2,23 @@
 //! deformable surface.
 
 use palpate_haptics::Period;
-use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Side, Surface,
+    ContactSide, Cut, Grid, GridNode, HeightField, Surface, SurfaceContact, SurfaceMethod,
+    SurfaceRecovery,
 };
 use palpate_model::Seconds;
 use palpate_model::units::MmPerS;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_runner::haptics::{Beat, Led, Simulated, Ticking};
+use palpate_runner::haptics::{GuidedDevice, LoopTask, RealTimeLoop, SimulatedMasterSlave};
 use palpate_test_support::wait::{Deadline, until};
 
-fn device(period: Period) -> Simulated {
+fn device(period: Period) -> SimulatedMasterSlave {
     let path = HandPath::RampHold { from: 0.0, to: 30.0, speed: 50.0 };
-    let settings = SimulationSettings::of(ModifiedKelvin::THESIS, period, Hand::firm(path));
-    Simulated::new(&settings).expect("a device")
+    let settings =
+        SimulationSettings::of(ModifiedKelvin::THESIS, period, SimulatedHand::firm(path));
+    SimulatedMasterSlave::new(&settings).expect("a device")
 }
 
 #[test]
@@ -33,13 +35,13 @@ fn haptic_tick_allocates_nothing() {
     assert_eq!(counted.count_total, 0, "{counted:?}");
     assert!(seen.snapshot.is_whole());
     // Nor does one whose hand is led from a window.
-    let hand = Hand::firm(HandPath::Still { at: 0.0 });
+    let hand = SimulatedHand::firm(HandPath::Still { at: 0.0 });
     let settings = SimulationSettings::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
-    let mut led = Led::new(&settings, MmPerS(50.0)).expect("a device");
-    let (lead, mut live) = (led.lead(), led.live().clone());
+    let mut led = GuidedDevice::new(&settings, MmPerS(50.0)).expect("a device");
+    let (lead, mut live) = (led.hand_target(), led.view().clone());
     let counted = allocation_counter::measure(|| {
         for tick in 0..20_000_u64 {
-            lead.to((tick / 1_000) as f64);
+            lead.set((tick / 1_000) as f64);
             led.tick(1);
             led.show(&mut live);
         }
@@ -95,20 +97,20 @@ fn haptic_tick_never_waits() {
 
 /// A surface of a method, and tools that press, pull and slide over it, at times more of them than are worked through
 /// together.
-fn poked(method: Method) -> impl FnMut(usize) {
+fn poked(method: SurfaceMethod) -> impl FnMut(usize) {
     let grid = Grid::new(41, 41, 0.5).expect("a grid");
     let field = HeightField::flat(grid, 0.05).expect("a field");
-    let recovery = Recovery::new(Seconds(0.05), Seconds(1e-3)).expect("a recovery");
+    let recovery = SurfaceRecovery::new(Seconds(0.05), Seconds(1e-3)).expect("a recovery");
     let mut surface = Surface::new(field, method, recovery, Cut::NONE);
     move |tick| {
-        let contacts: [Contact; 20] = std::array::from_fn(|tool| {
+        let contacts: [SurfaceContact; 20] = std::array::from_fn(|tool| {
             let [column, row] = [7 * tick + 11 * tool, tick / 3 + 31 * tool].map(|at| at % 41);
-            let node = Node { column: column as u16, row: row as u16 };
+            let node = GridNode { column: column as u16, row: row as u16 };
             let (z, side) = match tool % 3 {
-                0 => (1.5, Side::Pull),
-                _ => (-2.0, Side::Push),
+                0 => (1.5, ContactSide::Pull),
+                _ => (-2.0, ContactSide::Push),
             };
-            Contact::at(&grid, node, z, side)
+            SurfaceContact::at(&grid, node, z, side)
         });
         let effect = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
         assert!(!effect.dirty.is_empty() || tick % 4 == 0);
@@ -117,7 +119,7 @@ fn poked(method: Method) -> impl FnMut(usize) {
 
 #[test]
 fn surface_tick_allocates_nothing() {
-    for method in Method::ALL {
+    for method in SurfaceMethod::ALL {
         let mut tick = poked(method);
         // From the first tick on: all there is was made before.
         let counted = allocation_counter::measure(|| (0..400).for_each(&mut tick));
@@ -128,7 +130,7 @@ fn surface_tick_allocates_nothing() {
 #[cfg(target_os = "linux")]
 #[test]
 fn surface_tick_never_waits() {
-    for method in Method::ALL {
+    for method in SurfaceMethod::ALL {
         let mut tick = poked(method);
         // The first ones read the program from the disk.
         waits();
@@ -146,20 +148,20 @@ fn shared_view_is_never_torn_and_never_goes_back_in_time() {
     let period = Period::of_rate(10_000.0).unwrap();
     let device = device(period);
     let first = *device.last();
-    let mut beat = Beat::start(device, period, first).unwrap();
+    let mut beat = RealTimeLoop::start(device, period, first).unwrap();
     let (mut newest, mut changes, mut read) = (0, 0, 0_u32);
     let end = Deadline::new();
     // However seldom the loop gets a processor.
     while read < 1_000_000 || changes <= 10 {
         assert!(!end.is_over(), "{changes} changes in {read} reads");
         read += 1;
-        let seen = &beat.seen().snapshot;
+        let seen = &beat.view().snapshot;
         assert!(seen.is_whole(), "read {read}: {seen:?}");
         assert!(seen.tick >= newest, "read {read}");
         changes += u32::from(seen.tick > newest);
         newest = seen.tick;
     }
-    let kept = beat.kept();
+    let kept = beat.timing();
     assert!(kept.work.count > 10 && kept.period.p50.0 > 0.0, "{kept:?}");
     let last = beat.end().unwrap();
     assert!(last.last().snapshot.tick >= newest);
@@ -173,7 +175,7 @@ fn overrunning_loop_leaves_the_core_to_other_threads() {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for HeavyTask {
+    impl LoopTask for HeavyTask {
         type View = u64;
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -188,8 +190,8 @@ fn overrunning_loop_leaves_the_core_to_other_threads() {
         }
     }
     let period = Period::of_rate(250.0).unwrap();
-    let mut beat = Beat::start(HeavyTask::default(), period, 0).unwrap();
-    until(|| (*beat.seen() >= 60).then_some(()), || "60 calls".into());
+    let mut beat = RealTimeLoop::start(HeavyTask::default(), period, 0).unwrap();
+    until(|| (*beat.view() >= 60).then_some(()), || "60 calls".into());
     let task = beat.end().unwrap();
     // 10 ms of work and 4 of rest are three and a half ticks of 4 ms; without the rest two and a half.
     let due = task.ticks as f64 / (task.calls - 20) as f64;
@@ -203,7 +205,7 @@ fn missed_ticks_are_counted_and_none_is_lost() {
         calls: u64,
         ticks: u64,
     }
-    impl Ticking for SleepyTask {
+    impl LoopTask for SleepyTask {
         type View = (u64, u64);
         fn tick(&mut self, elapsed: u64) {
             self.calls += 1;
@@ -217,9 +219,9 @@ fn missed_ticks_are_counted_and_none_is_lost() {
         }
     }
     let task = SleepyTask { calls: 0, ticks: 0 };
-    let mut beat = Beat::start(task, Period::MILLISECOND, (0, 0)).unwrap();
-    until(|| (beat.seen().0 >= 200).then_some(()), || "200 calls".into());
-    let kept = beat.kept();
+    let mut beat = RealTimeLoop::start(task, Period::MILLISECOND, (0, 0)).unwrap();
+    until(|| (beat.view().0 >= 200).then_some(()), || "200 calls".into());
+    let kept = beat.timing();
     assert!(beat.is_alive());
     let task = beat.end().unwrap();
     assert!(kept.overruns >= 4 && kept.missed >= 12, "{kept:?}");

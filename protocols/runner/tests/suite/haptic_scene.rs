@@ -3,15 +3,15 @@
 use palpate_haptics::Period;
 use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{
-    DeviceSettings, Hand6, LedScene, Pose, Scene, ScenePath, SceneSettings,
+    DeviceSettings, HandLedScene, HandPose, Pose, Scene, ScenePath, SceneSettings,
 };
 use palpate_runner::haptics::scene::{
     COLUMNS, FRAME_NODES_MAX, SENSED_COLUMNS, SceneFrame, SceneRecorder, SceneRow, SceneTask,
     scene_input, scene_row,
 };
 use palpate_runner::haptics::scene_file::SceneFile;
-use palpate_runner::haptics::{SceneLoop, Stylus, Ticking};
-use palpate_sessions::ticks::{End, Recording};
+use palpate_runner::haptics::{LoopTask, SceneLoop, Stylus};
+use palpate_sessions::ticks::{TickEnd, TickRecording};
 use palpate_test_support::wait::until;
 
 fn scene(settings: SceneSettings) -> Scene {
@@ -23,7 +23,7 @@ fn task(
     settings: SceneSettings,
     path: Option<ScenePath>,
     recorder: Option<SceneRecorder>,
-) -> (SceneTask, triple_buffer::Input<Hand6>) {
+) -> (SceneTask, triple_buffer::Input<HandPose>) {
     let (stylus, pointing) = Stylus::new(settings, (path, 1)).expect("a device");
     let task = SceneTask::new(scene(settings), Box::new(stylus), recorder);
     (task, pointing)
@@ -38,7 +38,7 @@ fn a_tick_of_a_scene_allocates_nothing_while_it_is_recorded() {
     let mut frame = task.first();
     let counted = allocation_counter::measure(|| {
         for tick in 0..6000_u64 {
-            pointing.write(Hand6::default());
+            pointing.write(HandPose::default());
             // Stalls too.
             task.tick(1 + u64::from(tick % 997 == 0) * 20);
             if task.is_shown() {
@@ -108,20 +108,20 @@ fn recorded_loop_is_reproduced_bit_by_bit() {
     }
     assert!(deepest < -5.0, "{deepest}");
     // Then it follows who points.
-    live.point(Hand6 { at: [20.0, 30.0, 5.0], turn: [0.0; 3] });
+    live.point(HandPose { at: [20.0, 30.0, 5.0], turn: [0.0; 3] });
     until(
         || ((live.view().tick.device[0] - 20.0).abs() < 1.0).then_some(()),
         || "the device where the pointer is".into(),
     );
     let end = live.stop().unwrap();
-    assert!(end.kept.work.count > 100);
+    assert!(end.timing.work.count > 100);
     let recorded = end.recorded.unwrap().unwrap();
-    assert_eq!(recorded.lost, 0);
-    let found = Recording::read(&folder, COLUMNS).unwrap();
+    assert_eq!(recorded.lost_ticks, 0);
+    let found = TickRecording::read(&folder, COLUMNS).unwrap();
     assert_eq!(found.rows.len() as u64, recorded.ticks);
-    assert_eq!(found.end, End::Whole { lost: 0, left: end.scene.hash() });
+    assert_eq!(found.end, TickEnd::Whole { lost_ticks: 0, state_hash: end.scene.hash() });
     let differs = |change: fn(usize, &mut SceneRow)| {
-        let mut again = LedScene::new(settings).unwrap();
+        let mut again = HandLedScene::new(settings).unwrap();
         let mut first = None;
         for (index, row) in found.rows.iter().enumerate() {
             let mut row = *row;
@@ -129,7 +129,7 @@ fn recorded_loop_is_reproduced_bit_by_bit() {
             let (hand, elapsed) = scene_input(&row);
             let tick = again.tick_after(hand, elapsed);
             let made = scene_row(hand, elapsed, &tick);
-            first = first.or(made.differs(&row).map(|column| (index, column)));
+            first = first.or(made.first_difference(&row).map(|column| (index, column)));
         }
         (first, again.scene.hash())
     };
@@ -161,18 +161,18 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
 #[test]
 fn stored_recording_is_reproduced_bit_by_bit() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/recordings/scene-poke");
-    let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
+    let found = TickRecording::read(std::path::Path::new(folder), COLUMNS).unwrap();
     let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
-    let mut again = LedScene::new(file.settings(0).unwrap()).unwrap();
+    let mut again = HandLedScene::new(file.settings(0).unwrap()).unwrap();
     assert!(found.rows.len() > 700);
     for row in &found.rows {
         let (hand, elapsed) = scene_input(row);
         let tick = again.tick_after(hand, elapsed);
         let made = scene_row(hand, elapsed, &tick);
-        assert_eq!(row.differs(&made), None, "{row:?} {made:?}");
+        assert_eq!(row.first_difference(&made), None, "{row:?} {made:?}");
     }
     let left = again.scene.hash();
-    assert_eq!(found.end, End::Whole { lost: 0, left });
+    assert_eq!(found.end, TickEnd::Whole { lost_ticks: 0, state_hash: left });
 }
 
 /// A device that is not simulated: its stylus goes where a script says, and it keeps what it was given.
@@ -225,7 +225,7 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     for tick in 1..=3000 {
         task.tick(1);
         let (at, turn) = (pressed(tick), [0.0, -0.5, 0.0]);
-        let outcome = alone.feel(Pose { at, turn }, 1);
+        let outcome = alone.render(Pose { at, turn }, 1);
         let force = given.try_recv().expect("a force in every tick");
         assert_eq!(force, outcome.force, "{tick}");
         assert!(force.iter().all(|part| part.is_finite()));
@@ -237,7 +237,7 @@ fn another_device_takes_the_place_of_the_simulated_one() {
     // Its numbers are those that the scene is guarded by, or there is no scene.
     let stronger = DeviceSettings { force_max_n: 8.0, ..DeviceSettings::default() };
     let (device, _given) = ScriptedDevice::new(pressed);
-    let refused = SceneLoop::on(device, scene(settings.with_device(stronger)), None);
+    let refused = SceneLoop::start_on_device(device, scene(settings.with_device(stronger)), None);
     assert!(refused.unwrap_err().contains("different device"));
 }
 
@@ -248,17 +248,17 @@ fn recording_of_another_device_is_reproduced_from_its_poses() {
     let recorder = SceneRecorder::start(&folder, "", SENSED_COLUMNS).unwrap();
     let settings = SceneSettings::default();
     let (device, _given) = ScriptedDevice::new(pressed);
-    let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
+    let mut live = SceneLoop::start_on_device(device, scene(settings), Some(recorder)).unwrap();
     assert!(live.is_over());
     until(|| (live.view().tick.tick >= 1200).then_some(()), || "1200 ticks".into());
     let end = live.stop().unwrap();
-    let found = Recording::read(&folder, SENSED_COLUMNS).unwrap();
+    let found = TickRecording::read(&folder, SENSED_COLUMNS).unwrap();
     let mut again = scene(settings);
     for row in &found.rows {
-        let (Hand6 { at, turn }, elapsed) = scene_input(row);
-        let tick = again.feel(Pose { at, turn }, elapsed);
-        let made = scene_row(Hand6 { at, turn }, elapsed, &tick);
-        assert_eq!(row.differs(&made), None);
+        let (HandPose { at, turn }, elapsed) = scene_input(row);
+        let tick = again.render(Pose { at, turn }, elapsed);
+        let made = scene_row(HandPose { at, turn }, elapsed, &tick);
+        assert_eq!(row.first_difference(&made), None);
     }
     assert!(again.last().depth > 10.0 && again.hash() == end.scene.hash());
 }

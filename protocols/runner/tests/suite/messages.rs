@@ -1,6 +1,6 @@
 //! The words of what a replay and a programme refuse.
 
-use palpate_runner::programme::{CalibrationSessionError, ProgressError, RunError};
+use palpate_runner::programme::{CalibrationSessionError, ProgrammeRunError, ProgressError};
 use palpate_runner::replay::ReplayError;
 use palpate_test_support::assert_messages;
 
@@ -27,9 +27,9 @@ fn programme_errors_have_their_words() {
         ProgressError::Headless => ["new folder"],
         CalibrationSessionError::NoReadings("s-1".into()) => ["s-1", "load-cell-calibration"],
         incomplete() => ["s-1", "stop"],
-        RunError::Refused { task: task(), reason: "the depth is too great".into() } => ["'ramp'", "the depth is too great"],
-        RunError::Ended { task: task(), repeat: 2, ending: "stop".into(), reason: "by hand".into() } => ["'ramp'", "repeat 2", "stop", "by hand"],
-        RunError::Calibrating { task: task(), source: incomplete() } => ["'ramp'", "s-1"],
-        RunError::NoRunner => ["incomplete"],
+        ProgrammeRunError::Refused { task: task(), reason: "the depth is too great".into() } => ["'ramp'", "the depth is too great"],
+        ProgrammeRunError::Ended { task: task(), repeat: 2, ending: "stop".into(), reason: "by hand".into() } => ["'ramp'", "repeat 2", "stop", "by hand"],
+        ProgrammeRunError::Calibrating { task: task(), source: incomplete() } => ["'ramp'", "s-1"],
+        ProgrammeRunError::NoRunner => ["incomplete"],
     }
 }

@@ -2,13 +2,13 @@
 
 use super::*;
 use crate::plans::{BodyParameter, HoldUntil};
-use palpate_model::estimate::{Identifiability, LiveEstimate, Parameter};
+use palpate_model::estimate::{FittedParameter, Identifiability, LiveEstimate};
 
 /// An answer that knows tau to `relative`, and whether it counts as identified.
-fn answer(relative: f64, is_identified: bool) -> Input {
+fn answer(relative: f64, is_identified: bool) -> EngineInput {
     let half = 1.02 * relative;
-    Input::LiveFit(LiveEstimate {
-        parameters: vec![Parameter {
+    EngineInput::LiveFit(LiveEstimate {
+        parameters: vec![FittedParameter {
             name: "tau_eps".into(),
             value: 1.02,
             unit: "s".into(),
@@ -32,7 +32,7 @@ fn rule(at_least: f64) -> HoldUntil {
 }
 
 /// Whether a hold of 0.2 s with a rule ends at the sample after an answer given at 0.1 s.
-fn ends_early(until: Option<HoldUntil>, input: Input) -> bool {
+fn ends_early(until: Option<HoldUntil>, input: EngineInput) -> bool {
     let mut bench = Bench::holding_until(0.2, until);
     for _ in 0..100 {
         bench.sample(volts(0.0));

@@ -30,13 +30,13 @@ pub struct FindContact {
     /// What the first pass does after its trigger; without it the first pass ends there and contact
     /// is estimated from the second alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub press: Option<Press>,
+    pub press: Option<ContactPress>,
 }
 
 /// The end of a first pass that goes on into the tissue to learn how it answers.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Press {
+pub struct ContactPress {
     /// Filtered force above tare that ends it.
     pub force: Newtons,
     /// Time at that depth, and at the end of the second pass, while the force relaxes.
@@ -48,7 +48,7 @@ impl Default for FindContact {
     /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is eight times slower.
     ///
     /// The press to 0.42 N leaves a sixth of the 0.5 N that contact finding may ever exert to filter and
-    /// brake; the 6 s after it are six relaxation times of pig stomach. Together with the pass to 0.14 N they
+    /// brake; the 6 s after it are six relaxation times of pig stomach. JointFit with the pass to 0.14 N they
     /// give the contact position to 0.02 mm at 0.05 N of noise, with nothing known of the body beforehand; a
     /// pass of its own would give 0.06 mm.
     fn default() -> Self {
@@ -60,12 +60,12 @@ impl Default for FindContact {
             pass_force: Newtons(0.14),
             recovery: Seconds(10.0),
             std_error_mm_max: 0.1,
-            press: Some(Press::default()),
+            press: Some(ContactPress::default()),
         }
     }
 }
 
-impl Default for Press {
+impl Default for ContactPress {
     /// Reasons as for [`FindContact`].
     fn default() -> Self {
         Self { force: Newtons(0.42), dwell: Seconds(6.0) }
@@ -75,26 +75,26 @@ impl Default for Press {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Find the surface of the tissue and stop there. Depths count from it.",
     keys: &[
-        Key::optional("speed", Kind::Speed, "of the first pass"),
-        Key::optional("criterion", Kind::Force, "force that ends the first pass"),
-        Key::optional("retreat", Kind::Length, "retract before the second pass"),
-        Key::optional("pass_speed", Kind::Speed, "of the second pass"),
-        Key::optional("pass_force", Kind::Force, "force that ends the second pass"),
-        Key::optional("recovery", Kind::Time, "rest after each pass").zero_allowed(),
+        Key::optional("speed", QuantityKind::Speed, "of the first pass"),
+        Key::optional("criterion", QuantityKind::Force, "force that ends the first pass"),
+        Key::optional("retreat", QuantityKind::Length, "retract before the second pass"),
+        Key::optional("pass_speed", QuantityKind::Speed, "of the second pass"),
+        Key::optional("pass_force", QuantityKind::Force, "force that ends the second pass"),
+        Key::optional("recovery", QuantityKind::Time, "rest after each pass").zero_allowed(),
         Key::optional(
             "std_error_max",
-            Kind::Length,
+            QuantityKind::Length,
             "widest accepted standard error of the position found",
         ),
         Key::optional(
             "press_force",
-            Kind::Force,
+            QuantityKind::Force,
             "force to which the first pass goes on to learn how the tissue answers; `0 N` ends it at the criterion",
         )
         .zero_allowed(),
         Key::optional(
             "press_dwell",
-            Kind::Time,
+            QuantityKind::Time,
             "time at the end of each pass while the force relaxes",
         )
         .zero_allowed(),
@@ -120,10 +120,11 @@ fn read(args: &Args) -> Result<Step, String> {
     ] {
         *field = args.maybe(name).unwrap_or(*field);
     }
-    let usual = Press::default();
+    let usual = ContactPress::default();
     let force = args.maybe("press_force").unwrap_or(usual.force.0);
     let dwell = args.maybe("press_dwell").unwrap_or(usual.dwell.0);
-    search.press = (force > 0.0).then_some(Press { force: Newtons(force), dwell: Seconds(dwell) });
+    search.press =
+        (force > 0.0).then_some(ContactPress { force: Newtons(force), dwell: Seconds(dwell) });
     Ok(search.into())
 }
 
@@ -149,7 +150,7 @@ fn usual_search() -> String {
 /// Contact finding never exerts more than 0.5 N; filter and brake need a sixth of it.
 const PRESS_MAX: Newtons = Newtons(0.42);
 
-impl Press {
+impl ContactPress {
     fn check(&self, walk: &mut Walk<'_>) {
         walk.check_span(self.dwell);
         let most = walk.limits.force_max;

@@ -7,7 +7,7 @@
 use super::FindContact;
 use super::noise::{above_noise, check_drift, second_touch_error};
 use super::touch_log::{ForceUse, TouchLog};
-use crate::engine::{Contact, NOT_TARED};
+use crate::engine::{ContactPosition, NOT_TARED};
 use crate::steps::prelude::*;
 use palpate_model::signal::{ContactEstimate, ContactPoint, TouchEstimate, fit_contact, fit_touch};
 use std::collections::VecDeque;
@@ -59,8 +59,8 @@ enum Stage {
     SlowPass,
     SlowBraking,
     SlowDwell,
-    Clear(Contact),
-    Rest(Contact),
+    Clear(ContactPosition),
+    Rest(ContactPosition),
     ToZero,
 }
 
@@ -219,7 +219,7 @@ impl ContactSearch {
             }
             Stage::Rest(found) if is_over => {
                 cx.set_contact(Some(found));
-                let Contact { position, std_error_mm } = found;
+                let ContactPosition { position, std_error_mm } = found;
                 cx.record(Record::ContactFound { position, std_error_mm });
                 cx.move_to(Depth(0.0).position_from(position), self.plan.pass_speed)?;
                 self.stage = Stage::ToZero;
@@ -373,13 +373,13 @@ impl ContactSearch {
         Ok(found)
     }
 
-    fn estimate(&self) -> Result<Contact, String> {
+    fn estimate(&self) -> Result<ContactPosition, String> {
         let limit = self.plan.std_error_mm_max;
         let found = match self.plan.press {
             Some(_) => {
-                let TouchEstimate { contact, apart_mm } = self.fit()?;
+                let TouchEstimate { contact, separation_mm } = self.fit()?;
                 // Half of the distance is an error of the position.
-                if let Some(apart) = apart_mm.filter(|apart| apart.abs() > 2.0 * limit) {
+                if let Some(apart) = separation_mm.filter(|apart| apart.abs() > 2.0 * limit) {
                     let way = if apart > 0.0 { "after" } else { "before" };
                     return Err(format!(
                         "the second touch met the tissue {:.2} mm {way} where the first did; check that the specimen is held and let it rest longer",
@@ -396,7 +396,7 @@ impl ContactSearch {
                 found.std_error_mm
             ));
         }
-        Ok(Contact { position: found.position, std_error_mm: found.std_error_mm })
+        Ok(ContactPosition { position: found.position, std_error_mm: found.std_error_mm })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::engine::BlockMean;
 use palpate_model::rig::RigDescription;
-use palpate_model::signal::TouchPoint;
+use palpate_model::signal::ContactSearchPoint;
 use palpate_model::units::{Newtons, Position, Seconds};
 
 /// Milliseconds averaged into one point: 50 points a second, in which the fastest approach goes 0.03 mm.
@@ -18,7 +18,7 @@ pub(super) struct TouchLog {
     /// Time in s, position in mm and force in N of the point in progress.
     point: BlockMean<3>,
     is_uncounted: bool,
-    points: Vec<TouchPoint>,
+    points: Vec<ContactSearchPoint>,
 }
 
 /// Whether the force of a millisecond says something about the tissue.
@@ -50,13 +50,13 @@ impl TouchLog {
             return;
         };
         let force = (!std::mem::take(&mut self.is_uncounted)).then_some(Newtons(force));
-        self.points.push(TouchPoint { t: Seconds(t), position: Position(position), force });
+        self.points.push(ContactSearchPoint { t: Seconds(t), position: Position(position), force });
         if counts == ForceUse::Lead && self.points.len() >= 2 * LEAD_POINTS {
             self.points.drain(..LEAD_POINTS);
         }
     }
 
-    pub fn points(&self) -> &[TouchPoint] {
+    pub fn points(&self) -> &[ContactSearchPoint] {
         &self.points
     }
 }

@@ -1,7 +1,7 @@
 //! Atomic writing of exports.
 
 use super::ExportError;
-use palpate_sessions::atomic::{Draft, Existing};
+use palpate_sessions::atomic::{Draft, ExistingFile};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
@@ -31,7 +31,7 @@ pub(super) fn write<T>(
 ) -> Result<T, ExportError> {
     check_new(path)?;
     let (draft, value) = fill_draft(path, fill)?;
-    match draft.persist(Existing::Keep) {
+    match draft.persist(ExistingFile::Keep) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {
             Err(ExportError::Exists { path: path.into() })
         }
@@ -46,7 +46,7 @@ pub(crate) fn write_or_same(
 ) -> Result<WriteOutcome, ExportError> {
     let (draft, ()) = fill_draft(path, fill)?;
     let written = File::open(draft.hidden_path()).map_err(io_error(path))?;
-    match draft.persist(Existing::Keep) {
+    match draft.persist(ExistingFile::Keep) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {}
         outcome => return outcome.map(|()| WriteOutcome::Written).map_err(io_error(path)),
     }

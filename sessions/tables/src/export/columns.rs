@@ -1,7 +1,7 @@
 //! The columns of tables of samples: names, meanings and values.
 
 use palpate_sessions::manifest::Manifest;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, PrimitiveArray};
 use polars_core::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
 use polars_core::prelude::{Series, StringChunked};
@@ -24,7 +24,7 @@ enum Field {
     Status,
     Age,
     AgeWithin,
-    /// A column of [`Beside`], by index.
+    /// A column of [`ExtraColumns`], by index.
     Extra(usize),
     /// Number of the sample in a thinned table.
     EveryNth,
@@ -71,7 +71,7 @@ const MORE: [Field; 8] = [
 
 /// Columns in addition to the session's own, such as corrected depths.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Beside {
+pub struct ExtraColumns {
     /// Name, unit and one value per sample, `None` where unknown.
     pub columns: Vec<(&'static str, &'static str, Vec<Option<f64>>)>,
     /// Entries of the file's metadata that explain them.
@@ -166,21 +166,21 @@ impl Field {
 /// The columns of one table, and values that are the same in every row.
 pub(super) struct Layout<'a> {
     pub columns: Vec<ColumnInfo>,
-    extra: &'a Beside,
+    extra: &'a ExtraColumns,
     manifest: &'a Manifest,
 }
 
-/// Selected samples: their numbers in the session, and their rows.
+/// SelectionReport samples: their numbers in the session, and their rows.
 #[derive(Clone, Copy)]
 pub(super) struct Samples<'a> {
     pub numbers: &'a [u64],
-    pub rows: &'a [Row],
+    pub rows: &'a [SampleRow],
     /// Tick of the session's first sample.
     pub first_tick: u64,
 }
 
 /// Time of a sample in s. After a restart of the controller, which counts from zero again, the time is negative.
-pub(super) fn time_of(manifest: &Manifest, row: &Row, first_tick: u64) -> f64 {
+pub(super) fn time_of(manifest: &Manifest, row: &SampleRow, first_tick: u64) -> f64 {
     manifest.time_of(row.tick.wrapping_sub(first_tick) as i64).0
 }
 
@@ -189,7 +189,7 @@ impl<'a> Layout<'a> {
     /// the numbers of its samples.
     pub fn new(
         manifest: &'a Manifest,
-        extra: &'a Beside,
+        extra: &'a ExtraColumns,
         names: &[String],
         every: u64,
     ) -> Result<Self, String> {

@@ -1,7 +1,7 @@
 //! The data dictionary beside a table.
 
 use super::columns::ColumnInfo;
-use super::select::Selection;
+use super::select::SampleSelection;
 use palpate_sessions::manifest::Manifest;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub(super) fn dictionary(
     manifest: &Manifest,
     notes: &[String],
     columns: &[ColumnInfo],
-    selection: &Selection,
+    selection: &SampleSelection,
 ) -> String {
     let name = table.file_name().unwrap_or(table.as_os_str());
     let mut lines = vec![

@@ -11,7 +11,7 @@ use std::io::Write;
 use std::sync::Arc;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub enum TableFormat {
     /// Text with a header (RFC 4180) and this delimiter: decimal point, shortest digits that read back to the same number,
     /// empty cells for missing values. A text that a spreadsheet would take for a formula begins with `'`.
     Csv(u8),
@@ -20,7 +20,7 @@ pub enum Format {
     Arrow,
 }
 
-impl Format {
+impl TableFormat {
     #[must_use]
     pub fn ending(self) -> &'static str {
         match self {
@@ -43,19 +43,21 @@ pub(crate) enum Encoder<W: Write> {
 impl<W: Write> Encoder<W> {
     /// Begins a table with frames like `empty`. CSV has no metadata.
     pub fn new(
-        format: Format,
+        format: TableFormat,
         file: W,
         empty: &DataFrame,
         metadata: Metadata,
     ) -> PolarsResult<Self> {
         Ok(match format {
-            Format::Csv(delimiter) => {
+            TableFormat::Csv(delimiter) => {
                 let writer = CsvWriter::new(file).with_separator(delimiter);
                 let empty = escape_frame(empty.clone())?;
                 Self::Csv(writer.batched(empty.schema())?)
             }
-            Format::Parquet => Self::Parquet(Box::new(ParquetFile::new(file, empty)?), metadata),
-            Format::Arrow => {
+            TableFormat::Parquet => {
+                Self::Parquet(Box::new(ParquetFile::new(file, empty)?), metadata)
+            }
+            TableFormat::Arrow => {
                 let schema = empty.schema().to_arrow(CompatLevel::oldest());
                 let options = WriteOptions { compression: None };
                 let mut writer = FileWriter::new(file, Arc::new(schema), None, options);

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 /// Puts `'` before a text that begins with `=`, `+`, `-`, `@`, a tab or a carriage return, which spreadsheets run as a
 /// formula (OWASP, "CSV injection").
 #[must_use]
-pub fn harmless(text: &str) -> Cow<'_, str> {
+pub fn escape_formula(text: &str) -> Cow<'_, str> {
     match text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         true => format!("'{text}").into(),
         false => text.into(),
@@ -18,10 +18,10 @@ pub(super) fn escape_frame(frame: DataFrame) -> PolarsResult<DataFrame> {
     let height = frame.height();
     let columns = frame.columns().iter().map(|column| {
         let mut column = match column.dtype() {
-            DataType::String => column.str()?.apply_values(harmless).into_column(),
+            DataType::String => column.str()?.apply_values(escape_formula).into_column(),
             _ => column.clone(),
         };
-        let name = harmless(column.name()).into_owned();
+        let name = escape_formula(column.name()).into_owned();
         column.rename(name.into());
         Ok(column)
     });

@@ -1,9 +1,9 @@
 //! Export of a session's samples as an MCAP file with one message each, for programs such as Foxglove and PlotJuggler. The
 //! file is not a session, because it has no entries.
 
-use super::{ExportError, Feed, Table, atomic};
+use super::{ExportError, RowFeed, TableExport, atomic};
 use mcap::records::{MessageHeader, Metadata};
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use palpate_sessions::schema::{SAMPLE_TOPIC, sample_metadata, sample_schema};
 use prost::Message;
 use std::io::{self, Seek, Write};
@@ -35,10 +35,10 @@ struct Sample {
     sample: u64,
 }
 
-impl Table<'_> {
+impl TableExport<'_> {
     /// Writes the selected samples as messages into a new file; returns their number. At most one chunk is in memory. The
     /// selection of columns and the extra columns are ignored.
-    pub fn write_messages(&self, path: &Path, feed: Feed) -> Result<u64, ExportError> {
+    pub fn write_messages(&self, path: &Path, feed: RowFeed) -> Result<u64, ExportError> {
         atomic::write(path, |file| {
             let mut writing = MessageWriter::begin(self, file).map_err(failed(path))?;
             feed(&mut |rows| rows.iter().for_each(|row| writing.take(row)))?;
@@ -58,7 +58,7 @@ fn failed(path: &Path) -> impl Fn(mcap::McapError) -> ExportError {
 }
 
 struct MessageWriter<'a, W: Write + Seek> {
-    table: &'a Table<'a>,
+    table: &'a TableExport<'a>,
     container: mcap::Writer<W>,
     channel_id: u16,
     started_ns: u64,
@@ -72,7 +72,7 @@ struct MessageWriter<'a, W: Write + Seek> {
 }
 
 impl<'a, W: Write + Seek> MessageWriter<'a, W> {
-    fn begin(table: &'a Table<'a>, file: W) -> mcap::McapResult<Self> {
+    fn begin(table: &'a TableExport<'a>, file: W) -> mcap::McapResult<Self> {
         let manifest = table.manifest;
         let mut container = mcap::WriteOptions::new()
             .library(format!("palpate {}", manifest.software_version))
@@ -110,7 +110,7 @@ impl<'a, W: Write + Seek> MessageWriter<'a, W> {
         })
     }
 
-    fn take(&mut self, row: &Row) {
+    fn take(&mut self, row: &SampleRow) {
         let first_tick = *self.first_tick.get_or_insert(row.tick);
         // As in a table: a controller that restarted counts from zero again.
         let ticks = row.tick.wrapping_sub(first_tick) as i64;
@@ -125,7 +125,7 @@ impl<'a, W: Write + Seek> MessageWriter<'a, W> {
         self.selected += 1;
     }
 
-    fn put(&mut self, sample: u64, t_s: f64, row: &Row) -> mcap::McapResult<()> {
+    fn put(&mut self, sample: u64, t_s: f64, row: &SampleRow) -> mcap::McapResult<()> {
         let message = Sample {
             t_s,
             depth_mm: row.depth,

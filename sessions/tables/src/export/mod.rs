@@ -11,18 +11,18 @@ mod row_group;
 mod select;
 
 pub use atomic::WriteOutcome;
-pub use columns::Beside;
+pub use columns::ExtraColumns;
 pub use dictionary::dictionary_path;
 pub(crate) use encode::Encoder;
-pub use encode::Format;
-pub use formula::harmless;
-pub use select::Selection;
+pub use encode::TableFormat;
+pub use formula::escape_formula;
+pub use select::SampleSelection;
 
 use columns::{Cells, Layout, Samples, time_of};
 use encode::Metadata;
 use palpate_sessions::log::ReadError;
 use palpate_sessions::manifest::Manifest;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use palpate_sessions::text::sha256;
 use polars_core::prelude::{PolarsError, PolarsResult};
 use std::io::{self, Write};
@@ -60,18 +60,18 @@ pub enum ExportError {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Table<'a> {
+pub struct TableExport<'a> {
     pub manifest: &'a Manifest,
     /// Remarks for users of the data.
     pub notes: &'a [String],
-    pub beside: &'a Beside,
-    pub selection: &'a Selection,
+    pub extra: &'a ExtraColumns,
+    pub selection: &'a SampleSelection,
 }
 
 /// Passes every sample of a session in order, some at a time, to its argument.
-pub type Feed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&[Row])) -> Result<(), ReadError>;
+pub type RowFeed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&[SampleRow])) -> Result<(), ReadError>;
 
-impl Table<'_> {
+impl TableExport<'_> {
     /// Writes the table and, beside it, its data dictionary ([`dictionary_path`]), both as new files; returns the number of
     /// rows. At most one frame of samples is in memory.
     ///
@@ -79,7 +79,12 @@ impl Table<'_> {
     /// (`palpate.session`, `palpate.software`, `palpate.record_version`, `palpate.calibration_sha256`), the specimen
     /// (`palpate.specimen`, `palpate.about`, a JSON object), the content (`palpate.table_version`, `palpate.selection`, a JSON
     /// object), remarks (`palpate.notes`, a JSON list of sentences), and the metadata of the extra columns.
-    pub fn write(&self, format: Format, path: &Path, feed: Feed) -> Result<u64, ExportError> {
+    pub fn write(
+        &self,
+        format: TableFormat,
+        path: &Path,
+        feed: RowFeed,
+    ) -> Result<u64, ExportError> {
         let layout = self.layout()?;
         let dictionary = dictionary_path(path);
         atomic::check_new(&dictionary)?;
@@ -101,26 +106,26 @@ impl Table<'_> {
     pub(crate) fn write_to_lake(
         &self,
         path: &Path,
-        feed: Feed,
+        feed: RowFeed,
     ) -> Result<WriteOutcome, ExportError> {
         let layout = self.layout()?;
         atomic::write_or_same(path, |file| {
-            self.encode(&layout, Format::Parquet, path, file, feed).map(|_rows| ())
+            self.encode(&layout, TableFormat::Parquet, path, file, feed).map(|_rows| ())
         })
     }
 
     fn layout(&self) -> Result<Layout<'_>, ExportError> {
         let (columns, every) = (&self.selection.columns, self.selection.step());
-        Layout::new(self.manifest, self.beside, columns, every).map_err(ExportError::Columns)
+        Layout::new(self.manifest, self.extra, columns, every).map_err(ExportError::Columns)
     }
 
     fn encode(
         &self,
         layout: &Layout,
-        format: Format,
+        format: TableFormat,
         path: &Path,
         file: impl Write,
-        feed: Feed,
+        feed: RowFeed,
     ) -> Result<u64, ExportError> {
         let failed = |source| ExportError::Table { path: path.to_owned(), source };
         let mut writer = TableWriter::new(self, layout, format, file).map_err(failed)?;
@@ -148,17 +153,17 @@ impl Table<'_> {
             pairs.push(("calibration_sha256", hash));
         }
         let own = pairs.into_iter().map(|(key, text)| (format!("palpate.{key}"), text));
-        own.chain(self.beside.metadata.iter().cloned()).collect()
+        own.chain(self.extra.metadata.iter().cloned()).collect()
     }
 }
 
 struct TableWriter<'a, W: Write> {
-    table: &'a Table<'a>,
+    table: &'a TableExport<'a>,
     layout: &'a Layout<'a>,
     encoder: Encoder<W>,
     /// The selected ones of the present samples.
     numbers: Vec<u64>,
-    rows: Vec<Row>,
+    rows: Vec<SampleRow>,
     frame: Vec<Cells>,
     frame_rows: usize,
     /// Samples seen so far, those selected of them, and those written.
@@ -172,9 +177,9 @@ struct TableWriter<'a, W: Write> {
 
 impl<'a, W: Write> TableWriter<'a, W> {
     fn new(
-        table: &'a Table<'a>,
+        table: &'a TableExport<'a>,
         layout: &'a Layout<'a>,
-        format: Format,
+        format: TableFormat,
         file: W,
     ) -> PolarsResult<Self> {
         let empty = layout.frame(layout.empty_cells(0), 0)?;
@@ -195,7 +200,7 @@ impl<'a, W: Write> TableWriter<'a, W> {
         })
     }
 
-    fn take(&mut self, mut rows: &[Row]) {
+    fn take(&mut self, mut rows: &[SampleRow]) {
         let Some(first) = rows.first() else {
             return;
         };
@@ -218,13 +223,13 @@ impl<'a, W: Write> TableWriter<'a, W> {
         }
     }
 
-    fn select(&mut self, rows: &[Row], first_tick: u64) {
+    fn select(&mut self, rows: &[SampleRow], first_tick: u64) {
         let first = self.seen;
         self.seen += rows.len() as u64;
         self.numbers.clear();
         self.rows.clear();
         let selection = self.table.selection;
-        if !selection.is_part() {
+        if !selection.is_partial() {
             self.numbers.extend(first..self.seen);
             return;
         }

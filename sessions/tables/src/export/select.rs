@@ -1,12 +1,12 @@
 //! Selection of samples and columns.
 
 use palpate_model::rig::Phase;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use serde::Serialize;
 
 /// The default is all samples and the default columns.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Selection {
+pub struct SampleSelection {
     /// Empty for all.
     pub phases: Vec<Phase>,
     /// Empty for all.
@@ -30,9 +30,9 @@ struct SelectionJson<'a> {
     every: u64,
 }
 
-impl Selection {
+impl SampleSelection {
     /// Whether a sample at time `t` in s is selected, apart from [`Self::every`].
-    pub(super) fn takes(&self, t: f64, row: &Row) -> bool {
+    pub(super) fn takes(&self, t: f64, row: &SampleRow) -> bool {
         (self.phases.is_empty() || self.phases.contains(&row.phase))
             && (self.cycles.is_empty() || self.cycles.contains(&row.cycle))
             && self.from_s.is_none_or(|from| t >= from)
@@ -40,7 +40,7 @@ impl Selection {
     }
 
     /// Whether some samples are left out.
-    pub fn is_part(&self) -> bool {
+    pub fn is_partial(&self) -> bool {
         let all = Self { columns: self.columns.clone(), ..Self::default() };
         *self != all
     }

@@ -8,9 +8,9 @@ mod truncated;
 mod weights;
 
 pub use foreign::{
-    ColumnChoice, Decimal, Delimiter, Fault, Foreign, ForeignError, ForeignPart, ForeignSample,
-    Format, KeepError, Kept, TextEncoding, Told, UnitChoice, ZeroChoice, folder_name, keep,
-    open_foreign, parse_foreign,
+    ColumnChoice, DecimalSign, Delimiter, ForeignError, ForeignFile, ForeignFormat, ForeignPart,
+    ForeignSample, ImportOptions, ImportTarget, RowFault, StoreImportError, TextEncoding,
+    UnitChoice, ZeroChoice, folder_name, open_foreign, parse_foreign, store_import,
 };
-pub use table::{ColumnNames, Table, TableError, parse_table, read_table};
+pub use table::{ColumnNames, MeasurementTable, TableError, parse_table, read_table};
 pub use weights::{WeightsError, parse_weights, read_weights};

@@ -13,7 +13,7 @@ const BYTES_MAX: u64 = 1 << 30;
 
 /// Time, depth and force of a table, one element per row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct MeasurementTable {
     /// Time in s.
     pub t: Vec<f64>,
     /// Depth in mm.
@@ -51,7 +51,10 @@ impl std::str::FromStr for ColumnNames {
 }
 
 /// `columns` names the columns of a table without a header.
-pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, TableError> {
+pub fn read_table(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+) -> Result<MeasurementTable, TableError> {
     let io_error = |source: io::Error| TableError::Io { path: path.to_owned(), source };
     let not_text =
         |reason: &str| TableError::NotText { path: path.to_owned(), reason: reason.into() };
@@ -69,7 +72,7 @@ pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, T
 }
 
 /// Like [`read_table`], from text; the error is one sentence.
-pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, String> {
+pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<MeasurementTable, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text
         .lines()
@@ -104,7 +107,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
             return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or separately".into());
         }
     };
-    let mut table = Table::default();
+    let mut table = MeasurementTable::default();
     table.notes.extend(layout.note.clone());
     let mut left_out = 0usize;
     for (number, line) in lines {

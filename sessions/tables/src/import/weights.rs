@@ -1,8 +1,10 @@
 //! Tables of weights and voltages for a calibration, as written by hand.
 
 use super::cells::{delimiter_of, split};
-use super::foreign::decimal::{self, Decimal, Evidence};
-use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, Direction, Series, SeriesStep};
+use super::foreign::decimal::{self, DecimalSign, Evidence};
+use palpate_model::calibration::{
+    CALIBRATION_FORMAT, Calibration, CalibrationSeries, Direction, SeriesStep,
+};
 use palpate_model::units::Volts;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -149,7 +151,7 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
 fn detect_decimal(
     table: &[(usize, Vec<String>)],
     reals: &[Option<usize>],
-) -> Result<Decimal, WeightsError> {
+) -> Result<DecimalSign, WeightsError> {
     let cells = table.iter().flat_map(|(line, cells)| {
         let own = reals.iter().filter_map(|place| cells.get((*place)?));
         own.map(|cell| (*line, cell))
@@ -158,15 +160,15 @@ fn detect_decimal(
         cell.contains(',') && decimal::evidence(cell) != Evidence::None
     };
     let Some((line, cell)) = cells.clone().find(with_comma) else {
-        return Ok(Decimal::Point);
+        return Ok(DecimalSign::Point);
     };
     let has = |sign| {
         let only = Evidence::Only(sign);
         cells.clone().any(|(_, cell)| decimal::evidence(cell) == only)
     };
-    match (has(Decimal::Point), has(Decimal::Comma)) {
-        (true, false) => Ok(Decimal::Point),
-        (false, true) => Ok(Decimal::Comma),
+    match (has(DecimalSign::Point), has(DecimalSign::Comma)) {
+        (true, false) => Ok(DecimalSign::Point),
+        (false, true) => Ok(DecimalSign::Comma),
         _ => Err(WeightsError::Comma { line, cell: cell.clone() }),
     }
 }
@@ -176,8 +178,8 @@ fn wrong(line: usize, column: &'static str, cell: &str, expected: &'static str) 
 }
 
 /// Groups rows into series: a new one begins where direction or repeat changes, or where the masses restart.
-fn group_series(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
-    let mut series: Vec<Series> = Vec::new();
+fn group_series(rows: Vec<Row>) -> Result<Vec<CalibrationSeries>, WeightsError> {
+    let mut series: Vec<CalibrationSeries> = Vec::new();
     for row in rows {
         let direction = row.direction.unwrap_or(Direction::Loading);
         let mass = row.step.mass_g;
@@ -204,7 +206,7 @@ fn group_series(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
         if !goes_on {
             let before = series.iter().filter(|one| one.direction == direction).count();
             let number = u32::try_from(before + 1).unwrap_or(u32::MAX);
-            series.push(Series {
+            series.push(CalibrationSeries {
                 direction,
                 repeat: row.repeat.unwrap_or(number),
                 steps: Vec::new(),
@@ -222,7 +224,8 @@ mod tests {
     use super::*;
 
     fn shape(calibration: &Calibration) -> Vec<(Direction, u32, usize)> {
-        let one = |series: &Series| (series.direction, series.repeat, series.steps.len());
+        let one =
+            |series: &CalibrationSeries| (series.direction, series.repeat, series.steps.len());
         calibration.series.iter().map(one).collect()
     }
 

@@ -39,7 +39,7 @@ impl FitFile<'_> {
 }
 
 /// Refuses a fit with other settings, because files of a lake never change.
-pub fn state_of_fit(file: &FitFile) -> Result<FitState, ExportError> {
+pub fn find_fit(file: &FitFile) -> Result<FitState, ExportError> {
     let path = file.path();
     if !path.exists() {
         return Ok(FitState::Missing);
@@ -54,7 +54,7 @@ pub fn state_of_fit(file: &FitFile) -> Result<FitState, ExportError> {
 }
 
 /// Stores a fit as a JSON object with `session_id`, `model`, `settings`, `settings_sha256` and `fit`.
-pub fn keep_fit(file: &FitFile, fit: &impl serde::Serialize) -> Result<WriteOutcome, ExportError> {
+pub fn store_fit(file: &FitFile, fit: &impl serde::Serialize) -> Result<WriteOutcome, ExportError> {
     let id = file.session_id;
     if !is_file_name(id) {
         return Err(ExportError::BadName { name: id.into() });

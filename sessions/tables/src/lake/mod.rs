@@ -19,7 +19,7 @@ mod read;
 mod rows;
 mod write;
 
-pub use fits::{FitFile, FitState, keep_fit, state_of_fit};
+pub use fits::{FitFile, FitState, find_fit, store_fit};
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
-pub use read::{InLake, LakeError, read_session, sessions};
-pub use write::{Added, Told, add};
+pub use read::{LakeError, LakeSession, list_sessions, read_session};
+pub use write::{LakeAddition, LakeQuality, add_session};

@@ -7,7 +7,7 @@ use super::write::kind_name;
 use palpate_model::Nanos;
 use palpate_sessions::log::Session;
 use palpate_sessions::manifest::{Manifest, RECORD_VERSION};
-use palpate_sessions::record::{Entry, EntryKind};
+use palpate_sessions::record::{EntryKind, LogEntry};
 use palpate_sessions::text::crc32_of;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 use polars_io::prelude::{ParquetReader, SerReader};
@@ -30,14 +30,14 @@ pub enum LakeError {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct InLake {
+pub struct LakeSession {
     pub id: String,
     /// Folder below the folder of each part.
     partition: PathBuf,
 }
 
 /// All sessions of a lake, by name. Files being written are not listed.
-pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
+pub fn list_sessions(lake: &Path) -> Result<Vec<LakeSession>, LakeError> {
     if !is_lake(lake) {
         return Err(LakeError::NoLake { path: lake.into() });
     }
@@ -56,19 +56,20 @@ pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
         let id = id.and_then(|name| name.strip_suffix(".parquet"));
         let partition = file.path().parent();
         let partition = partition.and_then(|folder| folder.strip_prefix(&top).ok());
-        found.extend(
-            id.zip(partition).map(|(id, partition)| InLake {
-                id: id.to_owned(),
-                partition: partition.to_owned(),
-            }),
-        );
+        found.extend(id.zip(partition).map(|(id, partition)| LakeSession {
+            id: id.to_owned(),
+            partition: partition.to_owned(),
+        }));
     }
     found.sort();
     Ok(found)
 }
 
 /// A session as it was added, with its edits applied; and the reason if it was rejected.
-pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String>), LakeError> {
+pub fn read_session(
+    lake: &Path,
+    one: &LakeSession,
+) -> Result<(Session, Option<String>), LakeError> {
     let path = |of| {
         let folder = part_folder(lake, of).join(&one.partition);
         folder.join(format!("{}.parquet", one.id))
@@ -99,7 +100,7 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         end: session.end.take(),
         notes: session.notes,
         // A lake has no raw bytes and no health messages.
-        beside: palpate_sessions::log::Beside::default(),
+        auxiliary: palpate_sessions::log::AuxiliaryData::default(),
     };
     Ok((session, rejection))
 }
@@ -148,7 +149,7 @@ fn session_of(frame: &DataFrame) -> PolarsResult<(Manifest, StoredOutline, Optio
     Ok((manifest, about, is_rejected.then_some(reason)))
 }
 
-fn entries(frame: &DataFrame) -> PolarsResult<Vec<Entry>> {
+fn entries(frame: &DataFrame) -> PolarsResult<Vec<LogEntry>> {
     let (kind, body) = (frame.column("kind")?.str()?, frame.column("body")?.str()?);
     let number = |name: &str| frame.column(name)?.u64();
     let (order, now) = (number("order")?, number("now_ns")?);
@@ -160,7 +161,7 @@ fn entries(frame: &DataFrame) -> PolarsResult<Vec<Entry>> {
         let kind = kind.get(index).unwrap_or_default();
         let kinds = [EntryKind::Input, EntryKind::Decision, EntryKind::Fit];
         let found = kinds.into_iter().find(|known| kind_name(*known) == kind);
-        Ok(Entry {
+        Ok(LogEntry {
             kind: found.ok_or_else(|| bad(format!("kind {kind:?} is unknown")))?,
             order: value(order)?,
             after_sample: value(after)?,

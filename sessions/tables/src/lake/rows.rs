@@ -2,10 +2,10 @@
 
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 
-/// Columns of the samples: everything in a [`Row`] except the age.
+/// Columns of the samples: everything in a [`SampleRow`] except the age.
 pub(super) const SAMPLE_COLUMNS: [&str; 12] = [
     "session_id",
     "t_s",
@@ -25,7 +25,7 @@ fn missing(what: &str) -> PolarsError {
     PolarsError::ComputeError(format!("a row has no {what}").into())
 }
 
-pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
+pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<SampleRow>> {
     let column = |name: &str| frame.column(name);
     let (tick, host) = (column("tick")?.u64()?, column("host_ns")?.u64()?);
     let (counts, volts) = (column("counts")?.i32()?, column("signal_V")?.f64()?);
@@ -42,7 +42,7 @@ pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
         let ((((counts, volts), pulses), force), depth) = optional;
         let phase = phase.ok_or_else(|| missing("phase"))?;
         let found = Phase::ALL.iter().find(|known| known.name() == phase);
-        rows.push(Row {
+        rows.push(SampleRow {
             tick: tick.ok_or_else(|| missing("tick"))?,
             host: Nanos(host.ok_or_else(|| missing("host_ns"))?),
             age: None,
@@ -58,7 +58,7 @@ pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
             cycle: cycle.ok_or_else(|| missing("cycle"))?,
         });
     }
-    match rows.iter().find_map(Row::non_finite) {
+    match rows.iter().find_map(SampleRow::non_finite) {
         Some(what) => {
             Err(PolarsError::ComputeError(format!("the {what} of a sample is not a number").into()))
         }

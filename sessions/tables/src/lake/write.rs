@@ -4,10 +4,13 @@ use super::checksums::Checksums;
 use super::layout::{LAKE_VERSION, LakePart, is_file_name, part_folder, partition};
 use super::rows::SAMPLE_COLUMNS;
 use crate::export::atomic::{io_error, write_or_same};
-use crate::export::{Beside, Encoder, ExportError, Feed, Format, Selection, Table, WriteOutcome};
-use palpate_sessions::edits::Verdict;
-use palpate_sessions::log::Outline;
-use palpate_sessions::record::{Entry, EntryKind};
+use crate::export::{
+    Encoder, ExportError, ExtraColumns, RowFeed, SampleSelection, TableExport, TableFormat,
+    WriteOutcome,
+};
+use palpate_sessions::edits::DataQuality;
+use palpate_sessions::log::SessionOutline;
+use palpate_sessions::record::{EntryKind, LogEntry};
 use palpate_sessions::text::sha256;
 use polars_core::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
@@ -17,25 +20,25 @@ use std::path::{Path, PathBuf};
 
 /// The quality of a session, from its edits.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Told<'a> {
+pub struct LakeQuality<'a> {
     /// With author and reason.
-    pub verdict: Option<(Verdict, &'a str)>,
+    pub quality: Option<(DataQuality, &'a str)>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Added {
+pub struct LakeAddition {
     pub samples: PathBuf,
     /// Whether all files existed with the same content.
     pub was_there: bool,
 }
 
-/// Adds a session to a lake. Existing files must have the same content.
-pub fn add(
+/// Adds a session to a lake. ExistingFile files must have the same content.
+pub fn add_session(
     lake: &Path,
-    outline: &Outline,
-    quality: Told,
-    feed: Feed,
-) -> Result<Added, ExportError> {
+    outline: &SessionOutline,
+    quality: LakeQuality,
+    feed: RowFeed,
+) -> Result<LakeAddition, ExportError> {
     let manifest = &outline.manifest;
     let id = &manifest.session_id;
     if !is_file_name(id) {
@@ -48,16 +51,16 @@ pub fn add(
         Ok(folder.join(format!("{id}.parquet")))
     };
     let samples = place(LakePart::Samples)?;
-    let table = Table {
+    let table = TableExport {
         manifest,
         notes: &outline.notes,
-        beside: &Beside {
+        extra: &ExtraColumns {
             columns: Vec::new(),
             metadata: vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())],
         },
-        selection: &Selection {
+        selection: &SampleSelection {
             columns: SAMPLE_COLUMNS.map(String::from).into(),
-            ..Selection::default()
+            ..SampleSelection::default()
         },
     };
     let mut outcomes = vec![table.write_to_lake(&samples, feed)?];
@@ -68,7 +71,10 @@ pub fn add(
     outcomes.push(checksums.write(lake, &partition(manifest), id)?);
     // Written last, because readers list the sessions by it.
     outcomes.push(write_bytes(&of_session, &last)?);
-    Ok(Added { samples, was_there: outcomes.iter().all(|one| *one == WriteOutcome::Unchanged) })
+    Ok(LakeAddition {
+        samples,
+        was_there: outcomes.iter().all(|one| *one == WriteOutcome::Unchanged),
+    })
 }
 
 /// The bytes of a table's file.
@@ -78,7 +84,7 @@ fn encode(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Vec<u8>, Export
     let metadata = vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())];
     let mut bytes = Vec::new();
     let mut encoder =
-        Encoder::new(Format::Parquet, &mut bytes, &frame, metadata).map_err(failed)?;
+        Encoder::new(TableFormat::Parquet, &mut bytes, &frame, metadata).map_err(failed)?;
     encoder.write(frame).map_err(failed)?;
     encoder.finish().map_err(failed)?;
     Ok(bytes)
@@ -97,10 +103,10 @@ pub(super) const fn kind_name(kind: EntryKind) -> &'static str {
     }
 }
 
-fn events(outline: &Outline) -> PolarsResult<DataFrame> {
+fn events(outline: &SessionOutline) -> PolarsResult<DataFrame> {
     let entries = &outline.entries;
     let id = outline.manifest.session_id.as_str();
-    fn each<T>(entries: &[Entry], of: impl Fn(&Entry) -> T) -> Vec<T> {
+    fn each<T>(entries: &[LogEntry], of: impl Fn(&LogEntry) -> T) -> Vec<T> {
         entries.iter().map(of).collect()
     }
     let columns = [
@@ -114,7 +120,7 @@ fn events(outline: &Outline) -> PolarsResult<DataFrame> {
     DataFrame::new(entries.len(), columns.map(Column::from).into())
 }
 
-fn session(outline: &Outline, quality: Told) -> PolarsResult<DataFrame> {
+fn session(outline: &SessionOutline, quality: LakeQuality) -> PolarsResult<DataFrame> {
     let manifest = &outline.manifest;
     let text = |name: &str, text: &str| Series::new(name.into(), [text]).into_column();
     let word = |name: &str, text: Option<&str>| Series::new(name.into(), [text]).into_column();
@@ -124,7 +130,7 @@ fn session(outline: &Outline, quality: Told) -> PolarsResult<DataFrame> {
     let hash = (!calibration.is_null()).then(|| sha256(calibration.to_string().as_bytes()));
     let end = outline.end.as_ref();
     let ended = end.map(|end| end.ended_at.seconds().0);
-    let verdict = quality.verdict.map(|(verdict, _)| verdict.to_string());
+    let verdict = quality.quality.map(|(verdict, _)| verdict.to_string());
     let columns = vec![
         text("session_id", &manifest.session_id),
         text("started_at", &manifest.started_at_text()),
@@ -136,7 +142,7 @@ fn session(outline: &Outline, quality: Told) -> PolarsResult<DataFrame> {
         Series::new("duration_s".into(), [ended]).into_column(),
         word("outcome", end.map(|end| end.outcome.as_str())),
         word("verdict", verdict.as_deref()),
-        word("verdict_reason", quality.verdict.map(|(_, reason)| reason)),
+        word("verdict_reason", quality.quality.map(|(_, reason)| reason)),
         word("calibration", named(calibration).as_deref()),
         word("calibration_sha256", hash.as_deref()),
         text("software_version", &manifest.software_version),

@@ -14,15 +14,16 @@ use palpate_analysis::trade::stored::read_trade;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
-use palpate_sessions::analyses::{Analysed, Analyses, Analysis, add_analysis};
+use palpate_sessions::analyses::{Analyses, Analysis, AnalysisContent, add_analysis};
 use palpate_sessions::catalog::CATALOG_FILE;
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, read_checks};
+use palpate_sessions::document_store::{self, Document};
 use palpate_sessions::journal::Journal;
-use palpate_sessions::shelf::{self, Document};
 use palpate_sessions::{
-    Beside, Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
+    AuxiliaryData, Catalog, Edit, Edits, LOG_FILE, ReadError, Session, SessionOutline,
+    SessionSummary, add_edit,
 };
-use palpate_tables::import::{Told, parse_foreign, parse_table, parse_weights};
+use palpate_tables::import::{ImportOptions, parse_foreign, parse_table, parse_weights};
 use palpate_tables::lake;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -152,7 +153,7 @@ impl Original {
 
     /// The ends alone are read; what they say must hold.
     fn check_summary(&self, path: &Path) {
-        let Ok(summary) = Summary::read(path) else {
+        let Ok(summary) = SessionSummary::read(path) else {
             return;
         };
         let samples = self.held.rows.len() as u64;
@@ -207,16 +208,17 @@ fn document<D: Document + PartialEq + std::fmt::Debug + 'static>(
     written: &D,
 ) -> Kind {
     let folder = quick_folder();
-    let stored = shelf::save(folder.path(), written).expect("a sound document");
+    let stored = document_store::save_document(folder.path(), written).expect("a sound document");
     let bytes = fs::read(&stored.path).expect("it was stored");
     let written = written.clone();
-    let read = move |folder: &Path| match shelf::read::<D>(&folder.join("one.json")) {
-        Ok(read) => {
-            assert_eq!(read, written);
-            Outcome::Whole
-        }
-        Err(_) => Outcome::Refused,
-    };
+    let read =
+        move |folder: &Path| match document_store::read_document::<D>(&folder.join("one.json")) {
+            Ok(read) => {
+                assert_eq!(read, written);
+                Outcome::Whole
+            }
+            Err(_) => Outcome::Refused,
+        };
     Kind::new(name, "one.json", bytes, Box::new(read))
 }
 
@@ -243,8 +245,8 @@ pub fn analysis(number: usize) -> Analysis {
         engine_version: 1,
         inputs: Vec::new(),
         what: match number % 2 {
-            0 => Analysed::Mask { left_out_s: vec![[0.1 * number as f64, 17.25]] },
-            _ => Analysed::Fit {
+            0 => AnalysisContent::Mask { left_out_s: vec![[0.1 * number as f64, 17.25]] },
+            _ => AnalysisContent::Fit {
                 based_on: None,
                 settings: serde_json::Value::Null,
                 results: serde_json::json!({"tau_eps_s": 0.1 + 0.2 * number as f64}),
@@ -329,8 +331,10 @@ fn catalog() -> Kind {
         let Ok(catalog) = Catalog::open(folder) else {
             return Outcome::Refused;
         };
-        let found = catalog
-            .find(&palpate_sessions::catalog::Query { limit: Some(100), ..Default::default() });
+        let found = catalog.find(&palpate_sessions::catalog::CatalogQuery {
+            limit: Some(100),
+            ..Default::default()
+        });
         let mut count = 0;
         for entry in found.iter().flat_map(|found| &found.entries) {
             assert!(written.contains(entry), "a wrong entry was found");
@@ -362,18 +366,18 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         rows,
         end: Some(end(Nanos(5_000_000_000))),
         notes: vec!["a note".into()],
-        beside: Beside::default(),
+        auxiliary: AuxiliaryData::default(),
     };
-    let outline = Outline {
+    let outline = SessionOutline {
         path: session.path.clone(),
         manifest: session.manifest.clone(),
         samples: samples as u64,
         entries: session.entries.clone(),
         end: session.end.clone(),
         notes: session.notes.clone(),
-        beside: Beside::default(),
+        auxiliary: AuxiliaryData::default(),
     };
-    lake::add(folder, &outline, lake::Told::default(), &mut |visit| {
+    lake::add_session(folder, &outline, lake::LakeQuality::default(), &mut |visit| {
         visit(&session.rows);
         Ok(())
     })
@@ -385,7 +389,7 @@ fn in_lake() -> Kind {
     let folder = quick_folder();
     let written = lake_of(folder.path(), 400);
     let read = move |folder: &Path| {
-        let listed = lake::sessions(folder).expect("its folders are there");
+        let listed = lake::list_sessions(folder).expect("its folders are there");
         match lake::read_session(folder, &listed[0]) {
             Ok((read, None)) => {
                 let read = Session { path: PathBuf::new(), ..read };
@@ -460,7 +464,7 @@ pub fn check_table(text: &str) {
 
 /// Nothing tells a changed digit in a file without checksums; but what is read must be numbers in order.
 pub fn check_foreign(name: &str, bytes: &[u8]) -> Outcome {
-    match parse_foreign(name, bytes.to_vec(), &Told::default()) {
+    match parse_foreign(name, bytes.to_vec(), &ImportOptions::default()) {
         Ok(foreign) => {
             for part in &foreign.parts {
                 let mut last = f64::NEG_INFINITY;

@@ -8,11 +8,11 @@ use palpate_analysis::trade::stored::read_trade;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use palpate_sessions::checks::read_checks;
+use palpate_sessions::document_store;
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
-use palpate_sessions::recover::{examine, salvage};
-use palpate_sessions::shelf;
+use palpate_sessions::recover::{examine_session, salvage};
 use palpate_sessions::{
-    ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, Part, Session, Summary,
+    ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, LogPart, Session, SessionSummary,
 };
 use palpate_tables::lake;
 use std::path::Path;
@@ -96,7 +96,7 @@ pub const ALL: &[Target] = &[
             let path = folder.join("one.json");
             for bytes in [bytes, &seal_document("calibration", bytes)] {
                 put(&path, bytes);
-                if let Ok(calibration) = shelf::read::<Calibration>(&path) {
+                if let Ok(calibration) = document_store::read_document::<Calibration>(&path) {
                     assert!(calibration.curve().is_ok());
                 }
             }
@@ -108,7 +108,7 @@ pub const ALL: &[Target] = &[
         run: |bytes, folder| {
             let path = folder.join("one.json");
             put(&path, &seal_document("compliance", bytes));
-            if let Ok(compliance) = shelf::read::<RigCompliance>(&path) {
+            if let Ok(compliance) = document_store::read_document::<RigCompliance>(&path) {
                 assert!(compliance.mm_per_n.is_finite());
             }
         },
@@ -133,7 +133,7 @@ pub const ALL: &[Target] = &[
                 super::kinds::lake_of(folder, 20);
             }
             put(&path, bytes);
-            for one in lake::sessions(folder).expect("a lake") {
+            for one in lake::list_sessions(folder).expect("a lake") {
                 drop(lake::read_session(folder, &one));
             }
         },
@@ -219,18 +219,18 @@ fn read_log(path: &Path) {
     }
     let mut raw = 0;
     let scanned = Session::scan_parts(path, &mut |part| {
-        if let Part::Raw(block) = part {
+        if let LogPart::Raw(block) = part {
             raw += block.pieces().map(|piece| piece.bytes.len()).sum::<usize>();
         }
     });
     if let Ok(outline) = scanned {
-        assert_eq!(outline.beside.raw_bytes, raw as u64);
+        assert_eq!(outline.auxiliary.raw_bytes, raw as u64);
     }
     if let Ok(left) = salvage(path, &mut |block| assert_eq!(block.rows().count(), block.len())) {
         assert!(!left.missing.sentences().iter().any(String::is_empty));
     }
-    drop(Summary::read(path));
-    assert!(!examine(path).findings.iter().any(String::is_empty));
+    drop(SessionSummary::read(path));
+    assert!(!examine_session(path).findings.iter().any(String::is_empty));
 }
 
 fn read_lines(bytes: &[u8], folder: &Path) {
@@ -242,7 +242,7 @@ fn read_lines(bytes: &[u8], folder: &Path) {
         drop((edits.tags(), edits.verdict(), edits.review(&[])));
     }
     if let Ok(analyses) = Analyses::read(folder, "one") {
-        drop((analyses.counting().count(), analyses.input()));
+        drop((analyses.active().count(), analyses.input()));
     }
     drop(read_checks(folder, "bench"));
     drop(Journal::open::<serde_json::Value>(folder));

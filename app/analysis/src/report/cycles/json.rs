@@ -3,8 +3,8 @@
 use super::CycleReport;
 use palpate_model::units::{Depth, Newtons};
 use palpate_rheology::cycles::{
-    Creep, CycleAnalysis, Estimate, Prediction, PredictionError, Relaxation, Sinusoid,
-    SinusoidError,
+    Creep, CycleAnalysis, CyclePrediction, Estimate, PredictionError, Sinusoid, SinusoidError,
+    StressRelaxation,
 };
 use serde_json::{Value, json};
 
@@ -51,7 +51,7 @@ fn number(estimate: Estimate<f64>) -> Value {
 fn cycle(report: &CycleReport, index: usize) -> Value {
     let one: &CycleAnalysis = &report.cycles[index];
     let change = index.checked_sub(1).map(|before| report.steadiness.changes[before]);
-    let first = report.cycles[0].at_half();
+    let first = report.cycles[0].depth_at_half_peak();
     let levels = one.levels.map(|level| {
         level.map(|level| json!({ "force_n": level.force.0, "depth_mm": depth(level.depth) }))
     });
@@ -66,7 +66,7 @@ fn cycle(report: &CycleReport, index: usize) -> Value {
         "peak_change_percent": change.map(|change| change.peak_percent),
         "levels": levels,
         "shift_mm": change.and_then(|change| change.shift).map(Depth::get),
-        "shift_from_first_mm": first.zip(one.at_half()).map(|(from, to)| to.0 - from.0),
+        "shift_from_first_mm": first.zip(one.depth_at_half_peak()).map(|(from, to)| to.0 - from.0),
         "work_loading_n_mm": one.work_loading,
         "work_loop_n_mm": one.work_loop,
         "loss_share": one.loss_share(),
@@ -80,7 +80,7 @@ fn cycle(report: &CycleReport, index: usize) -> Value {
     })
 }
 
-fn relaxation(one: &Relaxation) -> Value {
+fn relaxation(one: &StressRelaxation) -> Value {
     json!({
         "duration_s": one.duration.0,
         "force_end_n": force(one.force_end),
@@ -103,7 +103,7 @@ fn creep(one: &Creep) -> Value {
     })
 }
 
-fn prediction(result: &Result<Prediction, PredictionError>) -> Value {
+fn prediction(result: &Result<CyclePrediction, PredictionError>) -> Value {
     let one = match result {
         Ok(one) => one,
         Err(err) => return json!({ "error": err.to_string() }),

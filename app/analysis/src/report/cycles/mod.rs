@@ -6,21 +6,21 @@ mod text;
 
 pub use json::object;
 pub use plot::picture;
-pub use text::whole;
+pub use text::cycles_text;
 
 use crate::cycles::CycleSource;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::cycles::{
-    CycleAnalysis, CycleSample, Prediction, PredictionError, Sinusoid, SinusoidError, Steadiness,
-    SteadyRule, analyse, predict, sinusoid,
+    CycleAnalysis, CyclePrediction, CycleSample, PredictionError, Sinusoid, SinusoidError,
+    Steadiness, SteadyRule, analyse_cycles, fit_sinusoid, predict_cycles,
 };
 use palpate_rheology::fit::FitSample;
 
 /// Settings of a cycle analysis.
 #[derive(Clone, Debug, Default)]
-pub struct Question {
+pub struct CycleSettings {
     /// Depth of the stiffness; 80 % of the first cycle's depth without it.
     pub at: Option<Depth>,
     pub rule: SteadyRule,
@@ -41,20 +41,20 @@ pub struct CycleReport {
     /// The sines, or why one could not be evaluated.
     pub sines: Vec<Result<Sinusoid, SinusoidError>>,
     /// For each cycle, where a body was given, what it predicts.
-    pub predictions: Vec<Result<Prediction, PredictionError>>,
+    pub predictions: Vec<Result<CyclePrediction, PredictionError>>,
 }
 
 impl CycleReport {
     #[must_use]
-    pub fn of(name: String, source: CycleSource, question: &Question) -> Self {
+    pub fn of(name: String, source: CycleSource, question: &CycleSettings) -> Self {
         let (sines, cycles) = match question.frequency {
             // A table that is one sine has no loading.
-            Some(frequency) => (vec![sinusoid(&source.samples, frequency)], Vec::new()),
+            Some(frequency) => (vec![fit_sinusoid(&source.samples, frequency)], Vec::new()),
             None => {
                 let sine = |(frequency, range): &(f64, std::ops::Range<usize>)| {
-                    sinusoid(&source.samples[range.clone()], *frequency)
+                    fit_sinusoid(&source.samples[range.clone()], *frequency)
                 };
-                let cycles = analyse(&source.samples, question.at, source.pulse);
+                let cycles = analyse_cycles(&source.samples, question.at, source.pulse);
                 (source.sines.iter().map(sine).collect(), cycles)
             }
         };
@@ -86,7 +86,7 @@ fn prediction(
     body: &ModifiedKelvin,
     source: &CycleSource,
     cycle: &CycleAnalysis,
-) -> Result<Prediction, PredictionError> {
+) -> Result<CyclePrediction, PredictionError> {
     let end = cycle.start.0 + cycle.duration.0;
     let samples: Vec<FitSample> = source
         .samples
@@ -102,5 +102,5 @@ fn prediction(
             sigma: Newtons(1.0),
         })
         .collect();
-    predict(body, &samples)
+    predict_cycles(body, &samples)
 }

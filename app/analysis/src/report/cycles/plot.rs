@@ -2,7 +2,7 @@
 
 use super::CycleReport;
 use crate::report::picture::{LEFT, RIGHT, band, titled};
-use palpate_figures::figure::{self, Axis, AxisNames, Band, Ink, Plot, Series};
+use palpate_figures::figure::{self, AxisNames, Ink, Plot, PlotAxis, PlotBand, PlotSeries};
 use palpate_figures::thin::thin;
 use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
@@ -49,8 +49,10 @@ pub fn picture(report: &CycleReport) -> String {
 fn panels(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Vec<Plot> {
     let numbered = || (1..).map(f64::from).zip(&report.cycles);
     let peaks = numbered().map(|(number, one)| [number, one.force_peak.value.0]).collect();
-    let first = report.cycles.first().and_then(|one| one.at_half());
-    let shift = |(number, one): (f64, &CycleAnalysis)| Some([number, one.at_half()?.0 - first?.0]);
+    let first = report.cycles.first().and_then(|one| one.depth_at_half_peak());
+    let shift = |(number, one): (f64, &CycleAnalysis)| {
+        Some([number, one.depth_at_half_peak()?.0 - first?.0])
+    };
     let mut panels = vec![
         by_cycle(report, "peak (N)", peaks, uncertainty),
         by_cycle(report, "shift from cycle 1 (mm)", numbered().filter_map(shift).collect(), None),
@@ -59,7 +61,7 @@ fn panels(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Vec<P
     if !relaxations.is_empty() {
         let ends = relaxations.iter().filter_map(|(_, curve)| curve[0].last());
         let longest = ends.map(|point| point[0]).fold(0.0, f64::max).max(1e-3);
-        let time = Axis::linear("time of hold (s)").over([0.0, longest]);
+        let time = PlotAxis::linear("time of hold (s)").with_range([0.0, longest]);
         panels.push(faded(report, time, &relaxations, uncertainty));
     }
     panels
@@ -75,7 +77,7 @@ type Curve = (usize, Vec<Vec<[f64; 2]>>);
 /// Curves of cycles, with bands around those of the first and the last.
 fn faded(
     report: &CycleReport,
-    x: Axis,
+    x: PlotAxis,
     curves: &[Curve],
     uncertainty: Option<&ForceUncertainty>,
 ) -> Plot {
@@ -84,7 +86,7 @@ fn faded(
     let banded = curves.iter().filter(|(index, _)| ends.contains(&Some(*index)));
     let parts = banded.flat_map(|(index, parts)| parts.iter().map(move |part| (index, part)));
     let bands = parts.filter_map(|(index, part)| {
-        Some(Band { ink: ink(*index, count), ..band(part, uncertainty)? })
+        Some(PlotBand { ink: ink(*index, count), ..band(part, uncertainty)? })
     });
     let bands = bands.collect();
     let lines = curves.iter().map(|(index, parts)| {
@@ -92,9 +94,9 @@ fn faded(
             true => format!("cycle {}", report.cycles[*index].cycle),
             false => String::new(),
         };
-        Series::line(&name, ink(*index, count), 1.2, parts.concat())
+        PlotSeries::line(&name, ink(*index, count), 1.2, parts.concat())
     });
-    Plot { bands, ..Plot::new("", x, Axis::linear("force (N)")).with(lines) }
+    Plot { bands, ..Plot::new("", x, PlotAxis::linear("force (N)")).with(lines) }
 }
 
 fn loops(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Plot {
@@ -104,7 +106,7 @@ fn loops(report: &CycleReport, uncertainty: Option<&ForceUncertainty>) -> Plot {
     let depths = || points().map(|point| point[0]);
     let (low, high) = (depths().fold(0.0, f64::min), depths().fold(0.0, f64::max));
     let range = [low, if high > low { high } else { low + 1.0 }];
-    faded(report, Axis::linear("depth (mm)").over(range), &curves, uncertainty)
+    faded(report, PlotAxis::linear("depth (mm)").with_range(range), &curves, uncertainty)
 }
 
 /// Force over depth, thinned one phase after the other, as thinning wants depths in order.
@@ -139,13 +141,13 @@ fn by_cycle(
     let range = [0.5, count.max(SLOTS_MIN) as f64 + 0.5];
     let dots = points.iter().map(|at| {
         let ink = ink(at[0] as usize - 1, count);
-        Series::dots("", ink, 3.5, vec![*at])
+        PlotSeries::dots("", ink, 3.5, vec![*at])
     });
-    let dots: Vec<Series> = dots.collect();
+    let dots: Vec<PlotSeries> = dots.collect();
     Plot {
         bands: band(&points, uncertainty).into_iter().collect(),
-        ..Plot::new("", Axis::linear("cycle").over(range), Axis::linear(name))
-            .with(std::iter::once(Series::line("", Ink::Line, 1.0, points)).chain(dots))
+        ..Plot::new("", PlotAxis::linear("cycle").with_range(range), PlotAxis::linear(name))
+            .with(std::iter::once(PlotSeries::line("", Ink::Line, 1.0, points)).chain(dots))
     }
 }
 
@@ -153,7 +155,7 @@ fn by_cycle(
 mod tests {
     use super::*;
     use crate::cycles::CycleSource;
-    use crate::report::cycles::Question;
+    use crate::report::cycles::CycleSettings;
     use palpate_model::calibration::Calibration;
     use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 
@@ -200,7 +202,8 @@ mod tests {
     #[test]
     fn forces_carry_the_band_of_their_calibration() {
         let drawn = |calibration| {
-            let report = CycleReport::of("S".into(), source(calibration), &Question::default());
+            let report =
+                CycleReport::of("S".into(), source(calibration), &CycleSettings::default());
             assert_eq!(report.cycles.len(), 3);
             picture(&report)
         };

@@ -4,11 +4,11 @@ use super::CycleReport;
 use crate::report::text::table;
 use palpate_figures::uncertain::{plain, with_error};
 use palpate_model::units::{Depth, Newtons};
-use palpate_rheology::cycles::{CycleAnalysis, Estimate, Prediction, Sinusoid};
+use palpate_rheology::cycles::{CycleAnalysis, CyclePrediction, Estimate, Sinusoid};
 
 /// Everything found in one record, in words.
 #[must_use]
-pub fn whole(report: &CycleReport) -> String {
+pub fn cycles_text(report: &CycleReport) -> String {
     let mut parts = vec![report.name.clone()];
     if !report.cycles.is_empty() {
         parts.push(loops(report));
@@ -133,7 +133,7 @@ fn prediction(report: &CycleReport) -> Option<String> {
     section(title, head, rows.collect())
 }
 
-fn predicted(one: &CycleAnalysis, found: &Prediction) -> Vec<String> {
+fn predicted(one: &CycleAnalysis, found: &CyclePrediction) -> Vec<String> {
     let percent = |error: Newtons| format!("{:+.2}", found.percent(error));
     vec![
         one.cycle.to_string(),

@@ -1,22 +1,22 @@
 //! Comparison of several sessions.
 
-use super::super::figures::{Align, Traces, overlays};
-use super::super::said;
-use super::Subject;
+use super::super::figures::{TimeAlignment, Traces, overlays};
+use super::super::session_text;
+use super::ReportSubject;
 use super::html::cells;
-use palpate_figures::page::Body;
+use palpate_figures::page::HtmlBody;
 
 /// Table of the sessions, figures over each other, and a table of parameters.
-pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
+pub(super) fn comparison(body: &mut HtmlBody, subjects: &[ReportSubject], align: TimeAlignment) {
     body.heading(2, "Comparison");
-    let row = |one: &Subject| {
+    let row = |one: &ReportSubject| {
         let verdict = one.edits.verdict();
         vec![
             one.name.clone(),
             one.analysis.clone().unwrap_or_default(),
             one.manifest.specimen.clone(),
             one.manifest.operator.clone(),
-            said::at(&one.manifest.started_at),
+            session_text::format_utc(&one.manifest.started_at),
             one.manifest.plan["name"].as_str().unwrap_or("imported").to_owned(),
             verdict.map_or("none".to_owned(), |(verdict, _)| verdict.to_string()),
         ]
@@ -46,7 +46,7 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
 }
 
 /// Every parameter, session by session.
-fn parameters(body: &mut Body, subjects: &[Subject]) {
+fn parameters(body: &mut HtmlBody, subjects: &[ReportSubject]) {
     let fitted: Vec<_> =
         subjects.iter().filter_map(|one| Some((one, &one.fit.as_ref().ok()?.report))).collect();
     let mut rows = Vec::new();

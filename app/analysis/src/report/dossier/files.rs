@@ -1,7 +1,9 @@
 //! The files that a page describes: their hashes are written into it and read back for comparison.
 
 use palpate_figures::drawing::escape;
-use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of};
+use palpate_sessions::analyses::{
+    ANALYSES_FILE, AnalysisError, AnalysisInput, read_session_inputs,
+};
 use palpate_sessions::text::{sha256, sha256_of_file};
 use std::path::Path;
 
@@ -14,7 +16,7 @@ const SEAL_END: &str = " -->\n";
 
 /// A file that a page lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Claim {
+pub struct FileClaim {
     pub session_id: String,
     pub folder: String,
     pub file: String,
@@ -22,7 +24,7 @@ pub struct Claim {
     pub sha256: String,
 }
 
-pub(super) fn attributes(session_id: &str, folder: &str, file: &Input) -> String {
+pub(super) fn attributes(session_id: &str, folder: &str, file: &AnalysisInput) -> String {
     format!(
         "{}{}\" data-folder=\"{}\" data-file=\"{}\" data-sha256=\"{}\"",
         ROW.trim_start_matches("<tr"),
@@ -45,7 +47,7 @@ fn own_hash(page: &str) -> String {
 }
 
 /// What a page says it describes, and whether the page itself is as it was made.
-pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
+pub fn claims(page: &str) -> Result<(Vec<FileClaim>, bool), String> {
     let no_page = "the file is not the page of a report; name a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
     let stated = seal.strip_suffix(SEAL_END).unwrap_or_default();
@@ -54,14 +56,14 @@ pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
         let parts: Vec<&str> = row.split('"').collect();
         let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else { return None };
         let names = [*f, *w, *h].map(str::trim);
-        (names == ["data-folder=", "data-file=", "data-sha256="]).then(|| Claim {
+        (names == ["data-folder=", "data-file=", "data-sha256="]).then(|| FileClaim {
             session_id: unescape(session),
             folder: unescape(folder),
             file: unescape(file),
             sha256: unescape(hash),
         })
     });
-    let claims: Option<Vec<Claim>> = rows.collect();
+    let claims: Option<Vec<FileClaim>> = rows.collect();
     let claims = claims.filter(|claims| !claims.is_empty()).ok_or(no_page)?;
     Ok((claims, own_hash(page) == stated))
 }
@@ -74,24 +76,24 @@ fn unescape(text: &str) -> String {
 
 /// Comparison of a session's files with those that a page lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Compared {
+pub struct FileComparison {
     /// Number of unchanged files.
     pub same: usize,
     /// A sentence for each other file.
     pub differences: Vec<String>,
 }
 
-pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisError> {
-    let mut now = inputs_of(session)?;
+pub fn compare(claims: &[&FileClaim], session: &Path) -> Result<FileComparison, AnalysisError> {
+    let mut now = read_session_inputs(session)?;
     let analyses = session.join(ANALYSES_FILE);
     if analyses.is_file() {
         let hash = sha256_of_file(&analyses);
-        now.push(Input {
+        now.push(AnalysisInput {
             what: ANALYSES_FILE.to_owned(),
             sha256: hash.map_err(|source| AnalysisError::Input { path: analyses, source })?,
         });
     }
-    let mut compared = Compared::default();
+    let mut compared = FileComparison::default();
     for claim in claims {
         match now.iter().find(|one| one.what == claim.file) {
             Some(one) if one.sha256 == claim.sha256 => compared.same += 1,
@@ -114,8 +116,8 @@ pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisEr
 mod tests {
     use super::*;
 
-    fn input(what: &str, sha256: &str) -> Input {
-        Input { what: what.into(), sha256: sha256.into() }
+    fn input(what: &str, sha256: &str) -> AnalysisInput {
+        AnalysisInput { what: what.into(), sha256: sha256.into() }
     }
 
     #[test]
@@ -124,7 +126,7 @@ mod tests {
         let row = attributes("id", folder, &input("000.mcap", "beef"));
         let page = sealed(&format!("<p class=\"made\">now</p>\n<tr{row}><td></td></tr>\n"));
         let (found, is_whole) = claims(&page).unwrap();
-        let expected = Claim {
+        let expected = FileClaim {
             session_id: "id".into(),
             folder: folder.into(),
             file: "000.mcap".into(),

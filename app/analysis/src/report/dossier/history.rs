@@ -2,18 +2,18 @@
 
 use super::super::session::{lateness, target_cells};
 use super::super::text::capital;
-use super::super::{kept, said};
-use super::Subject;
-use palpate_figures::page::Body;
+use super::super::{session_text, stored_analysis};
+use super::ReportSubject;
+use palpate_figures::page::HtmlBody;
 use palpate_protocols::engine::{Effect, Record};
-use palpate_runner::fidelity::{Achieved, Fidelity};
-use palpate_sessions::analyses::{Analysed, Analysis};
+use palpate_runner::fidelity::{Fidelity, TargetResult};
+use palpate_sessions::analyses::{Analysis, AnalysisContent};
 use palpate_sessions::record::EntryKind;
 
 /// Events listed at most: a page with more is not read.
 const EVENTS_MAX: usize = 1000;
 
-pub(super) fn deviations(body: &mut Body, subject: &Subject, level: u8) {
+pub(super) fn deviations(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Deviations");
     match &subject.fidelity {
         Err(reason) => body.paragraph(&format!("{}.", capital(reason))),
@@ -21,10 +21,10 @@ pub(super) fn deviations(body: &mut Body, subject: &Subject, level: u8) {
     }
 }
 
-fn fidelity(body: &mut Body, found: &Fidelity) {
+fn fidelity(body: &mut HtmlBody, found: &Fidelity) {
     let late = lateness(found);
     let time = &found.time_use;
-    let missed = found.missed().count();
+    let missed = found.missed_targets().count();
     body.facts(
         "Samples and time use of the run",
         &[
@@ -44,7 +44,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
     if found.targets.is_empty() {
         return;
     }
-    let row = |one: &Achieved| {
+    let row = |one: &TargetResult| {
         let mut row = vec![format!("{} {}", one.step_index + 1, one.step)];
         row.extend(target_cells(one));
         row.push(if one.is_within { "met" } else { "missed" }.to_owned());
@@ -55,7 +55,7 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
     body.table("Targets and achieved values", &heads, &rows);
 }
 
-pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
+pub(super) fn events(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     let decided = subject.entries.iter().filter(|entry| entry.kind == EntryKind::Decision);
     let records = decided.filter_map(|entry| {
         let Ok(Effect::Record(record)) = serde_json::from_value(entry.body.clone()) else {
@@ -93,7 +93,7 @@ pub(super) fn events(body: &mut Body, subject: &Subject, level: u8) {
     }
 }
 
-pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
+pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Edits and analyses");
     let edits = &subject.edits.all;
     if edits.is_empty() {
@@ -101,9 +101,9 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
     } else {
         let row = |edit: &palpate_sessions::Edit| {
             vec![
-                said::at(&edit.at),
+                session_text::format_utc(&edit.at),
                 edit.by.clone(),
-                said::change(&edit.change),
+                session_text::describe_edit(&edit.change),
                 edit.reason.clone(),
             ]
         };
@@ -112,20 +112,21 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
         body.table("Edits, in the order made", &heads, &rows);
     }
     let analyses = &subject.analyses;
-    let made: Vec<_> = analyses.all.iter().filter(|one| one.what != Analysed::Withdrawal).collect();
+    let made: Vec<_> =
+        analyses.all.iter().filter(|one| one.what != AnalysisContent::Withdrawal).collect();
     if made.is_empty() {
         body.paragraph("The session has no analyses.");
         return;
     }
     let row = |one: &&Analysis| {
-        let withdrawn = kept::withdrawn(analyses, &one.name);
+        let withdrawn = stored_analysis::describe_withdrawal(analyses, &one.name);
         vec![
             one.name.clone(),
             one.what.word().to_owned(),
-            said::at(&one.at),
+            session_text::format_utc(&one.at),
             one.by.clone(),
             one.reason.clone(),
-            kept::deed(&one.what),
+            stored_analysis::describe_analysis(&one.what),
             format!("palpate {}", one.software_version),
             withdrawn.unwrap_or_else(|| "counts".to_owned()),
         ]
@@ -134,7 +135,7 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses, in the order made", &heads, &rows);
     for one in made {
-        let lines = kept::fit_lines(one);
+        let lines = stored_analysis::fit_lines(one);
         if !lines.is_empty() {
             body.paragraph(&format!("Fit '{}' found:", one.name));
             body.pre(&lines.join("\n"));
@@ -142,7 +143,7 @@ pub(super) fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
     }
 }
 
-pub(super) fn made_with(body: &mut Body, subject: &Subject, level: u8) {
+pub(super) fn made_with(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     let manifest = &subject.manifest;
     body.heading(level, "Rig and program");
     let mut facts = vec![
@@ -180,10 +181,10 @@ pub(super) fn made_with(body: &mut Body, subject: &Subject, level: u8) {
             ),
         ));
     }
-    let signal = manifest.signal.as_ref().map(said::signal);
+    let signal = manifest.signal.as_ref().map(session_text::describe_signal);
     facts.extend(signal.map(|lines| ("signal", lines.join("; "))));
     let accepted = manifest.acknowledgements.iter();
     facts.extend(accepted.map(|line| ("acknowledged before the start", line.clone())));
-    facts.extend(said::health(&subject.auxiliary.health));
+    facts.extend(session_text::describe_health(&subject.auxiliary.health));
     body.facts("Rig, settings and program", &facts);
 }

@@ -1,44 +1,44 @@
 //! The page of a report, part by part.
 
 use super::super::text::{ParameterText, capital, quality, typeset};
-use super::super::{calibration as calibrations, calibration_plot, figures, said};
+use super::super::{calibration as calibrations, calibration_plot, figures, session_text};
 use super::comparison::comparison;
 use super::files::{MADE, attributes, sealed};
 use super::history::{afterwards, deviations, events, made_with};
-use super::{FitPart, Subject};
-use crate::report::figures::Align;
-use palpate_figures::page::{Body, document};
+use super::{FitPart, ReportSubject};
+use crate::report::figures::TimeAlignment;
+use palpate_figures::page::{HtmlBody, document};
 use palpate_figures::uncertain::{error_alone, interval};
-use palpate_rheology::fit::Parameter;
+use palpate_rheology::fit::FittedParameter;
 
-pub(super) fn page(subjects: &[Subject], align: Align, made: &str) -> String {
+pub(super) fn page(subjects: &[ReportSubject], align: TimeAlignment, made: &str) -> String {
     let (title, level) = match subjects {
         [one] => (title_of(one), 2),
         several => (format!("Comparison of {} sessions", several.len()), 3),
     };
-    let mut body = Body::default();
+    let mut body = HtmlBody::default();
     body.heading(1, &title);
-    body.opened(MADE, made);
+    body.paragraph_with_tag(MADE, made);
     if subjects.len() > 1 {
-        let mut part = Body::default();
+        let mut part = HtmlBody::default();
         comparison(&mut part, subjects, align);
         body.section("comparison", part);
     }
     for subject in subjects {
-        let mut part = Body::default();
+        let mut part = HtmlBody::default();
         if level > 2 {
             part.heading(2, &title_of(subject));
         }
         session(&mut part, subject, level);
         body.section("session", part);
     }
-    let mut part = Body::default();
+    let mut part = HtmlBody::default();
     files(&mut part, subjects);
     body.section("files", part);
     sealed(&document(&title, body))
 }
 
-fn title_of(subject: &Subject) -> String {
+fn title_of(subject: &ReportSubject) -> String {
     let manifest = &subject.manifest;
     let what = match manifest.specimen.trim() {
         "" => subject.name.as_str(),
@@ -49,7 +49,7 @@ fn title_of(subject: &Subject) -> String {
     format!("{what}: {protocol}, {day} UTC")
 }
 
-fn session(body: &mut Body, subject: &Subject, level: u8) {
+fn session(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     summary(body, subject, level);
     worth(body, subject, level);
     measured(body, subject, level);
@@ -67,7 +67,7 @@ fn session(body: &mut Body, subject: &Subject, level: u8) {
     made_with(body, subject, level);
 }
 
-fn summary(body: &mut Body, subject: &Subject, level: u8) {
+fn summary(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     let manifest = &subject.manifest;
     body.heading(level, "Measurement");
     let plan = &manifest.plan;
@@ -81,7 +81,7 @@ fn summary(body: &mut Body, subject: &Subject, level: u8) {
         ("read by analysis", subject.analysis.clone().unwrap_or_default()),
         ("specimen", manifest.specimen.clone()),
         ("operator", manifest.operator.clone()),
-        ("started", said::at(&manifest.started_at)),
+        ("started", session_text::format_utc(&manifest.started_at)),
         ("indenter", manifest.indenter.clone()),
         ("protocol", protocol.unwrap_or_default()),
     ];
@@ -102,21 +102,21 @@ fn summary(body: &mut Body, subject: &Subject, level: u8) {
     body.facts("The session", &facts);
 }
 
-fn ending(subject: &Subject) -> String {
+fn ending(subject: &ReportSubject) -> String {
     match &subject.end {
         Some(end) => format!("{}: {}", end.outcome, end.reason),
         None => "none: the recording was interrupted".to_owned(),
     }
 }
 
-fn worth(body: &mut Body, subject: &Subject, level: u8) {
+fn worth(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Data quality");
     let verdict = match subject.edits.verdict() {
         Some((verdict, edit)) => format!("{verdict}, says {}: {}", edit.by, edit.reason),
         None => "none".to_owned(),
     };
     let review = match &subject.review {
-        Some(review) => format!("{}; {}", said::review(review), review.reason),
+        Some(review) => format!("{}; {}", session_text::describe_review(review), review.reason),
         None => "not reviewed".to_owned(),
     };
     let tags: Vec<&str> = subject.edits.tags().into_iter().collect();
@@ -130,7 +130,7 @@ fn worth(body: &mut Body, subject: &Subject, level: u8) {
     }
 }
 
-fn measured(body: &mut Body, subject: &Subject, level: u8) {
+fn measured(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Force");
     let traces = &subject.traces;
     let thinning = capital(&traces.thinning());
@@ -144,7 +144,7 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     );
 }
 
-fn fit(body: &mut Body, subject: &Subject, level: u8) {
+fn fit(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Fit");
     match &subject.fit {
         Ok(part) => fit_part(body, part),
@@ -152,7 +152,7 @@ fn fit(body: &mut Body, subject: &Subject, level: u8) {
     }
 }
 
-fn fit_part(body: &mut Body, part: &FitPart) {
+fn fit_part(body: &mut HtmlBody, part: &FitPart) {
     let report = &part.report;
     body.paragraph(&format!("{}; {}.", capital(&report.model), quality(report)));
     let heads = ["parameter", "value ± standard error", "unit", "95 % interval", "systematic"];
@@ -165,7 +165,7 @@ fn fit_part(body: &mut Body, part: &FitPart) {
 }
 
 /// Name, value, unit, interval and systematic uncertainty of a parameter.
-pub(super) fn cells(parameter: &Parameter) -> Vec<String> {
+pub(super) fn cells(parameter: &FittedParameter) -> Vec<String> {
     let text = ParameterText::of(parameter);
     let ends = parameter.ci95.zip(parameter.std_error);
     let ends = ends.map(|(ends, error)| interval(ends, parameter.value, error));
@@ -179,7 +179,7 @@ pub(super) fn cells(parameter: &Parameter) -> Vec<String> {
     ]
 }
 
-fn calibration(body: &mut Body, subject: &Subject, level: u8) {
+fn calibration(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Calibration");
     match &subject.calibration {
         None => body.paragraph("The session has no calibration: its forces are those of its file."),
@@ -187,14 +187,14 @@ fn calibration(body: &mut Body, subject: &Subject, level: u8) {
             body.paragraph(&format!("{}: {reason}.", calibration.name));
         }
         Some((calibration, Ok(details))) => {
-            body.pre(&calibrations::whole(calibration, None, details, &[]));
+            body.pre(&calibrations::calibration_page(calibration, None, details, &[]));
             let caption = "The curve with its readings, its residuals, its slope, and the standard uncertainty of a force with every term that is stated.";
             body.figure(&calibration_plot::picture(calibration, details), caption);
         }
     }
 }
 
-fn files(body: &mut Body, subjects: &[Subject]) {
+fn files(body: &mut HtmlBody, subjects: &[ReportSubject]) {
     body.heading(2, "Files that this page describes");
     body.paragraph(
         "The table has the SHA-256 (FIPS 180-4) of each file. 'palpate report --check' compares this page with the present files, and so can any program that computes SHA-256.",

@@ -6,39 +6,41 @@ mod files;
 mod history;
 mod html;
 
-pub use files::{Claim, Compared, claims, compare};
+pub use files::{FileClaim, FileComparison, claims, compare};
 
-use super::calibration::Told;
+use super::calibration::CalibrationDetails;
 use super::calibration_plot;
-use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
-use super::figures::{Align, Traces, Window};
+use super::cycles::{CycleReport, CycleSettings, cycles_text, picture as cycles_picture};
+use super::figures::{TimeAlignment, TimeWindow, Traces};
 use super::picture;
-use crate::analysed::{self, Opened};
+use crate::analysed_session::{self, AnalysedSession};
 use crate::cycles::of_session as cycles_of;
 use crate::fidelity;
-use crate::fit::Fitted;
+use crate::fit::SourceFit;
 use crate::progress::Progress;
-use crate::source::{self, SourceError, Stretch};
+use crate::source::{self, RecordStretch, SourceError};
 use palpate_figures::drawing::Drawing;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::base::FoundBase;
 use palpate_runner::fidelity::Fidelity;
-use palpate_sessions::analyses::{Analyses, Input, inputs_of};
-use palpate_sessions::{Beside, EDITS_FILE, Edits, EndRecord, Entry, Manifest, Review, Session};
+use palpate_sessions::analyses::{Analyses, AnalysisInput, read_session_inputs};
+use palpate_sessions::{
+    AuxiliaryData, EDITS_FILE, Edits, EndRecord, LogEntry, Manifest, Review, Session,
+};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// A session, and the analysis through which it is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct SessionReading {
     pub session: PathBuf,
     /// `None` reads the session with its edits only.
     pub analysis: Option<String>,
 }
 
 /// One session with all that a page tells of it. Its samples are not in memory any more.
-pub struct Subject {
+pub struct ReportSubject {
     /// The name of its folder. The path is private and stays out of the page.
     pub name: String,
     pub(super) analysis: Option<String>,
@@ -46,20 +48,20 @@ pub struct Subject {
     pub(super) samples: usize,
     pub(super) duration_s: f64,
     pub(super) notes: Vec<String>,
-    pub(super) entries: Vec<Entry>,
+    pub(super) entries: Vec<LogEntry>,
     pub(super) end: Option<EndRecord>,
-    pub(super) auxiliary: Beside,
+    pub(super) auxiliary: AuxiliaryData,
     pub(super) edits: Edits,
     pub(super) analyses: Analyses,
     pub(super) review: Option<Review>,
     pub(super) base: FoundBase,
     pub(super) fidelity: Result<Fidelity, String>,
-    pub(super) calibration: Option<(Calibration, Result<Told, String>)>,
+    pub(super) calibration: Option<(Calibration, Result<CalibrationDetails, String>)>,
     pub(super) traces: Traces,
     pub(super) cycles: Option<CyclePart>,
     pub(super) fit: Result<FitPart, String>,
     /// Every file of the session with its SHA-256.
-    pub(super) files: Vec<Input>,
+    pub(super) files: Vec<AnalysisInput>,
 }
 
 pub(super) struct CyclePart {
@@ -74,22 +76,22 @@ pub(super) struct FitPart {
     pub remarks: Vec<String>,
 }
 
-impl Subject {
-    pub fn of(wanted: &Wanted) -> Result<Self, SourceError> {
+impl ReportSubject {
+    pub fn of(wanted: &SessionReading) -> Result<Self, SourceError> {
         let path = &wanted.session;
-        let files = inputs_of(path)?;
-        let opened = analysed::open(path, wanted.analysis.as_deref())?;
-        let Opened { edited, analyses, left_out_s } = opened;
+        let files = read_session_inputs(path)?;
+        let opened = analysed_session::open(path, wanted.analysis.as_deref())?;
+        let AnalysedSession { edited, analyses, left_out_s } = opened;
         let (session, edits) = (edited.session, edited.edits);
         // The review itself is among the edits; their order shows what came after it.
         let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
-        let seen: Vec<Input> = seen.chain(analyses.input()).collect();
-        let name = name_of(path);
+        let seen: Vec<AnalysisInput> = seen.chain(analyses.input()).collect();
+        let name = folder_name(path);
         let calibration = source::calibration_of(&session).ok().map(|calibration| {
-            let details = Told::of(&calibration).map_err(|err| err.to_string());
+            let details = CalibrationDetails::of(&calibration).map_err(|err| err.to_string());
             (calibration, details)
         });
-        let traces = Traces::of(&name, &session, Window::WHOLE).leaving_out(&left_out_s);
+        let traces = Traces::of(&name, &session, TimeWindow::WHOLE).leaving_out(&left_out_s);
         Ok(Self {
             manifest: session.manifest.clone(),
             samples: session.rows.len(),
@@ -97,7 +99,7 @@ impl Subject {
             notes: session.notes.clone(),
             entries: session.entries.clone(),
             end: session.end.clone(),
-            auxiliary: session.beside.clone(),
+            auxiliary: session.auxiliary.clone(),
             review: edits.review(&seen),
             base: FoundBase::of_session(&session),
             fidelity: fidelity::of_session(&session).map_err(|err| err.to_string()),
@@ -116,7 +118,7 @@ impl Subject {
 
 /// The name of a session's folder, or of its file.
 #[must_use]
-pub fn name_of(path: &Path) -> String {
+pub fn folder_name(path: &Path) -> String {
     let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     named.file_name().unwrap_or(named.as_os_str()).to_string_lossy().into_owned()
 }
@@ -124,19 +126,19 @@ pub fn name_of(path: &Path) -> String {
 /// The cycles of a session that has several, or sines.
 fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
     let source = cycles_of(session).ok()?;
-    let report = CycleReport::of(name.to_owned(), source, &Question::default());
+    let report = CycleReport::of(name.to_owned(), source, &CycleSettings::default());
     (report.cycles.len() > 1 || !report.sines.is_empty())
         .then(|| CyclePart { text: cycles_text(&report), figure: cycles_picture(&report) })
 }
 
 /// The fit of a session, whatever the session is worth, with what its calibration adds.
 fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart, String> {
-    let source = source::of_session(session, Stretch::RampHold, left_out_s);
+    let source = source::of_session(session, RecordStretch::RampHold, left_out_s);
     let mut source = source.map_err(|err| err.to_string())?;
     // The page has the notes of the reader beside the session.
     source.notes.clear();
     let options = FitOptions::default();
-    let fitted = Fitted::of(source, &options).with_systematic(&options);
+    let fitted = SourceFit::of(source, &options).with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;
     let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of).and_then(Result::ok);
     Ok(FitPart {
@@ -148,7 +150,7 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
 
 palpate_model::named! {
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-    pub enum Figure {
+    pub enum SessionFigure {
         #[default]
         ForceTime = "force-time",
         ForceDepth = "force-depth",
@@ -161,21 +163,21 @@ palpate_model::named! {
 /// One figure of a session, of a stretch of it where it is over time or depth; or why it cannot be drawn, though the
 /// session could be read.
 pub fn figure(
-    wanted: &Wanted,
-    figure: Figure,
-    window: Window,
+    wanted: &SessionReading,
+    figure: SessionFigure,
+    window: TimeWindow,
 ) -> Result<Result<Drawing, String>, SourceError> {
-    let opened = analysed::open(&wanted.session, wanted.analysis.as_deref())?;
+    let opened = analysed_session::open(&wanted.session, wanted.analysis.as_deref())?;
     let (session, left_out_s) = (opened.edited.session, opened.left_out_s);
-    let name = name_of(&wanted.session);
+    let name = folder_name(&wanted.session);
     let traces = || Traces::of(&name, &session, window).leaving_out(&left_out_s);
     Ok(match figure {
-        Figure::ForceTime => Ok(super::figures::force_time(&traces())),
-        Figure::ForceDepth => Ok(super::figures::force_depth(&traces())),
-        Figure::Residual => fit(&name, session, &left_out_s).map(|part| part.figure),
-        Figure::Calibration => {
+        SessionFigure::ForceTime => Ok(super::figures::force_time(&traces())),
+        SessionFigure::ForceDepth => Ok(super::figures::force_depth(&traces())),
+        SessionFigure::Residual => fit(&name, session, &left_out_s).map(|part| part.figure),
+        SessionFigure::Calibration => {
             let calibration = source::calibration_of(&session)?;
-            match Told::of(&calibration) {
+            match CalibrationDetails::of(&calibration) {
                 Ok(details) => Ok(calibration_plot::drawing(&calibration, &details)),
                 Err(err) => Err(err.to_string()),
             }
@@ -184,12 +186,12 @@ pub fn figure(
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum FigureFormat {
     Svg,
     Png,
 }
 
-impl Ending {
+impl FigureFormat {
     pub fn of(file: &Path) -> Result<Self, String> {
         let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
@@ -212,9 +214,9 @@ impl Ending {
 
 /// Date and program version of a page.
 #[must_use]
-pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
+pub fn creation_line(now: chrono::DateTime<chrono::Utc>) -> String {
     let version = env!("CARGO_PKG_VERSION");
-    format!("Made {} by palpate {version}", super::said::at(&now))
+    format!("Made {} by palpate {version}", super::session_text::format_utc(&now))
 }
 
 #[derive(Debug, Error)]
@@ -228,18 +230,18 @@ pub enum ReportError {
 /// Reads every session and makes the page. `made` is when and with which version, in words; `progress` hears
 /// which session is read next.
 pub fn write(
-    wanted: &[Wanted],
-    align: Align,
+    wanted: &[SessionReading],
+    align: TimeAlignment,
     made: &str,
     progress: &dyn Progress,
 ) -> Result<String, ReportError> {
     let mut subjects = Vec::new();
     for (index, one) in wanted.iter().enumerate() {
-        if progress.tell(index, wanted.len(), &name_of(&one.session)).is_break() {
+        if progress.report(index, wanted.len(), &folder_name(&one.session)).is_break() {
             return Err(ReportError::Cancelled);
         }
         let failed = |err| ReportError::Source(one.session.clone(), Box::new(err));
-        subjects.push(Subject::of(one).map_err(failed)?);
+        subjects.push(ReportSubject::of(one).map_err(failed)?);
     }
     Ok(html::page(&subjects, align, made))
 }

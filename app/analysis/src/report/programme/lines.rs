@@ -1,6 +1,6 @@
 //! Rows of the page for each run and each specimen.
 
-use crate::edited::Edited;
+use crate::edited_session::EditedSession;
 use crate::source::SourceError;
 use palpate_runner::programme::{FINISHED, REFUSED};
 use palpate_sessions::Manifest;
@@ -47,7 +47,7 @@ impl SessionLoss {
 
     /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
     pub(super) fn of(
-        opened: &Result<Edited, SourceError>,
+        opened: &Result<EditedSession, SourceError>,
         path: &Path,
         ending: Option<&str>,
     ) -> Option<(Self, String)> {

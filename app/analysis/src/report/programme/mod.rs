@@ -4,22 +4,25 @@ mod lines;
 
 pub use lines::{RunLine, SessionLoss, SpecimenPart};
 
-use super::calibration::{Told, whole as calibration_text};
-use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
-use super::fit_json::Overlay;
+use super::calibration::{CalibrationDetails, calibration_page as calibration_text};
+use super::cycles::{CycleReport, CycleSettings, cycles_text, picture as cycles_picture};
+use super::fit_json::FitOverlay;
 use super::picture;
 use super::text::{parameter_lines, table};
 use crate::cycles::of_session;
-use crate::edited;
-use crate::fit::Fitted;
-use crate::source::{self, FitSource, Stretch};
-use palpate_figures::page::{Body, document};
+use crate::edited_session;
+use crate::fit::SourceFit;
+use crate::source::{self, FitSource, RecordStretch};
+use palpate_figures::page::{HtmlBody, document};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_rheology::cycles::predict;
-use palpate_rheology::fit::{FitOptions, FitReport, Systematic};
-use palpate_runner::programme::{FINISHED, Place, Programme, Progress, Task, calibration_of};
-use palpate_sessions::{Manifest, Session, Verdict};
+use palpate_rheology::cycles::predict_cycles;
+use palpate_rheology::fit::{FitOptions, FitReport, SystematicUncertainty};
+use palpate_runner::programme::{
+    FINISHED, Programme, ProgrammePosition, ProgrammeProgress, ProgrammeTask,
+    calibration_from_session,
+};
+use palpate_sessions::{DataQuality, Manifest, Session};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +45,7 @@ pub struct TaskPart {
 #[derive(Clone, Debug, Serialize)]
 pub struct FitLine {
     pub session: String,
-    pub parameters: Vec<palpate_rheology::fit::Parameter>,
+    pub parameters: Vec<palpate_rheology::fit::FittedParameter>,
     /// Root mean square of the residual in N.
     pub rmse_n: f64,
 }
@@ -63,7 +66,7 @@ pub struct PredictionLine {
 }
 
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Page {
+pub struct ProgrammePage {
     /// The programme in words.
     pub title: String,
     pub purpose: String,
@@ -73,12 +76,12 @@ pub struct Page {
     pub tasks: Vec<TaskPart>,
 }
 
-impl Page {
+impl ProgrammePage {
     /// Reads every session of a programme and works out what it tells; `tell` hears of each task before it is read.
     pub fn of(
         programme: &Programme,
         folder: &Path,
-        progress: &Progress,
+        progress: &ProgrammeProgress,
         tell: &mut dyn FnMut(&str),
     ) -> Self {
         let mut page = Self {
@@ -106,20 +109,20 @@ impl Page {
         &mut self,
         part: &mut TaskPart,
         bodies: &mut FittedBodies,
-        task: &Task,
-        (place, session, ending): &(Place, PathBuf, Option<String>),
+        task: &ProgrammeTask,
+        (place, session, ending): &(ProgrammePosition, PathBuf, Option<String>),
         folder: &Path,
     ) {
         let name = session.display().to_string();
         let path = folder.join(session);
-        let opened = edited::open(&path);
+        let opened = edited_session::open(&path);
         let loss = SessionLoss::of(&opened, &path, ending.as_deref());
         // What was said of a session holds for it as it was.
         let whole = opened.as_ref().ok().filter(|_| loss.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
         let is_rejected = opened.as_ref().ok().and_then(|one| one.rejection()).is_some();
         let verdict = verdict.map(|(verdict, edit)| match verdict {
-            Verdict::Valid => verdict.to_string(),
+            DataQuality::Valid => verdict.to_string(),
             _ => format!("{verdict}: {}", edit.reason),
         });
         let opened = opened.map(|one| one.session);
@@ -188,7 +191,7 @@ impl Page {
     }
 
     /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
-    pub fn loss(&self) -> Option<String> {
+    pub fn loss_sentence(&self) -> Option<String> {
         let finished = self.runs.iter().filter(|run| run.ending.as_deref() == Some(FINISHED));
         let loss: Vec<String> = finished
             .filter_map(|run| Some(format!("{} is {}", run.session, run.loss?.word())))
@@ -203,11 +206,11 @@ impl Page {
 
     /// The page as one HTML file.
     pub fn html(&self) -> String {
-        let mut body = Body::default();
+        let mut body = HtmlBody::default();
         body.heading(1, &self.title);
         body.paragraph(&self.purpose);
-        if let Some(loss) = self.loss() {
-            body.strong(&format!("{}.", super::text::capital(&loss)));
+        if let Some(loss_sentence) = self.loss_sentence() {
+            body.strong(&format!("{}.", super::text::capital(&loss_sentence)));
         }
         body.heading(2, "Sessions");
         body.pre(&self.table());
@@ -234,9 +237,15 @@ impl TaskPart {
     }
 
     /// What one session adds: a calibration, cycles, a fit or the error of a prediction.
-    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut FittedBodies) {
+    fn read(
+        &mut self,
+        task: &ProgrammeTask,
+        name: &str,
+        session: &Session,
+        bodies: &mut FittedBodies,
+    ) {
         if task.calibrates {
-            match calibration_of(session, &task.name) {
+            match calibration_from_session(session, &task.name) {
                 Ok(calibration) => self.calibration(&calibration),
                 Err(err) => self.line(&err.to_string()),
             }
@@ -245,17 +254,17 @@ impl TaskPart {
         let Ok(cycles) = of_session(session) else {
             return;
         };
-        let report = CycleReport::of(name.to_owned(), cycles, &Question::default());
+        let report = CycleReport::of(name.to_owned(), cycles, &CycleSettings::default());
         if report.cycles.len() > 1 || !report.sines.is_empty() {
             self.line(&cycles_text(&report));
             self.figures.push(cycles_picture(&report));
-        } else if let Ok(samples) = source::samples_of(session, Stretch::RampHold)
+        } else if let Ok(samples) = source::fit_samples(session, RecordStretch::RampHold)
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
             let calibration = source::calibration_of(session).ok();
             let source = FitSource { samples, calibration, ..FitSource::default() };
-            let fitted = Fitted::of(source, &options).with_systematic(&options);
+            let fitted = SourceFit::of(source, &options).with_systematic(&options);
             match &fitted.result {
                 Ok(report) => self.fit(task, name, (&fitted, report), bodies),
                 Err(err) => {
@@ -268,7 +277,7 @@ impl TaskPart {
     }
 
     fn calibration(&mut self, calibration: &Calibration) {
-        match Told::of(calibration) {
+        match CalibrationDetails::of(calibration) {
             Ok(details) => {
                 self.line(&calibration_text(calibration, None, &details, &[]));
                 self.figures.push(super::calibration_plot::picture(calibration, &details));
@@ -279,9 +288,9 @@ impl TaskPart {
 
     fn fit(
         &mut self,
-        task: &Task,
+        task: &ProgrammeTask,
         name: &str,
-        (fitted, report): (&Fitted, &FitReport),
+        (fitted, report): (&SourceFit, &FitReport),
         bodies: &mut FittedBodies,
     ) {
         let samples = fitted.samples.as_slice();
@@ -289,7 +298,7 @@ impl TaskPart {
         for line in parameter_lines(&report.parameters) {
             self.line(&line);
         }
-        let systematic = fitted.systematic.iter().map(Systematic::sentence);
+        let systematic = fitted.systematic.iter().map(SystematicUncertainty::sentence);
         for remark in systematic.chain(fitted.notes.iter().cloned()) {
             self.line(&format!("  {remark}"));
         }
@@ -304,7 +313,7 @@ impl TaskPart {
             self.line(&format!("  not compared: {reason}"));
         }
         if let Some(Ok((fitted, body))) = body {
-            match predict(body, samples) {
+            match predict_cycles(body, samples) {
                 Ok(found) => {
                     let line = PredictionLine {
                         session: name.to_owned(),
@@ -325,7 +334,7 @@ impl TaskPart {
         }
         if self.figures.is_empty() {
             let band = fitted.calibration.as_ref().and_then(|one| ForceUncertainty::of(one).ok());
-            let overlay = Overlay::of(report, samples);
+            let overlay = FitOverlay::of(report, samples);
             let drawn = picture::of_report(name, (samples, &overlay), report, band.as_ref());
             self.figures.push(drawn);
         }
@@ -367,7 +376,7 @@ mod tests {
 
     #[test]
     fn what_people_wrote_is_text_and_no_markup() {
-        let page = Page {
+        let page = ProgrammePage {
             title: "a <b> & c".into(),
             purpose: String::new(),
             runs: Vec::new(),

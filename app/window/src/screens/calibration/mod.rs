@@ -9,8 +9,10 @@ use crate::widgets::{
 };
 use crate::workers::BackgroundTask;
 use eframe::egui::{Button, Context, Key, TextEdit, Ui, vec2};
-use palpate_analysis::calibrations::{Shelved, Shown, keep, read};
-use palpate_analysis::report::calibration::Entry;
+use palpate_analysis::calibrations::{
+    CalibrationOverview, CalibrationView, read, store_calibration,
+};
+use palpate_analysis::report::calibration::CalibrationEntry;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -28,7 +30,7 @@ pub struct CalibrationScreen {
     library: Result<PathBuf, String>,
     /// The rig's own, which needs no library, and the rig's name.
     own: (Calibration, String),
-    shelved: BackgroundTask<Shelved>,
+    shelved: BackgroundTask<CalibrationOverview>,
     chosen: usize,
     name: String,
 }
@@ -71,13 +73,13 @@ impl CalibrationScreen {
         let (library, own, folder) = (self.library.clone(), self.own.clone(), folder.to_owned());
         self.shelved.start("calibrations", ctx, move |_| {
             let library = library?;
-            let id = keep(&library, &folder, &name);
+            let id = store_calibration(&library, &folder, &name);
             Ok(read(&library, own, Some(id)))
         });
     }
 
-    fn shown_one(&self) -> Option<&Shown> {
-        self.shelved.answer()?.as_ref().ok()?.shown.get(self.chosen)
+    fn shown_one(&self) -> Option<&CalibrationView> {
+        self.shelved.answer()?.as_ref().ok()?.calibrations.get(self.chosen)
     }
 
     /// The chosen calibration, or why it cannot be used now.
@@ -85,7 +87,7 @@ impl CalibrationScreen {
         let one = self.shown_one().ok_or("the library is not read yet")?;
         workbench.free_verdict()?;
         require(one.calibration != workbench.bench.calibration, "it is in use")?;
-        one.told.as_ref().map(|_| &one.calibration).map_err(Clone::clone)
+        one.details.as_ref().map(|_| &one.calibration).map_err(Clone::clone)
     }
 }
 
@@ -93,7 +95,7 @@ impl Screen for CalibrationScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, "Calibrations");
         if let Some(shelved) = answer_ui(ui, &self.shelved, "reading the library") {
-            for (index, one) in shelved.shown.iter().enumerate() {
+            for (index, one) in shelved.calibrations.iter().enumerate() {
                 let button = Button::selectable(index == self.chosen, &one.entry.id)
                     .min_size(vec2(ui.available_width(), 24.0));
                 if ui.add(button).clicked() {
@@ -127,7 +129,7 @@ impl Screen for CalibrationScreen {
         if reason_button(ui, "Save calibration of last run", vec2(150.0, 28.0), &verdict) {
             commands.push(UiCommand::KeepCalibration);
         }
-        match self.shelved.answer().and_then(|answer| answer.as_ref().ok()?.kept.as_ref()) {
+        match self.shelved.answer().and_then(|answer| answer.as_ref().ok()?.stored.as_ref()) {
             Some(Ok(id)) => quiet_ui(ui, format!("saved as {id}")),
             Some(Err(reason)) => alarm_ui(ui, format!("Not saved: {reason}")),
             None => {}
@@ -135,7 +137,7 @@ impl Screen for CalibrationScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        if let Some(Shown { told: Ok((_, curves)), .. }) = self.shown_one() {
+        if let Some(CalibrationView { details: Ok((_, curves)), .. }) = self.shown_one() {
             plots::curves_ui(ui, curves);
         }
     }
@@ -157,7 +159,7 @@ impl Screen for CalibrationScreen {
                 fact_ui(ui, name, value);
             }
         }
-        let findings = match &one.told {
+        let findings = match &one.details {
             Ok((report, _)) => &report.quality.findings,
             Err(reason) => return alarm_ui(ui, reason),
         };
@@ -174,7 +176,9 @@ impl Screen for CalibrationScreen {
 
     fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
         if self.shelved.poll()
-            && let Some(Ok(Shelved { kept: Some(Ok(id)), shown, .. })) = self.shelved.answer()
+            && let Some(Ok(CalibrationOverview {
+                stored: Some(Ok(id)), calibrations: shown, ..
+            })) = self.shelved.answer()
         {
             self.chosen = shown.iter().position(|one| one.entry.id == *id).unwrap_or(0);
         }
@@ -218,7 +222,7 @@ impl Screen for CalibrationScreen {
 }
 
 /// Age and state, and whether it is in use.
-fn state_words(entry: &Entry, is_own: bool, is_used: bool) -> String {
+fn state_words(entry: &CalibrationEntry, is_own: bool, is_used: bool) -> String {
     let mut words = Vec::new();
     if is_used {
         words.push("IN USE".to_owned());

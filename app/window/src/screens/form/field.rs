@@ -1,14 +1,14 @@
 //! A parameter of a protocol as it is typed, and a label of the session.
 
-use palpate_model::about::Key;
+use palpate_model::metadata::MetadataKey;
 use palpate_model::rig::RigDescription;
 use palpate_model::units::MmPerS;
-use palpate_protocols::file::{Given, Kind, Parameter, What};
+use palpate_protocols::file::{ProtocolParameter, ProtocolValue, QuantityKind, ValueContent};
 
 /// A parameter being typed.
 #[derive(Clone, Debug)]
 pub struct ParamField {
-    pub parameter: Parameter,
+    pub parameter: ProtocolParameter,
     pub text: String,
     /// Of a number that is typed without a unit; empty where there is none.
     pub unit: &'static str,
@@ -19,16 +19,16 @@ pub struct ParamField {
 impl ParamField {
     /// The field of a parameter, with its usual value.
     #[must_use]
-    pub fn new(parameter: Parameter) -> Self {
+    pub fn new(parameter: ProtocolParameter) -> Self {
         let usual = &parameter.default;
-        let first = match &usual.what {
-            What::List(items) => items.first().unwrap_or(usual),
+        let first = match &usual.content {
+            ValueContent::List(items) => items.first().unwrap_or(usual),
             _ => usual,
         };
         let (number, unit) = split(first, parameter.kind);
-        let text = match &usual.what {
-            What::None => String::new(),
-            What::List(_) => usual.text.clone(),
+        let text = match &usual.content {
+            ValueContent::None => String::new(),
+            ValueContent::List(_) => usual.text.clone(),
             _ => number,
         };
         Self { value: Ok(usual.text.clone()), text, unit, parameter }
@@ -42,9 +42,9 @@ impl ParamField {
     fn read(&self, rig: &RigDescription) -> Result<String, String> {
         let text = self.text.trim();
         if text.is_empty() {
-            return match (&self.parameter.default.what, self.parameter.kind) {
-                (What::None, _) => Ok("none".into()),
-                (_, Kind::Text) => Err("type a text here".into()),
+            return match (&self.parameter.default.content, self.parameter.kind) {
+                (ValueContent::None, _) => Ok("none".into()),
+                (_, QuantityKind::Text) => Err("type a text here".into()),
                 _ => Err(format!(
                     "a number is missing here; write it like {}",
                     self.parameter.default.text
@@ -97,16 +97,16 @@ impl ParamField {
     }
 }
 
-fn check_speeds(given: &Given, rig: &RigDescription) -> Result<(), String> {
-    match &given.what {
-        What::Number(Kind::Speed, speed) => rig.check_speed(MmPerS(*speed)),
-        What::List(items) => items.iter().try_for_each(|item| check_speeds(item, rig)),
+fn check_speeds(given: &ProtocolValue, rig: &RigDescription) -> Result<(), String> {
+    match &given.content {
+        ValueContent::Number(QuantityKind::Speed, speed) => rig.check_speed(MmPerS(*speed)),
+        ValueContent::List(items) => items.iter().try_for_each(|item| check_speeds(item, rig)),
         _ => Ok(()),
     }
 }
 
 /// The number of a value as it was written, and its unit.
-fn split(given: &Given, kind: Kind) -> (String, &'static str) {
+fn split(given: &ProtocolValue, kind: QuantityKind) -> (String, &'static str) {
     let units = kind.units();
     let parts = units.iter().find_map(|unit| {
         let number = given.text.strip_suffix(unit)?.trim();
@@ -119,7 +119,7 @@ fn split(given: &Given, kind: Kind) -> (String, &'static str) {
 /// A label of the session as it is typed, such as its operator.
 #[derive(Clone, Debug)]
 pub struct LabelField {
-    pub key: &'static Key,
+    pub key: &'static MetadataKey,
     pub text: String,
     pub error: Option<String>,
     /// The protocol requires it.

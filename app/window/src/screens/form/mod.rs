@@ -6,14 +6,14 @@ pub use field::{LabelField, ParamField};
 
 use crate::command::ManualMove;
 use crate::widgets::require;
-use palpate_analysis::daily::is_gated;
-use palpate_model::about::{KEYS, Labels};
-use palpate_model::calibration::{Calibration, Curve};
+use palpate_analysis::daily::needs_daily_check;
+use palpate_model::calibration::{Calibration, CalibrationCurve};
+use palpate_model::metadata::{METADATA_KEYS, SessionLabels};
 use palpate_model::rig::{Limits, RigDescription};
-use palpate_protocols::file::{Problem, Protocol, built_in};
+use palpate_protocols::file::{Protocol, ProtocolProblem, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
-use palpate_runner::{AfterStop, Answers, RigView, RunRequest};
+use palpate_runner::{AfterStop, PromptResponder, RigView, RunRequest};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ const SESSIONS_MAX: u32 = 9_999;
 pub struct RunSetup {
     pub calibration: Calibration,
     /// Of the calibration.
-    pub curve: Curve,
+    pub curve: CalibrationCurve,
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
@@ -38,17 +38,17 @@ pub struct RunSetup {
 #[derive(Clone, Debug)]
 pub struct ProtocolForm {
     /// Or the problems of its file.
-    pub protocol: Result<Protocol, Vec<Problem>>,
+    pub protocol: Result<Protocol, Vec<ProtocolProblem>>,
     /// None for a built-in protocol.
     pub file: Option<PathBuf>,
     pub fields: Vec<ParamField>,
-    /// In the order of [`KEYS`].
+    /// In the order of [`METADATA_KEYS`].
     pub label_fields: Vec<LabelField>,
     /// Folder for new sessions; empty for the library.
     pub folder: String,
-    labels: Labels,
+    labels: SessionLabels,
     acknowledged: Vec<String>,
-    checked: Option<(CheckKey, Result<CheckedPlan, Vec<Problem>>)>,
+    checked: Option<(CheckKey, Result<CheckedPlan, Vec<ProtocolProblem>>)>,
 }
 
 /// What a preview depends on apart from the protocol: values by name, `None` while one is wrong, and whether the axis is
@@ -59,7 +59,7 @@ type CheckKey = (Option<BTreeMap<String, String>>, bool);
 #[derive(Clone, Debug)]
 pub struct CheckedPlan {
     pub plan: Plan,
-    pub warnings: Vec<Problem>,
+    pub warnings: Vec<ProtocolProblem>,
     pub preview: Preview,
     /// Expected depth and force over time for an average specimen.
     pub outline: Vec<OutlinePoint>,
@@ -79,9 +79,9 @@ impl Default for ProtocolForm {
             protocol: Err(Vec::new()),
             file: None,
             fields: Vec::new(),
-            label_fields: KEYS.iter().map(empty).collect(),
+            label_fields: METADATA_KEYS.iter().map(empty).collect(),
             folder: String::new(),
-            labels: Labels::default(),
+            labels: SessionLabels::default(),
             acknowledged: Vec::new(),
             checked: None,
         };
@@ -103,12 +103,12 @@ impl ProtocolForm {
     pub fn choose_file(&mut self, path: &Path, text: Result<String, String>) {
         let protocol = match text {
             Ok(text) => Protocol::read(&text),
-            Err(reason) => Err(vec![Problem::error(0, reason)]),
+            Err(reason) => Err(vec![ProtocolProblem::error(0, reason)]),
         };
         self.choose(protocol, Some(path.to_owned()));
     }
 
-    fn choose(&mut self, protocol: Result<Protocol, Vec<Problem>>, file: Option<PathBuf>) {
+    fn choose(&mut self, protocol: Result<Protocol, Vec<ProtocolProblem>>, file: Option<PathBuf>) {
         let parameters = protocol.iter().flat_map(|one| one.parameters.iter());
         self.fields = parameters.cloned().map(ParamField::new).collect();
         for field in &mut self.label_fields {
@@ -157,11 +157,11 @@ impl ProtocolForm {
     }
 
     fn read_labels(&mut self) {
-        self.labels = Labels::default();
+        self.labels = SessionLabels::default();
         for field in &mut self.label_fields {
             field.error = None;
             if !field.text.trim().is_empty() {
-                let read = self.labels.tell(field.key.name, &field.text);
+                let read = self.labels.set(field.key.name, &field.text);
                 field.error = read.err().map(|err| err.to_string());
             }
         }
@@ -187,19 +187,20 @@ impl ProtocolForm {
         rig: &RigView,
         bench: &RunSetup,
     ) -> Result<RunRequest, String> {
-        let words =
-            |problems: Vec<Problem>| problems.first().map_or_else(String::new, ToString::to_string);
+        let words = |problems: Vec<ProtocolProblem>| {
+            problems.first().map_or_else(String::new, ToString::to_string)
+        };
         let protocol = built_in(manual.protocol).ok_or("the protocol is not built in")?;
         let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // A button of a manual move acknowledges nothing.
-        if let (true, Some(reason)) = (is_gated(&plan), bench.to_acknowledge.first()) {
+        if let (true, Some(reason)) = (needs_daily_check(&plan), bench.to_acknowledge.first()) {
             return Err(format!(
                 "{reason}; make the daily check, or accept it on the run screen with the protocol {}",
                 manual.protocol
             ));
         }
-        preview.verdict(false)?;
+        preview.check_start(false)?;
         Ok(RunRequest { to_acknowledge: Vec::new(), ..self.request_for(plan, bench, false) })
     }
 
@@ -213,7 +214,7 @@ impl ProtocolForm {
             is_acknowledged,
             to_acknowledge: bench.to_acknowledge.clone(),
             after_stop: AfterStop::Wait,
-            answers: Answers::Operator,
+            answers: PromptResponder::Operator,
             leader: None,
         }
     }
@@ -229,7 +230,7 @@ impl ProtocolForm {
     }
 
     /// Problems of the file, or of the values together.
-    pub fn problems(&self) -> &[Problem] {
+    pub fn problems(&self) -> &[ProtocolProblem] {
         match (&self.protocol, &self.checked) {
             (Err(problems), _) | (Ok(_), Some((_, Err(problems)))) => problems,
             _ => &[],
@@ -275,7 +276,7 @@ impl ProtocolForm {
         let preview = &checked.preview;
         let is_box_open = preview.refusals.is_empty() && !preview.acknowledgements.is_empty();
         require(!is_box_open || self.is_acknowledged(), "tick the box above first")?;
-        preview.verdict(self.is_acknowledged())
+        preview.check_start(self.is_acknowledged())
     }
 
     /// The request to run the plan; `None` while it may not start.

@@ -138,7 +138,7 @@ fn labels_that_a_protocol_requires_must_be_filled_in() {
     let request = form.request(&bench().1).unwrap();
     let cycles = request.plan.steps.iter().map(|planned| planned.cycle).max();
     assert_eq!(cycles, Some(2));
-    assert!(request.labels.is_told("specimen.source"));
+    assert!(request.labels.is_set("specimen.source"));
     assert!(form.checked().unwrap().deepest_mm() > 19.9);
 }
 
@@ -148,7 +148,7 @@ fn a_file_with_mistakes_names_their_lines_and_does_not_start() {
     let text = "palpate = 1\nname = \"x\"\nversion = 1\ntitle = \"X\"\nabout = \"x\"\n[procedure]\nsteps = [\n  { do = \"rmap\" },\n]\n";
     form.choose_file(Path::new("x.toml"), Ok(text.into()));
     type_into(&mut form, &[]);
-    let words: Vec<String> = form.problems().iter().map(Problem::to_string).collect();
+    let words: Vec<String> = form.problems().iter().map(ProtocolProblem::to_string).collect();
     assert!(words.iter().any(|one| one.starts_with("line 8: ")), "{words:?}");
     assert!(form.verdict().unwrap_err().contains("correct the protocol file"));
     form.choose_built_in("ramp-hold");

@@ -6,7 +6,7 @@ use crate::widgets::{
 };
 use crate::workbench::ScreenOffers;
 use eframe::egui::{Button, Ui};
-use palpate_analysis::haptics::{Setting, THESIS};
+use palpate_analysis::haptics::{HapticSettings, THESIS};
 use palpate_haptics::{DriveKind, Period, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn usual_friction() -> String {
 
 impl Default for HapticsForm {
     fn default() -> Self {
-        let usual = Setting::source(Period::MILLISECOND);
+        let usual = HapticSettings::source(Period::MILLISECOND);
         Self {
             body: THESIS.into(),
             is_current: false,
@@ -58,25 +58,25 @@ impl HapticsForm {
         self.damping.check(not_negative);
         self.friction.check(not_negative);
         self.rate.check(check_rate);
-        let most = f64::from(Setting::DELAY_MAX);
+        let most = f64::from(HapticSettings::DELAY_MAX);
         self.delay.check(|delay| {
             let is_valid = (0.0..=most).contains(&delay) && delay.fract() == 0.0;
             require(is_valid, format!("must be a whole number from 0 to {most}"))
         });
-        self.depth.check(|depth| up_to(depth, Setting::DEPTH_MAX));
-        self.speed.check(|speed| up_to(speed, Setting::SPEED_MAX));
+        self.depth.check(|depth| up_to(depth, HapticSettings::DEPTH_MAX));
+        self.speed.check(|speed| up_to(speed, HapticSettings::SPEED_MAX));
     }
 
     /// The source of the material and the setting, or the first thing that is wrong.
-    pub fn request(&self) -> Result<(PathBuf, Setting), String> {
+    pub fn request(&self) -> Result<(PathBuf, HapticSettings), String> {
         let body = self.body.trim();
         let words = format!("type the folder of a session, a table, or '{THESIS}'");
         require(!body.is_empty(), words)?;
         let rate = self.rate.named_value("rate")?;
         let period = Period::of_rate(rate).map_err(|err| err.to_string())?;
-        let usual = Setting::source(period);
+        let usual = HapticSettings::source(period);
         let friction = self.friction.named_value("friction")?;
-        let setting = Setting {
+        let setting = HapticSettings {
             period,
             drive: match self.is_current {
                 false => usual.drive,
@@ -144,7 +144,7 @@ mod tests {
         form.check();
         let (body, setting) = form.request().unwrap();
         assert_eq!(body, Path::new(THESIS));
-        assert_eq!(setting, Setting::source(Period::MILLISECOND));
+        assert_eq!(setting, HapticSettings::source(Period::MILLISECOND));
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         }
         form.check();
         let (_, setting) = form.request().unwrap();
-        let expected = Setting {
+        let expected = HapticSettings {
             period: Period::of_rate(2000.0).unwrap(),
             drive: DriveKind::Current { amps_per_volt: 1.0 },
             damping: 0.5e-3,

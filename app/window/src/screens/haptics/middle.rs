@@ -7,8 +7,8 @@ use crate::widgets::{NamedControl, answer_ui, heading_ui, placeholder_ui};
 use crate::workers::haptic_loop::HapticLoop;
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Ui, vec2};
-use palpate_analysis::haptics::Tried;
-use palpate_figures::figure::{Axis, Ink, Plot, Series};
+use palpate_analysis::haptics::SimulatedTrial;
+use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotSeries};
 use palpate_runner::haptics::TrailPoint;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,18 +59,18 @@ fn before_ui(ui: &mut Ui, check: &HapticsCheck, running: Option<&HapticLoop>) {
     });
     heading_ui(ui, "Limit cycle of the simulated device");
     // The same heights in both, so that they compare.
-    let places = checked.tried.iter().flat_map(|tried| &tried.trace);
+    let places = checked.trials.iter().flat_map(|tried| &tried.trace);
     let ends = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
         [low.min(point[1]), high.max(point[1])]
     });
     ui.columns_const(|columns: &mut [Ui; 2]| {
-        for (ui, tried) in columns.iter_mut().zip(&checked.tried) {
+        for (ui, tried) in columns.iter_mut().zip(&checked.trials) {
             tried_ui(ui, tried, ends);
         }
     });
 }
 
-fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
+fn tried_ui(ui: &mut Ui, tried: &SimulatedTrial, ends: [f64; 2]) {
     let (id, words, ink) = match tried.is_guarded {
         false => ("unguarded", "without guards", Ink::Limit),
         true => ("guarded", "with guards", Ink::Series),
@@ -81,9 +81,9 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
     };
     let from = tried.trace.first().map_or(0.0, |point| point[0]);
     let to = tried.trace.last().map_or(1.0, |point| point[0]);
-    let time = Axis::linear("time from contact of the hand (s)");
-    let plot = Plot::new("", time, Axis::linear("position (mm)").seeing(&ends))
-        .with([Series::line(&buzz, ink, 1.4, tried.trace.clone())]);
+    let time = PlotAxis::linear("time from contact of the hand (s)");
+    let plot = Plot::new("", time, PlotAxis::linear("position (mm)").with_visible_values(&ends))
+        .with([PlotSeries::line(&buzz, ink, 1.4, tried.trace.clone())]);
     legend_ui(ui, &[&plot]);
     plot_ui(ui, id, &plot, PlotLook { shown: Some([from, to]), ..PlotLook::default() });
 }
@@ -91,7 +91,12 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, ends: [f64; 2]) {
 fn live_ui(ui: &mut Ui, live_loop: &HapticLoop) {
     let end = live_loop.last().t.0.max(PAST_S);
     let curve = |name, ink: Ink, of: fn(&TrailPoint) -> f64| {
-        Series::line(name, ink, 1.4, live_loop.trail().map(|point| [point.t, of(point)]).collect())
+        PlotSeries::line(
+            name,
+            ink,
+            1.4,
+            live_loop.trail().map(|point| [point.t, of(point)]).collect(),
+        )
     };
     let model = curve("force of the model", Ink::Quiet, |point| point.model);
     let force = curve("force commanded", Ink::Series, |point| point.force);

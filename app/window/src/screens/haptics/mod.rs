@@ -15,10 +15,10 @@ use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Slider, Ui};
 use form::HapticsForm;
 use middle::View;
-use palpate_analysis::haptics::{Checked, Setting, body_of, check};
-use palpate_analysis::haptics_tape::{led_recorder, recorded, replay};
+use palpate_analysis::haptics::{HapticCheck, HapticSettings, check, fit_haptic_body};
+use palpate_analysis::haptics_tape::{finish_recording, hand_led_recorder, replay};
 use palpate_analysis::progress::Progress;
-use palpate_analysis::recorded::Replayed;
+use palpate_analysis::tick_replay::ReplayResult;
 use std::path::{Path, PathBuf};
 
 /// How far above the surface a hand can be led, in mm.
@@ -27,9 +27,9 @@ const ABOVE: f64 = 2.0;
 /// A material on a device, checked.
 pub struct HapticsCheck {
     source: PathBuf,
-    setting: Setting,
+    setting: HapticSettings,
     notes: Vec<String>,
-    pub checked: Checked,
+    pub checked: HapticCheck,
 }
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
@@ -56,16 +56,16 @@ impl HapticsScreen {
     }
 
     /// The last check.
-    pub fn looked(&self) -> Option<&Result<HapticsCheck, String>> {
+    pub fn check_result(&self) -> Option<&Result<HapticsCheck, String>> {
         self.task.answer()
     }
 
     /// The loop that runs or ran last.
-    pub fn feel(&self) -> Option<&HapticLoop> {
+    pub fn live_loop(&self) -> Option<&HapticLoop> {
         self.live_loop.as_ref()
     }
 
-    pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
+    pub fn replayed(&self) -> Option<&Result<ReplayResult, String>> {
         self.tape.replayed()
     }
 
@@ -89,7 +89,7 @@ impl HapticsScreen {
         let checked = checked.map(|check| (check.setting, check.checked.body));
         let started = checked.and_then(|(setting, body)| {
             let is_guarded = !self.is_open;
-            let begin = |folder: &Path| led_recorder(folder, body, &setting, is_guarded);
+            let begin = |folder: &Path| hand_led_recorder(folder, body, &setting, is_guarded);
             let recorder = self.tape.begin(ctx, begin)?;
             let settings = setting.simulation(body, is_guarded);
             HapticLoop::start(&settings, setting.speed, recorder)
@@ -201,12 +201,12 @@ impl Screen for HapticsScreen {
         self.view = View::Margin;
         self.task.start("haptics-check", ctx, move |progress| {
             progress.share(0.0, "the fit");
-            let body = body_of(&source)?;
+            let body = fit_haptic_body(&source)?;
             let checked = check(body.body, &setting, &mut |share| {
                 progress.share(share, "the simulated device")
             })?;
             let mut notes = body.notes.clone();
-            notes.extend(body.beyond(setting.deepest));
+            notes.extend(body.extrapolation_warning(setting.deepest));
             Ok(HapticsCheck { source, setting, notes, checked })
         });
     }
@@ -225,7 +225,7 @@ impl Screen for HapticsScreen {
 
     fn stop(&mut self) {
         if let Some(beat) = self.live_loop.as_mut().and_then(HapticLoop::stop) {
-            self.tape.end(move || beat.end().and_then(recorded));
+            self.tape.end(move || beat.end().and_then(finish_recording));
         }
     }
 

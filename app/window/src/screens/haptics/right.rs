@@ -6,7 +6,7 @@ use crate::widgets::{
 };
 use crate::workers::haptic_loop::HapticLoop;
 use eframe::egui::{Label, RichText, Ui};
-use palpate_analysis::report::haptics::{margin_text, tried_text, why_less};
+use palpate_analysis::report::haptics::{force_loss_reasons, margin_text, tried_text};
 
 impl HapticsScreen {
     pub fn draw_right(&self, ui: &mut Ui) {
@@ -36,7 +36,7 @@ fn force_ui(ui: &mut Ui, live_loop: &HapticLoop) {
         ui.label("the loop does not run");
         return;
     }
-    let causes = why_less(live_loop.flags(), live_loop.missed());
+    let causes = force_loss_reasons(live_loop.flags(), live_loop.missed());
     if causes.is_empty() {
         placeholder_ui(ui, "nothing reduces it");
     }
@@ -73,7 +73,7 @@ fn loop_ui(ui: &mut Ui, live_loop: &HapticLoop) {
 fn check_ui(ui: &mut Ui, check: &HapticsCheck) {
     sentences_ui(ui, &check.checked.sentences);
     section_ui(ui, "Simulated before play");
-    for tried in &check.checked.tried {
+    for tried in &check.checked.trials {
         ui.add(Label::new(tried_text(tried)).wrap());
         ui.add_space(3.0);
     }

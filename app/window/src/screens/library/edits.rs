@@ -6,8 +6,10 @@ use crate::widgets::{
 };
 use crate::workers::BackgroundTask;
 use eframe::egui::{Button, Context, Key, Modifiers, Popup, Ui, vec2};
-use palpate_analysis::edits::{Act, Said, Saying, author, say, take_back};
-use palpate_sessions::edits::{Decision, Verdict};
+use palpate_analysis::edits::{
+    EditOutcome, SessionEdit, UndoableEdits, author, edit_sessions, undo_edits,
+};
+use palpate_sessions::edits::{DataQuality, ReviewDecision};
 use std::path::PathBuf;
 
 /// Edits that can be undone.
@@ -30,10 +32,10 @@ pub(super) struct EditPanel {
     tags: String,
     note: String,
     reason: String,
-    task: BackgroundTask<Said>,
+    task: BackgroundTask<EditOutcome>,
     step: EditStep,
-    undo: Vec<Act>,
-    redo: Vec<Act>,
+    undo: Vec<UndoableEdits>,
+    redo: Vec<UndoableEdits>,
 }
 
 impl Default for EditPanel {
@@ -70,7 +72,7 @@ impl EditPanel {
             return false;
         }
         let Some(Ok(edited)) = self.task.answer() else { return true };
-        if let Some(act) = edited.act.clone() {
+        if let Some(act) = edited.undo.clone() {
             match self.step {
                 EditStep::Edit => {
                     self.undo.push(act);
@@ -97,10 +99,12 @@ impl EditPanel {
         require(!self.by.trim().is_empty(), "type your name into 'by'")
     }
 
-    fn start(&mut self, ctx: &Context, sessions: &[PathBuf], edit: Saying) {
+    fn start(&mut self, ctx: &Context, sessions: &[PathBuf], edit: SessionEdit) {
         let (sessions, by) = (sessions.to_vec(), self.by.trim().to_owned());
         self.step = EditStep::Edit;
-        self.task.start("edits", ctx, move |progress| Ok(say(&edit, &sessions, &by, progress)));
+        self.task.start("edits", ctx, move |progress| {
+            Ok(edit_sessions(&edit, &sessions, &by, progress))
+        });
     }
 
     fn undo_or_redo(&mut self, ctx: &Context, step: EditStep) {
@@ -112,7 +116,7 @@ impl EditPanel {
         let Some(act) = stack.pop() else { return };
         let by = self.by.trim().to_owned();
         self.step = step;
-        self.task.start("undo", ctx, move |progress| Ok(take_back(&act, &by, progress)));
+        self.task.start("undo", ctx, move |progress| Ok(undo_edits(&act, &by, progress)));
     }
 
     /// Ctrl+Z undoes, Ctrl+Shift+Z and Ctrl+Y redo, while no text is typed.
@@ -143,29 +147,29 @@ impl EditPanel {
         text_row(ui, "new tags", "+pilot -doubtful", &mut self.tags);
         if button(ui, "Change tags", &needs(&self.tags, "tags")) {
             let (add, remove) = tags(&self.tags);
-            edit = Some(Saying::Tags { add, remove });
+            edit = Some(SessionEdit::Tags { add, remove });
         }
         text_row(ui, "note", "a remark", &mut self.note);
         if button(ui, "Add note", &needs(&self.note, "the note")) {
-            edit = Some(Saying::Note(self.note.clone()));
+            edit = Some(SessionEdit::Note(self.note.clone()));
         }
         text_row(ui, "reason", "of a verdict or a review", &mut self.reason);
         let needs_reason = needs(&self.reason, "the reason");
         let verdicts = [
-            ("Valid", Verdict::Valid),
-            ("Suspect", Verdict::Suspect),
-            ("Rejected", Verdict::Rejected),
+            ("Valid", DataQuality::Valid),
+            ("Suspect", DataQuality::Suspect),
+            ("Rejected", DataQuality::Rejected),
         ];
         if let Some(verdict) = choice_buttons(ui, verdicts, needs_reason.is_ok()) {
-            edit = Some(Saying::Verdict(verdict, self.reason.clone()));
+            edit = Some(SessionEdit::Verdict(verdict, self.reason.clone()));
         }
         let decisions = [
-            ("Accept", Decision::Accepted),
-            ("Reject", Decision::Rejected),
-            ("Repeat", Decision::Repeat),
+            ("Accept", ReviewDecision::Accepted),
+            ("Reject", ReviewDecision::Rejected),
+            ("Repeat", ReviewDecision::Repeat),
         ];
         if let Some(decision) = choice_buttons(ui, decisions, needs_reason.is_ok()) {
-            edit = Some(Saying::Review(decision, self.reason.clone()));
+            edit = Some(SessionEdit::Review(decision, self.reason.clone()));
         }
         if let Err(reason) = &needs_reason {
             quiet_ui(ui, format!("Verdict and review: {reason}"));
@@ -186,8 +190,8 @@ impl EditPanel {
             match self.task.answer() {
                 Some(Ok(edited)) => {
                     let done = match self.step {
-                        EditStep::Undo if edited.act.is_some() => "undone: ",
-                        EditStep::Redo if edited.act.is_some() => "redone: ",
+                        EditStep::Undo if edited.undo.is_some() => "undone: ",
+                        EditStep::Redo if edited.undo.is_some() => "redone: ",
                         _ => "",
                     };
                     quiet_ui(ui, format!("{done}{}", edited.words));
@@ -198,7 +202,7 @@ impl EditPanel {
             }
         }
         let may = self.may(1);
-        let words = |name: &str, stack: &[Act]| {
+        let words = |name: &str, stack: &[UndoableEdits]| {
             let act = stack.last()?;
             Some(format!("{name}: {}", act.words))
         };

@@ -3,8 +3,8 @@
 use crate::widgets::{choice_ui, quiet_ui, require, section_ui, small_alarm_ui, task_ui, text_row};
 use crate::workers::{BackgroundTask, Dialog};
 use eframe::egui::Ui;
-use palpate_analysis::exports::{Destination, Exported, export_all};
-use palpate_tables::export::Format;
+use palpate_analysis::exports::{ExportDestination, ExportSummary, export_all};
+use palpate_tables::export::TableFormat;
 use std::path::PathBuf;
 
 palpate_model::named! {
@@ -20,12 +20,12 @@ palpate_model::named! {
 }
 
 impl Kind {
-    fn destination(self, to: PathBuf) -> Destination {
+    fn destination(self, to: PathBuf) -> ExportDestination {
         match self {
-            Self::Csv => Destination::Tables(Format::Csv(b','), to),
-            Self::Parquet => Destination::Tables(Format::Parquet, to),
-            Self::Arrow => Destination::Tables(Format::Arrow, to),
-            Self::Lake => Destination::Lake(to),
+            Self::Csv => ExportDestination::Tables(TableFormat::Csv(b','), to),
+            Self::Parquet => ExportDestination::Tables(TableFormat::Parquet, to),
+            Self::Arrow => ExportDestination::Tables(TableFormat::Arrow, to),
+            Self::Lake => ExportDestination::Lake(to),
         }
     }
 }
@@ -35,7 +35,7 @@ pub(super) struct FilesPanel {
     kind: Kind,
     to: String,
     dialog: Dialog<PathBuf>,
-    task: BackgroundTask<Exported>,
+    task: BackgroundTask<ExportSummary>,
 }
 
 impl FilesPanel {

@@ -4,7 +4,7 @@ use crate::widgets::{choice_box_ui, small_alarm_ui, text_row};
 use chrono::{DateTime, Utc};
 use eframe::egui::Ui;
 use palpate_sessions::catalog::{
-    Choices, DayError, Order, Query, beginning, ending, words_and_conditions,
+    CatalogChoices, CatalogOrder, CatalogQuery, DayError, parse_end, parse_query_line, parse_start,
 };
 
 const VERDICTS: [&str; 4] = ["valid", "suspect", "rejected", "none"];
@@ -34,7 +34,7 @@ pub(super) struct SearchForm {
     review: NamePick,
     since: String,
     until: String,
-    pub order: Order,
+    pub order: CatalogOrder,
     pub is_reversed: bool,
 }
 
@@ -50,12 +50,11 @@ fn day(
 }
 
 impl SearchForm {
-    pub fn query(&self) -> Result<Query, String> {
-        let (words, conditions) =
-            words_and_conditions(&self.line).map_err(|err| err.to_string())?;
+    pub fn query(&self) -> Result<CatalogQuery, String> {
+        let (words, conditions) = parse_query_line(&self.line).map_err(|err| err.to_string())?;
         let verdict = self.verdict.chosen.as_deref().map(str::parse);
         let review = self.review.chosen.as_deref().map(str::parse);
-        Ok(Query {
+        Ok(CatalogQuery {
             words,
             conditions,
             specimen: self.specimen.chosen.clone(),
@@ -64,16 +63,16 @@ impl SearchForm {
             tags: self.tag.chosen.iter().cloned().collect(),
             verdict: verdict.transpose()?,
             review: review.transpose()?,
-            since: day(&self.since, beginning).map_err(|err| format!("from: {err}"))?,
-            before: day(&self.until, ending).map_err(|err| format!("until: {err}"))?,
+            since: day(&self.since, parse_start).map_err(|err| format!("from: {err}"))?,
+            before: day(&self.until, parse_end).map_err(|err| format!("until: {err}"))?,
             order: self.order,
             is_reversed: self.is_reversed,
-            ..Query::default()
+            ..CatalogQuery::default()
         })
     }
 
     /// Sorts by a column, in reverse where it is sorted by it already.
-    pub fn sort(&mut self, order: Order) {
+    pub fn sort(&mut self, order: CatalogOrder) {
         self.is_reversed = self.order == order && !self.is_reversed;
         self.order = order;
     }
@@ -83,10 +82,10 @@ impl SearchForm {
         *self = Self { order: self.order, is_reversed: self.is_reversed, ..Self::default() };
     }
 
-    pub fn ui(&mut self, ui: &mut Ui, choices: &Choices) {
+    pub fn ui(&mut self, ui: &mut Ui, choices: &CatalogChoices) {
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
         text_row(ui, "find", "words, depth>=20mm", &mut self.line);
-        if let Err(err) = words_and_conditions(&self.line) {
+        if let Err(err) = parse_query_line(&self.line) {
             small_alarm_ui(ui, err.to_string());
         }
         self.specimen.ui(ui, "specimen is", &choices.specimens);
@@ -97,7 +96,8 @@ impl SearchForm {
         self.review.ui(ui, "review is", &words(&REVIEWS));
         text_row(ui, "from", "2026-03-05", &mut self.since);
         text_row(ui, "until", "2026-03-31", &mut self.until);
-        for (text, read) in [(&self.since, beginning as fn(&str) -> _), (&self.until, ending)] {
+        for (text, read) in [(&self.since, parse_start as fn(&str) -> _), (&self.until, parse_end)]
+        {
             if let Err(err) = day(text, read) {
                 small_alarm_ui(ui, format!("'{text}' is not a day: {err}"));
             }
@@ -108,8 +108,8 @@ impl SearchForm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_sessions::catalog::{ReviewIs, VerdictIs};
-    use palpate_sessions::edits::{Decision, Verdict};
+    use palpate_sessions::catalog::{QualityFilter, ReviewFilter};
+    use palpate_sessions::edits::{DataQuality, ReviewDecision};
 
     #[test]
     fn the_form_asks_as_the_command_line_does() {
@@ -122,12 +122,12 @@ mod tests {
         form.verdict.chosen = Some("suspect".into());
         form.review.chosen = Some("repeat".into());
         form.tag.chosen = Some("pilot".into());
-        form.sort(Order::Started);
+        form.sort(CatalogOrder::Started);
         let query = form.query().unwrap();
         assert_eq!(query.words, "pig");
         assert_eq!(query.conditions, ["depth>=20mm".parse().unwrap()]);
-        assert_eq!(query.verdict, Some(VerdictIs::Given(Verdict::Suspect)));
-        assert_eq!(query.review, Some(ReviewIs::Given(Decision::Repeat)));
+        assert_eq!(query.verdict, Some(QualityFilter::Given(DataQuality::Suspect)));
+        assert_eq!(query.review, Some(ReviewFilter::Given(ReviewDecision::Repeat)));
         assert_eq!(query.tags, ["pilot"]);
         let day = query.before.unwrap() - query.since.unwrap();
         assert_eq!(day.num_hours(), 24);

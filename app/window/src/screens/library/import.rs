@@ -3,8 +3,8 @@
 use crate::widgets::{progress_ui, quiet_ui, require, section_ui, small_alarm_ui, text_row};
 use crate::workers::{BackgroundTask, Dialog};
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
-use palpate_analysis::imports::{Request, import_and_tell};
-use palpate_model::about::Labels;
+use palpate_analysis::imports::{ImportRequest, import_with_summary};
+use palpate_model::metadata::SessionLabels;
 use std::path::{Path, PathBuf};
 
 /// Between the paths of several files.
@@ -50,19 +50,19 @@ impl ImportPanel {
     }
 
     fn start(&mut self, ctx: &Context, library: &Path, is_dry_run: bool) {
-        let request = Request {
+        let request = ImportRequest {
             files: self.paths(),
-            labels: Labels {
+            labels: SessionLabels {
                 specimen: self.specimen.trim().to_owned(),
                 operator: self.operator.trim().to_owned(),
-                ..Labels::default()
+                ..SessionLabels::default()
             },
             library: Some(library.to_owned()),
             is_dry_run,
-            ..Request::default()
+            ..ImportRequest::default()
         };
         self.was_dry_run = is_dry_run;
-        self.task.start("import", ctx, move |progress| import_and_tell(&request, progress));
+        self.task.start("import", ctx, move |progress| import_with_summary(&request, progress));
     }
 
     /// Draws the form; sessions go to this library.

@@ -5,10 +5,10 @@ use crate::widgets::{
     TableLine,
 };
 use eframe::egui::Ui;
-use palpate_analysis::find::Found;
+use palpate_analysis::catalog_search::CatalogSearchResult;
 use palpate_analysis::report::catalog::one_line;
-use palpate_sessions::catalog::{Entry, Order, ReviewIs};
-use palpate_sessions::edits::{Decision, Verdict};
+use palpate_sessions::catalog::{CatalogEntry, CatalogOrder, ReviewFilter};
+use palpate_sessions::edits::{DataQuality, ReviewDecision};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
@@ -18,15 +18,15 @@ const ENTRIES_MAX: usize = 5000;
 const MARGIN: usize = 60;
 
 /// Heading, width, whether it has numbers, and the order that the heading sorts by.
-const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
-    ("started (UTC)", 134.0, false, Some(Order::Started)),
-    ("specimen", 92.0, false, Some(Order::Specimen)),
-    ("verdict", 78.0, false, Some(Order::Verdict)),
-    ("review", 88.0, false, Some(Order::Review)),
+const COLUMNS: [(&str, f32, bool, Option<CatalogOrder>); 10] = [
+    ("started (UTC)", 134.0, false, Some(CatalogOrder::Started)),
+    ("specimen", 92.0, false, Some(CatalogOrder::Specimen)),
+    ("verdict", 78.0, false, Some(CatalogOrder::Verdict)),
+    ("review", 88.0, false, Some(CatalogOrder::Review)),
     ("health", 86.0, false, None),
-    ("protocol", 110.0, false, Some(Order::Protocol)),
-    ("operator", 84.0, false, Some(Order::Operator)),
-    ("length", 70.0, true, Some(Order::Duration)),
+    ("protocol", 110.0, false, Some(CatalogOrder::Protocol)),
+    ("operator", 84.0, false, Some(CatalogOrder::Operator)),
+    ("length", 70.0, true, Some(CatalogOrder::Duration)),
     ("tags", 110.0, false, None),
     ("folder", 320.0, false, None),
 ];
@@ -34,7 +34,7 @@ const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
 #[derive(Debug, Default)]
 pub(super) struct SessionList {
     folders: Vec<String>,
-    entries: BTreeMap<String, (Entry, u64)>,
+    entries: BTreeMap<String, (CatalogEntry, u64)>,
     generation: u64,
     chosen: BTreeSet<String>,
     /// Raised with every change of those chosen.
@@ -50,12 +50,12 @@ pub(super) struct SessionList {
 pub(super) enum ListRequest {
     /// Review the sessions chosen.
     Open,
-    Sort(Order),
+    Sort(CatalogOrder),
 }
 
 impl SessionList {
     /// Takes the result of a search. Sessions that it does not have are no longer chosen.
-    pub fn take(&mut self, found: &mut Found) {
+    pub fn take(&mut self, found: &mut CatalogSearchResult) {
         self.folders = std::mem::take(&mut found.folders);
         self.generation += 1;
         self.choice += 1;
@@ -68,7 +68,7 @@ impl SessionList {
     }
 
     /// Takes catalog entries.
-    pub fn learn(&mut self, entries: Vec<Entry>) {
+    pub fn learn(&mut self, entries: Vec<CatalogEntry>) {
         let now = self.generation;
         if self.entries.len() > ENTRIES_MAX {
             self.entries.retain(|_, (_, of)| *of == now);
@@ -110,13 +110,13 @@ impl SessionList {
     }
 
     /// Of the sessions chosen, as far as they are read.
-    pub fn chosen_entries(&self) -> impl Iterator<Item = &Entry> {
+    pub fn chosen_entries(&self) -> impl Iterator<Item = &CatalogEntry> {
         let known = self.chosen.iter().filter_map(|one| self.entries.get(one));
         known.map(|(entry, _)| entry)
     }
 
     /// The only session chosen, and the generation of its entry.
-    pub fn only(&self) -> Option<(&Entry, u64)> {
+    pub fn only(&self) -> Option<(&CatalogEntry, u64)> {
         let folder = self.chosen.first().filter(|_| self.chosen.len() == 1)?;
         let (entry, of) = self.entries.get(folder)?;
         Some((entry, *of))
@@ -148,7 +148,7 @@ impl SessionList {
         self.at = Some(folder);
     }
 
-    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<ListRequest> {
+    pub fn ui(&mut self, ui: &mut Ui, sorted: (CatalogOrder, bool)) -> Vec<ListRequest> {
         let columns = COLUMNS.map(|(head, width, is_number, _)| {
             let head = head.to_owned();
             Column { head, width, is_number }
@@ -203,7 +203,7 @@ fn unread(folder: &str) -> TableLine {
 }
 
 /// State of a session's files according to the catalog: a glyph, a word, and what is wrong.
-pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
+pub(super) fn health(entry: &CatalogEntry) -> (Glyph, &'static str, Option<&str>) {
     match (&entry.trouble, &entry.ending) {
         (Some(trouble), _) => (Glyph::Diamond, "damaged", Some(trouble)),
         (None, None) => (Glyph::Half, "unfinished", None),
@@ -211,27 +211,27 @@ pub(super) fn health(entry: &Entry) -> (Glyph, &'static str, Option<&str>) {
     }
 }
 
-pub(super) fn verdict(entry: &Entry) -> (Glyph, &'static str) {
+pub(super) fn verdict(entry: &CatalogEntry) -> (Glyph, &'static str) {
     match entry.verdict {
-        Some(Verdict::Valid) => (Glyph::Tick, "valid"),
-        Some(Verdict::Suspect) => (Glyph::Question, "suspect"),
-        Some(Verdict::Rejected) => (Glyph::Cross, "rejected"),
+        Some(DataQuality::Valid) => (Glyph::Tick, "valid"),
+        Some(DataQuality::Suspect) => (Glyph::Question, "suspect"),
+        Some(DataQuality::Rejected) => (Glyph::Cross, "rejected"),
         None if entry.trouble.is_some() => (Glyph::Dash, "unknown"),
         None => (Glyph::Dash, "none"),
     }
 }
 
-pub(super) fn review(entry: &Entry) -> (Glyph, &'static str) {
-    let review = ReviewIs::of(entry.review.as_ref());
+pub(super) fn review(entry: &CatalogEntry) -> (Glyph, &'static str) {
+    let review = ReviewFilter::of(entry.review.as_ref());
     let mark = match review {
-        ReviewIs::Given(Decision::Accepted) => Glyph::Tick,
-        ReviewIs::Given(Decision::Rejected) => Glyph::Cross,
-        ReviewIs::Given(Decision::Repeat) => Glyph::Repeat,
-        ReviewIs::Outdated => Glyph::Question,
-        ReviewIs::None => Glyph::Dash,
+        ReviewFilter::Given(ReviewDecision::Accepted) => Glyph::Tick,
+        ReviewFilter::Given(ReviewDecision::Rejected) => Glyph::Cross,
+        ReviewFilter::Given(ReviewDecision::Repeat) => Glyph::Repeat,
+        ReviewFilter::Outdated => Glyph::Question,
+        ReviewFilter::None => Glyph::Dash,
     };
     match review {
-        ReviewIs::None if entry.trouble.is_some() => (mark, "unknown"),
+        ReviewFilter::None if entry.trouble.is_some() => (mark, "unknown"),
         review => (mark, review.word()),
     }
 }
@@ -241,7 +241,7 @@ pub(super) fn second(at: &str) -> String {
     at.get(..19).unwrap_or(at).replace('T', " ")
 }
 
-fn line(entry: &Entry) -> TableLine {
+fn line(entry: &CatalogEntry) -> TableLine {
     let or_dash = |text: &str| match one_line(text) {
         text if text.is_empty() => "-".to_owned(),
         text => text,
@@ -281,12 +281,15 @@ fn line(entry: &Entry) -> TableLine {
 mod tests {
     use super::*;
 
-    fn found(folders: &[&str]) -> Found {
-        let entry = |folder: &&str| Entry { folder: (*folder).to_owned(), ..Entry::default() };
-        Found {
+    fn found(folders: &[&str]) -> CatalogSearchResult {
+        let entry = |folder: &&str| CatalogEntry {
+            folder: (*folder).to_owned(),
+            ..CatalogEntry::default()
+        };
+        CatalogSearchResult {
             folders: folders.iter().map(ToString::to_string).collect(),
             first: folders.iter().take(2).map(entry).collect(),
-            ..Found::default()
+            ..CatalogSearchResult::default()
         }
     }
 
@@ -329,11 +332,11 @@ mod tests {
 
     #[test]
     fn a_row_has_its_state_in_words_and_shapes() {
-        let mut entry = Entry {
+        let mut entry = CatalogEntry {
             folder: "s/1".into(),
             ending: Some("finish".into()),
-            verdict: Some(Verdict::Suspect),
-            ..Entry::default()
+            verdict: Some(DataQuality::Suspect),
+            ..CatalogEntry::default()
         };
         assert_eq!(health(&entry).1, "whole");
         assert_eq!(verdict(&entry), (Glyph::Question, "suspect"));

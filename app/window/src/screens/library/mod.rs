@@ -18,8 +18,11 @@ use files::FilesPanel;
 use form::SearchForm;
 use import::ImportPanel;
 use list::{ListRequest, SessionList};
-use palpate_analysis::find::{Found, Search, Told, entries, search, told, update};
-use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
+use palpate_analysis::catalog_search::{
+    CatalogSearch, CatalogSearchResult, SessionHistory, entries, read_session_history, search,
+    update,
+};
+use palpate_sessions::catalog::{CatalogChanges, CatalogChoices, CatalogEntry, CatalogQuery};
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -44,24 +47,24 @@ struct SessionDetails {
     folder: String,
     /// Of its catalog entry.
     generation: u64,
-    history: Option<Result<Told, String>>,
+    history: Option<Result<SessionHistory, String>>,
 }
 
 pub struct LibraryScreen {
     library: Result<PathBuf, String>,
     form: SearchForm,
     /// The query of the search shown or in progress.
-    query: Option<Query>,
-    search: LatestAnswer<Search, Found>,
-    pages: LatestAnswer<(PathBuf, Vec<String>), Vec<Entry>>,
+    query: Option<CatalogQuery>,
+    search: LatestAnswer<CatalogSearch, CatalogSearchResult>,
+    pages: LatestAnswer<(PathBuf, Vec<String>), Vec<CatalogEntry>>,
     last_page: (u64, Vec<String>),
     searches: u64,
-    histories: LatestAnswer<(PathBuf, Entry), Told>,
+    histories: LatestAnswer<(PathBuf, CatalogEntry), SessionHistory>,
     details: Option<SessionDetails>,
-    update: BackgroundTask<Changes>,
+    update: BackgroundTask<CatalogChanges>,
     is_update_wanted: bool,
-    choices: Choices,
-    found: Option<Result<Found, String>>,
+    choices: CatalogChoices,
+    found: Option<Result<CatalogSearchResult, String>>,
     list: SessionList,
     /// Folders of the sessions chosen, and the number of the choice: thousands are not joined in every frame.
     chosen: (u64, Rc<Vec<PathBuf>>),
@@ -82,11 +85,11 @@ impl LibraryScreen {
             pages: LatestAnswer::new("entries", entries),
             last_page: (0, Vec::new()),
             searches: 0,
-            histories: LatestAnswer::new("history", told),
+            histories: LatestAnswer::new("history", read_session_history),
             details: None,
             update: BackgroundTask::default(),
             is_update_wanted: false,
-            choices: Choices::default(),
+            choices: CatalogChoices::default(),
             found: None,
             list: SessionList::default(),
             chosen: (0, Rc::default()),
@@ -147,7 +150,7 @@ impl LibraryScreen {
         let (Ok(library), Ok(query)) = (&self.library, self.form.query()) else { return };
         self.query = Some(query.clone());
         let library = library.clone();
-        self.search.ask(Search { library, query, page: PAGE }, ctx);
+        self.search.ask(CatalogSearch { library, query, page: PAGE }, ctx);
     }
 
     /// Folders of the sessions chosen.

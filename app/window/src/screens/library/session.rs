@@ -6,9 +6,9 @@ use crate::widgets::{
     small_alarm_ui, small_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
-use palpate_analysis::find::Told;
+use palpate_analysis::catalog_search::SessionHistory;
 use palpate_analysis::report::catalog::one_line;
-use palpate_sessions::catalog::{Entry, Origin, Source};
+use palpate_sessions::catalog::{CatalogEntry, NamedValueSource, SessionOrigin};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -33,7 +33,11 @@ fn marked_ui(ui: &mut Ui, name: &str, mark: Glyph, word: &str, is_wrong: bool) {
 }
 
 /// Draws one session. `history` is none until it is read.
-pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, history: Option<&Result<Told, String>>) {
+pub(super) fn session_ui(
+    ui: &mut Ui,
+    entry: &CatalogEntry,
+    history: Option<&Result<SessionHistory, String>>,
+) {
     section_ui(ui, "Session");
     let mut fact = |name: &str, value: &str| {
         if !value.is_empty() {
@@ -53,9 +57,9 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, history: Option<&Result<Tol
     fact(
         "origin",
         match entry.origin {
-            Origin::Recorded => "recorded here",
-            Origin::Imported => "imported from another program's file",
-            Origin::Recovered => "recovered from a damaged or interrupted one",
+            SessionOrigin::Recorded => "recorded here",
+            SessionOrigin::Imported => "imported from another program's file",
+            SessionOrigin::Recovered => "recovered from a damaged or interrupted one",
         },
     );
     let ending = entry.ending.as_deref().unwrap_or_default();
@@ -100,7 +104,7 @@ fn with_reason(word: &str, reason: &str) -> String {
     }
 }
 
-fn history_ui(ui: &mut Ui, history: Option<&Result<Told, String>>) {
+fn history_ui(ui: &mut Ui, history: Option<&Result<SessionHistory, String>>) {
     match history {
         None => quiet_ui(ui, "reading notes and history"),
         Some(Err(err)) => small_alarm_ui(ui, err),
@@ -128,10 +132,12 @@ fn history_ui(ui: &mut Ui, history: Option<&Result<Told, String>>) {
     }
 }
 
-fn values_ui(ui: &mut Ui, entry: &Entry) {
-    for (source, title) in
-        [(Source::About, "Labels"), (Source::Plan, "Protocol values"), (Source::Fit, "Saved fits")]
-    {
+fn values_ui(ui: &mut Ui, entry: &CatalogEntry) {
+    for (source, title) in [
+        (NamedValueSource::About, "Labels"),
+        (NamedValueSource::Plan, "Protocol values"),
+        (NamedValueSource::Fit, "Saved fits"),
+    ] {
         let values: Vec<_> = entry.named.iter().filter(|one| one.source == source).collect();
         if values.is_empty() {
             continue;
@@ -140,7 +146,7 @@ fn values_ui(ui: &mut Ui, entry: &Entry) {
         for one in values.iter().take(VALUES) {
             // A number that was converted has its unit in its text.
             let text = match (one.number, source) {
-                (Some(_), Source::Fit) => format!("{} {}", one.text, one.unit),
+                (Some(_), NamedValueSource::Fit) => format!("{} {}", one.text, one.unit),
                 _ => one.text.clone(),
             };
             ui.add(Label::new(one_line(&format!("{} {text}", one.name))).truncate());
@@ -152,13 +158,17 @@ fn values_ui(ui: &mut Ui, entry: &Entry) {
 }
 
 /// Draws what several sessions have in common. `count` are chosen.
-pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<Item = &'a Entry>) {
+pub(super) fn several_ui<'a>(
+    ui: &mut Ui,
+    count: usize,
+    entries: impl Iterator<Item = &'a CatalogEntry>,
+) {
     section_ui(ui, &format!("{count} sessions chosen"));
-    let entries: Vec<&Entry> = entries.collect();
+    let entries: Vec<&CatalogEntry> = entries.collect();
     if entries.len() < count {
         return;
     }
-    let names = |of: fn(&Entry) -> &str| {
+    let names = |of: fn(&CatalogEntry) -> &str| {
         let names: BTreeSet<&str> = entries.iter().map(|entry| of(entry)).collect();
         let mut words: Vec<String> = names.iter().take(NAMES).map(|name| one_line(name)).collect();
         if names.len() > NAMES {

@@ -8,9 +8,9 @@ use crate::widgets::{
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
 use palpate_analysis::report::selection_plot::plot;
-use palpate_analysis::select::Selected;
+use palpate_analysis::select::SelectionReport;
 use palpate_figures::uncertain::plain;
-use palpate_rheology::select::{Candidate, Selection};
+use palpate_rheology::select::{ModelCandidate, ModelSelection};
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.46;
@@ -31,7 +31,7 @@ const COLUMNS: [(&str, f32); 11] = [
 ];
 
 /// Draws every family over its cost, and the table beneath.
-pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
+pub(super) fn families_ui(ui: &mut Ui, selection: &ModelSelection) {
     let plot = plot(selection);
     heading_ui(ui, &plot.title);
     let height = ui.available_height() * PLOT_SHARE;
@@ -73,7 +73,7 @@ fn column(head: &str, width: f32) -> Column {
     }
 }
 
-fn emphasis(selection: &Selection, one: &Candidate) -> Emphasis {
+fn emphasis(selection: &ModelSelection, one: &ModelCandidate) -> Emphasis {
     match (&selection.verdict.family, one.is_within) {
         (Some(chosen), _) if *chosen == one.family => Emphasis::Marked,
         (_, Some(false)) => Emphasis::Quiet,
@@ -82,13 +82,13 @@ fn emphasis(selection: &Selection, one: &Candidate) -> Emphasis {
 }
 
 /// The family in words and what to know of its fit.
-fn hint(one: &Candidate) -> String {
+fn hint(one: &ModelCandidate) -> String {
     let lines = std::iter::once(&one.name).chain(&one.warnings).chain(&one.prediction_refused);
     lines.cloned().collect::<Vec<_>>().join("\n")
 }
 
 /// Draws the choice in words, what each term buys, and the recordings.
-pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
+pub(super) fn choice_ui(ui: &mut Ui, selected: &SelectionReport) {
     let tokens = tokens_of(ui);
     let selection = &selected.selection;
     section_ui(ui, "Choice");

@@ -6,9 +6,9 @@ use crate::widgets::{
 };
 use crate::workers::PathPurpose;
 use eframe::egui::{Button, Label, TextEdit, Ui};
+use palpate_analysis::recordings::RecordingNames;
 use palpate_analysis::select::SelectRequest;
-use palpate_analysis::source::Stretch;
-use palpate_analysis::sources::Naming;
+use palpate_analysis::source::RecordStretch;
 use palpate_rheology::select::{HoldOut, SelectOptions};
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use std::path::{Path, PathBuf};
@@ -59,8 +59,8 @@ impl ModelsForm {
         require(!self.sources.is_empty(), "add a recording first")?;
         Ok(SelectRequest {
             paths: self.sources.clone(),
-            wanted: Stretch::with_unload(self.with_unload).into(),
-            naming: Naming::Stem,
+            wanted: RecordStretch::with_unload(self.with_unload).into(),
+            naming: RecordingNames::Stem,
             options: SelectOptions {
                 tolerance: self.tolerance()?,
                 hold_out: self.hold_out,

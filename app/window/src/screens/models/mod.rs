@@ -9,7 +9,7 @@ use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbenc
 use crate::widgets::{answer_ui, placeholder_ui, section_ui, work_ui};
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
-use palpate_analysis::select::{Selected, select_sources};
+use palpate_analysis::select::{SelectionReport, select_sources};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
@@ -21,12 +21,12 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 #[derive(Default)]
 pub struct ModelsScreen {
     form: ModelsForm,
-    task: BackgroundTask<Selected>,
+    task: BackgroundTask<SelectionReport>,
 }
 
 impl ModelsScreen {
     /// The last comparison.
-    pub fn answer(&self) -> Option<&Result<Selected, String>> {
+    pub fn answer(&self) -> Option<&Result<SelectionReport, String>> {
         self.task.answer()
     }
 }

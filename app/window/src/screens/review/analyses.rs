@@ -5,16 +5,18 @@ mod list;
 mod quality;
 mod report;
 
-use super::Looked;
+use super::ReviewSource;
 use crate::command::Commands;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, task_ui, text_row};
 use crate::workers::{BackgroundTask, Job};
 use eframe::egui::{Context, Ui};
 use form::AnalysisForm;
-use palpate_analysis::analyses::{Deed, Done, Known, Who, own, read};
 use palpate_analysis::edits::author;
-use palpate_analysis::report::dossier::Wanted;
-use palpate_rheology::fit::Parameter;
+use palpate_analysis::report::dossier::SessionReading;
+use palpate_analysis::session_actions::{
+    ActionReport, Attribution, SessionAction, SessionActionContext, fit_without_analysis, read,
+};
+use palpate_rheology::fit::FittedParameter;
 use quality::QualityForm;
 use report::ReportPanel;
 use std::path::{Path, PathBuf};
@@ -22,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// The session's own fit: whose it is, its parameters and its sentences.
 struct OwnFit {
     session: PathBuf,
-    parameters: Vec<Parameter>,
+    parameters: Vec<FittedParameter>,
     sentences: Vec<String>,
 }
 
@@ -31,11 +33,11 @@ struct OwnFit {
 pub struct AnalysesPanel {
     library: Option<PathBuf>,
     /// Of the session in front, or why it cannot be read.
-    known: Option<Result<Known, String>>,
+    known: Option<Result<SessionActionContext, String>>,
     /// The session in front.
     front: Option<PathBuf>,
-    reading: Job<(PathBuf, Result<Known, String>)>,
-    work: BackgroundTask<Done>,
+    reading: Job<(PathBuf, Result<SessionActionContext, String>)>,
+    work: BackgroundTask<ActionReport>,
     is_working: bool,
     own: BackgroundTask<OwnFit>,
     form: AnalysisForm,
@@ -47,7 +49,7 @@ pub struct AnalysesPanel {
     made: Option<String>,
     /// A session that is not as it was.
     changed: Option<PathBuf>,
-    shown: Vec<Looked>,
+    shown: Vec<ReviewSource>,
 }
 
 impl AnalysesPanel {
@@ -65,7 +67,7 @@ impl AnalysesPanel {
         if self.is_working && !self.work.is_busy() {
             self.is_working = false;
             if let Some(Ok(done)) = self.work.answer() {
-                self.made.clone_from(&done.made);
+                self.made.clone_from(&done.created_analysis);
                 if done.changed.is_some() {
                     if done.is_edit {
                         self.changed.clone_from(&done.changed);
@@ -92,7 +94,7 @@ impl AnalysesPanel {
     }
 
     /// Which sessions are shown: what a report may be about.
-    pub fn set_shown(&mut self, shown: &[Looked]) {
+    pub fn set_shown(&mut self, shown: &[ReviewSource]) {
         self.shown.clear();
         self.shown.extend_from_slice(shown);
     }
@@ -116,7 +118,7 @@ impl AnalysesPanel {
     }
 
     /// Draws the analyses of a session; which of them it is read by can be chosen.
-    pub fn ui(&mut self, ui: &mut Ui, source: &mut Looked, _commands: &mut Commands) {
+    pub fn ui(&mut self, ui: &mut Ui, source: &mut ReviewSource, _commands: &mut Commands) {
         if self.front.as_ref() != Some(&source.session) {
             self.front = Some(source.session.clone());
             self.known = None;
@@ -136,7 +138,7 @@ impl AnalysesPanel {
         self.known = Some(known);
     }
 
-    fn known_ui(&mut self, ui: &mut Ui, known: &Known, source: &mut Looked) {
+    fn known_ui(&mut self, ui: &mut Ui, known: &SessionActionContext, source: &mut ReviewSource) {
         // What was made is chosen once it is among what is known.
         let is_known = |made: &mut String| known.analyses.all.iter().any(|one| one.name == *made);
         if let Some(made) = self.made.take_if(is_known) {
@@ -154,7 +156,7 @@ impl AnalysesPanel {
         self.own_ui(ui);
         section_ui(ui, "New analysis");
         let others = self.shown.iter().filter(|one| one.session != known.session);
-        let others: Vec<Wanted> = others.map(report::report_source).collect();
+        let others: Vec<SessionReading> = others.map(report::report_source).collect();
         let name = self.form.ui(ui, known, source.analysis.as_deref(), &others);
         // One pair of fields for all that is done to a session.
         text_row(ui, "reason", "why, in a few words", &mut self.reason);
@@ -185,8 +187,9 @@ impl AnalysesPanel {
         require(!self.reason.trim().is_empty(), "type a reason above")
     }
 
-    fn start(&mut self, ctx: &Context, session: &Path, action: Deed) {
-        let who = Who { by: self.by.trim().to_owned(), reason: self.reason.trim().to_owned() };
+    fn start(&mut self, ctx: &Context, session: &Path, action: SessionAction) {
+        let who =
+            Attribution { by: self.by.trim().to_owned(), reason: self.reason.trim().to_owned() };
         let session = session.to_path_buf();
         self.is_working = true;
         self.work.start("analysis", ctx, move |progress| {
@@ -198,7 +201,8 @@ impl AnalysesPanel {
         let session = session.to_path_buf();
         let is_rejected_included = self.form.is_rejected_included();
         self.own.start("own-fit", ctx, move |progress| {
-            let (parameters, sentences) = own(&session, is_rejected_included, progress)?;
+            let (parameters, sentences) =
+                fit_without_analysis(&session, is_rejected_included, progress)?;
             Ok(OwnFit { session, parameters, sentences })
         });
     }

@@ -10,7 +10,7 @@ use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over
 use crate::widgets::{heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
 use eframe::egui::{Ui, vec2};
-use palpate_model::signal::track::Track;
+use palpate_model::signal::track::SignalTrack;
 
 /// Points that the axes beside and below a plot take of it.
 const AXIS_WIDTH: f32 = 58.0;
@@ -187,7 +187,7 @@ impl ReviewScreen {
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = tokens_of(ui);
-        let cursors = |track: &Track, shift: f64| {
+        let cursors = |track: &SignalTrack, shift: f64| {
             self.cursors.map(|cursor| {
                 let place = track.place(cursor? + shift)?;
                 let value = |quantity: Quantity| track.value(quantity as usize, place);

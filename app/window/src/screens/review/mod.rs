@@ -33,7 +33,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 
 /// A session, and the analysis by which it is read: none for the session as it was measured.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Looked {
+pub struct ReviewSource {
     pub session: PathBuf,
     pub analysis: Option<String>,
 }
@@ -113,7 +113,7 @@ impl ReviewScreen {
         if self.subjects.iter().any(|one| one.source.session == session) {
             return;
         }
-        let source = Looked { session, analysis: None };
+        let source = ReviewSource { session, analysis: None };
         self.subjects.push(ReviewSubject::new(source, self.next_id));
         self.next_id += 1;
         self.fetch(ctx);
@@ -231,7 +231,7 @@ impl Screen for ReviewScreen {
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_right(ui);
-        let shown: Vec<Looked> = self.subjects.iter().map(|one| one.source.clone()).collect();
+        let shown: Vec<ReviewSource> = self.subjects.iter().map(|one| one.source.clone()).collect();
         self.analyses.set_shown(&shown);
         let shift = self.front().map_or(0.0, |one| one.shift(self.time_origin));
         let cursors = match self.cursors {

@@ -8,7 +8,7 @@ use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_figures::uncertain::{interval, plain};
-use palpate_sessions::edits::Verdict;
+use palpate_sessions::edits::DataQuality;
 
 /// Letters of a hash that tell it apart at a glance; the whole one is copied.
 const HASH_SHOWN: usize = 12;
@@ -66,7 +66,7 @@ fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
     }
     match &facts.verdict {
         None => fact_ui(ui, "verdict", "none"),
-        Some((Verdict::Valid, reason)) => fact_ui(ui, "verdict", format!("valid: {reason}")),
+        Some((DataQuality::Valid, reason)) => fact_ui(ui, "verdict", format!("valid: {reason}")),
         Some((verdict, reason)) => alarm_ui(ui, format!("verdict: {verdict}: {reason}")),
     }
     match &facts.end {

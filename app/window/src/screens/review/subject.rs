@@ -1,6 +1,6 @@
 //! One session of those shown: what was read of it, its fit, and the points drawn.
 
-use super::Looked;
+use super::ReviewSource;
 use crate::plots::stretches::{LineWindow, Stretches};
 use crate::widgets::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A session that is shown.
 pub struct ReviewSubject {
-    pub source: Looked,
+    pub source: ReviewSource,
     /// Its own as long as it is shown; its colour follows from it.
     pub id: u64,
     pub name: String,
@@ -30,7 +30,7 @@ pub const LINE_RESIDUAL: usize = 5;
 impl ReviewSubject {
     /// A session that is still to be read.
     #[must_use]
-    pub fn new(source: Looked, id: u64) -> Self {
+    pub fn new(source: ReviewSource, id: u64) -> Self {
         let recording = ReviewRecording::new(&source.session, source.analysis.as_deref());
         Self {
             name: recording.name(),
@@ -87,7 +87,7 @@ impl ReviewSubject {
         !matches!(self.recording.stage, Stage::Waiting | Stage::Reading)
     }
 
-    /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
+    /// CatalogChanges with every fifth of it that was read, so that lines are not found again for every piece.
     pub fn fifths(&self) -> u64 {
         if self.is_settled() { u64::MAX } else { (self.recording.share() * 5.0) as u64 }
     }

@@ -9,7 +9,7 @@ use crate::widgets::{
     tokens_of,
 };
 use eframe::egui::{Button, Grid, Key, Label, RichText, ScrollArea, Ui, vec2};
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::units::{MmPerS, Seconds};
@@ -127,7 +127,7 @@ impl RigScreen {
     }
 }
 
-fn values_ui(ui: &mut Ui, rig: &RigView, curve: &Curve) {
+fn values_ui(ui: &mut Ui, rig: &RigView, curve: &CalibrationCurve) {
     let tokens = tokens_of(ui);
     let none = || "--".to_owned();
     let position = rig.reading.map(|reading| {

@@ -7,7 +7,7 @@ use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui, tick_box}
 use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene, SceneInstant};
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Ui, vec2};
-use palpate_figures::figure::{Ink, Series};
+use palpate_figures::figure::{Ink, PlotSeries};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PictureSource {
@@ -114,7 +114,12 @@ impl SceneScreen {
         let size = vec2(ui.available_width(), height);
         ui.allocate_ui(size, |ui| self.view.ui(ui, &picture));
         let curve = |name, ink, of: fn(&ForcePoint) -> f64| {
-            Series::line(name, ink, 1.4, trail.iter().map(|point| [point.t, of(point)]).collect())
+            PlotSeries::line(
+                name,
+                ink,
+                1.4,
+                trail.iter().map(|point| [point.t, of(point)]).collect(),
+            )
         };
         let force = curve("force on the hand", Ink::Limit, |point| point.force);
         let depth = curve("depth of the stylus", Ink::Series, |point| point.depth);

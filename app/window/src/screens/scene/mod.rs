@@ -16,9 +16,9 @@ use eframe::egui::{Context, Key, Ui};
 use form::SceneForm;
 use middle::PictureSource;
 use palpate_analysis::progress::Progress;
-use palpate_analysis::recorded::Replayed;
-use palpate_analysis::scene::{recorded, replay, scene_of};
-use palpate_haptics::scene::{Hand6, SceneSettings};
+use palpate_analysis::scene::{finish_scene_recording, read_scene, replay};
+use palpate_analysis::tick_replay::ReplayResult;
+use palpate_haptics::scene::{HandPose, SceneSettings};
 use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
 use plan::PlannedScene;
@@ -79,12 +79,12 @@ impl SceneScreen {
     }
 
     /// The scene that runs or ran last.
-    pub fn touch(&self) -> Option<&LiveScene> {
+    pub fn live_scene(&self) -> Option<&LiveScene> {
         self.live.as_ref()
     }
 
     /// The path that was computed last.
-    pub fn ahead(&self) -> Option<&Result<ComputedPath, String>> {
+    pub fn computed_path(&self) -> Option<&Result<ComputedPath, String>> {
         self.computed.answer()
     }
 
@@ -99,7 +99,7 @@ impl SceneScreen {
         self.form.settings().map(|_| ())
     }
 
-    pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
+    pub fn replayed(&self) -> Option<&Result<ReplayResult, String>> {
         self.tape.replayed()
     }
 
@@ -110,7 +110,7 @@ impl SceneScreen {
         }
         let named = self.form.file.trim().to_owned();
         self.reading.start("scene-read", ctx, move |_| {
-            scene_of((!named.is_empty()).then_some(Path::new(&named)))
+            read_scene((!named.is_empty()).then_some(Path::new(&named)))
         });
     }
 
@@ -229,7 +229,7 @@ impl Screen for SceneScreen {
                 None => {}
             }
         }
-        let hand = Hand6 { at: self.view.hand().at(), turn: TURN };
+        let hand = HandPose { at: self.view.hand().at(), turn: TURN };
         if let Some(Err(reason)) = self.live.as_mut().map(|live| live.poll(hand)) {
             self.refusal = Some(reason);
             self.tape.cut_off();
@@ -284,7 +284,7 @@ impl Screen for SceneScreen {
 
     fn stop(&mut self) {
         if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
-            self.tape.end(move || live.stop().and_then(recorded));
+            self.tape.end(move || live.stop().and_then(finish_scene_recording));
         }
     }
 

@@ -6,20 +6,20 @@ use crate::widgets::{NamedControl, alarm_ui, fact_ui, quiet_ui, reason_button, s
 use crate::workers::live_scene::LiveScene;
 use eframe::egui::{Ui, vec2};
 use palpate_analysis::report::scene::plan_text;
-use palpate_analysis::scene_bench::{made_after, planned, planned_again};
-use palpate_haptics::surface::{NoPlan, SceneCurves, ScenePlan};
+use palpate_analysis::scene_bench::{plan_scene, replan_scene, scene_from_plan};
+use palpate_haptics::surface::{SceneCurves, ScenePlan, ScenePlanError};
 use palpate_runner::haptics::scene_file::SceneFile;
 
 /// A plan, what it was made of, and what it answers.
 pub(super) struct PlannedScene {
     file: SceneFile,
     curves: SceneCurves,
-    plan: Result<ScenePlan, NoPlan>,
+    plan: Result<ScenePlan, ScenePlanError>,
 }
 
 impl PlannedScene {
     fn of(file: SceneFile, curves: &SceneCurves) -> Self {
-        Self { plan: planned(&file, curves, 1.0), curves: curves.clone(), file }
+        Self { plan: plan_scene(&file, curves, 1.0), curves: curves.clone(), file }
     }
 
     fn is_of(&self, file: &SceneFile, curves: &SceneCurves) -> bool {
@@ -52,7 +52,7 @@ impl SceneScreen {
         }
         let verdict = match &self.planned {
             None => Err("measure the cost of a scene on the screen Trade first".to_owned()),
-            Some(PlannedScene { plan: Err(none), .. }) => Err(none.why.clone()),
+            Some(PlannedScene { plan: Err(none), .. }) => Err(none.reason.clone()),
             Some(_) if is_running => Err("the scene runs".to_owned()),
             Some(PlannedScene { plan: Ok(_), .. }) => Ok(()),
         };
@@ -68,7 +68,7 @@ impl SceneScreen {
                 quiet_ui(ui, line);
             }
             if is_used {
-                self.form.take(made_after(file, plan));
+                self.form.take(scene_from_plan(file, plan));
             }
         }
         self.late_ui(ui);
@@ -97,16 +97,16 @@ impl SceneScreen {
 /// What follows for a scene whose ticks took so many microseconds. Only where its own plan was missed do the times of all others
 /// change with it.
 fn after_miss(file: &SceneFile, curves: &SceneCurves, took: f64) -> String {
-    match planned(file, curves, 1.0) {
-        Ok(plan) if made_after(file, &plan) == *file => {
-            let again = match planned_again(file, curves, &plan, took) {
+    match plan_scene(file, curves, 1.0) {
+        Ok(plan) if scene_from_plan(file, &plan) == *file => {
+            let again = match replan_scene(file, curves, &plan, took) {
                 Ok(plan) => plan_text(&plan),
-                Err(none) => none.why,
+                Err(none) => none.reason,
             };
             format!("planned again with that time:\n{again}")
         }
         Ok(_) => "the scene that ran does not follow its plan; use the plan and start again".into(),
-        Err(none) => none.why,
+        Err(none) => none.reason,
     }
 }
 
@@ -140,9 +140,9 @@ mod tests {
         file.tolerances.shape_mm = 0.05;
         file.tolerances.tick_us = 150.0;
         let curves = curves(&file);
-        let plan = planned(&file, &curves, 1.0).unwrap();
+        let plan = plan_scene(&file, &curves, 1.0).unwrap();
         assert_eq!(plan.mesh.nodes, 201);
-        let fine = made_after(&file, &plan);
+        let fine = scene_from_plan(&file, &plan);
         // Four times as slow as measured: only the coarse mesh keeps to the budget, and it is too coarse.
         let words = after_miss(&fine, &curves, 400.0);
         assert!(words.contains("within the budget, 51 nodes a side"), "{words}");

@@ -31,7 +31,7 @@ fn force_ui(ui: &mut Ui, tick: &SceneTick) {
     fact_ui(ui, "speed", format!("{:.1} mm/s inwards", tick.speed));
     fact_ui(ui, "moved", format!("{} nodes", tick.moved));
     section_ui(ui, "Why no force?");
-    ui.add(Label::new(tick.why.name()).wrap());
+    ui.add(Label::new(tick.no_force_reason.name()).wrap());
 }
 
 fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {

@@ -11,12 +11,12 @@ use crate::widgets::{
 };
 use crate::workers::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui, vec2};
-use palpate_analysis::report::scatter::Scatter;
+use palpate_analysis::report::scatter::ScatterPlot;
 use palpate_analysis::report::text::capital;
 use palpate_analysis::trade::stored::{read_trade, trade_file, write_trade};
 use palpate_analysis::trade::text::{advice, percent, terms};
-use palpate_analysis::trade::{self, Extent, SCENE_PEAK};
-use palpate_haptics::surface::{Needs, NoPlan, SceneCurves, ScenePlan, plan};
+use palpate_analysis::trade::{self, SCENE_PEAK, TradeExtent};
+use palpate_haptics::surface::{SceneCurves, ScenePlan, ScenePlanError, SceneRequirements, plan};
 use palpate_model::units::Newtons;
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use palpate_rheology::trade::{Recommendation, TradeCurves};
@@ -118,9 +118,9 @@ impl TradeScreen {
     }
 
     /// The plan for what is wanted of a scene; none before its curves are measured.
-    fn planned(&self) -> Option<Result<ScenePlan, NoPlan>> {
+    fn planned(&self) -> Option<Result<ScenePlan, ScenePlanError>> {
         let curves = self.scene_curves()?;
-        let needs = Needs {
+        let needs = SceneRequirements {
             force: self.tolerance.parse().ok()?,
             peak: SCENE_PEAK,
             shape_mm: self.shape.value.clone().ok()?,
@@ -181,7 +181,7 @@ impl TradeScreen {
                 plan_lines(&plan).iter().for_each(|line| sentence_ui(ui, line));
             }
             Some(Err(none)) => {
-                alarm_ui(ui, format!("no plan: {}", none.why));
+                alarm_ui(ui, format!("no plan: {}", none.reason));
                 if let Some(plan) = &none.nearest {
                     section_ui(ui, "Nearest within the budget");
                     plan_lines(plan).iter().for_each(|line| sentence_ui(ui, line));
@@ -243,7 +243,7 @@ impl Screen for TradeScreen {
         };
         let height = ui.available_height() * PLOT_SHARE;
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-            let scatter = Scatter {
+            let scatter = ScatterPlot {
                 axes: shown.axes,
                 marks: &shown.marks,
                 has_front: self.view != View::Families,
@@ -319,7 +319,7 @@ impl Screen for TradeScreen {
         if workbench.measure_verdict().is_err() {
             return;
         }
-        let extent = if self.is_quick { Extent::Quick } else { Extent::Full };
+        let extent = if self.is_quick { TradeExtent::Quick } else { TradeExtent::Full };
         if self.view.is_scene() {
             self.scene.start("scene-curves", ctx, move |progress| {
                 let curves = trade::measure_scene(extent, progress)?;

@@ -1,15 +1,15 @@
 //! The curves of accuracy over cost as points and table rows.
 
 use crate::widgets::{Column, Emphasis, TableRow};
-use palpate_analysis::report::scatter::Mark;
+use palpate_analysis::report::scatter::ScatterPoint;
 use palpate_analysis::trade::text::{digits, plain, time};
 use palpate_haptics::surface::{SceneCurves, ScenePlan};
-use palpate_rheology::trade::{TradeCurves, front};
+use palpate_rheology::trade::{TradeCurves, find_pareto_front};
 
 /// A curve as points and table rows.
 pub(super) struct TradeTable {
     pub axes: [&'static str; 2],
-    pub marks: Vec<Mark>,
+    pub marks: Vec<ScatterPoint>,
     pub columns: Vec<Column>,
     pub rows: Vec<TableRow>,
     /// The mark of what is recommended.
@@ -40,7 +40,8 @@ impl TradeTable {
         hint: Option<String>,
     ) {
         if let [Some(cost), Some(error)] = at {
-            self.marks.push(Mark { at: [cost, error], label: [String::new(), cells.join("\n")] });
+            self.marks
+                .push(ScatterPoint { at: [cost, error], label: [String::new(), cells.join("\n")] });
         }
         let emphasis = match (is_front, at[1]) {
             (true, _) => Emphasis::Marked,
@@ -137,7 +138,7 @@ fn scene_table(
     let mut table = TradeTable::new(axes, &[head, axes[0], axes[1]]);
     let points: Vec<ScenePoint> = points.collect();
     let places: Vec<[f64; 2]> = points.iter().map(|one| [one.cost, one.error]).collect();
-    let best = front(&places);
+    let best = find_pareto_front(&places);
     for (index, mut one) in points.into_iter().enumerate() {
         if one.is_planned {
             one.words.push_str(" (planned)");
@@ -167,7 +168,7 @@ pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeTa
     let points = curves.cuts.iter().map(|point| ScenePoint {
         words: match (point.range, point.threshold_mm > 0.0) {
             (None, false) => "no cut".to_owned(),
-            _ => point.words(),
+            _ => point.description(),
         },
         cost: 100.0 * point.cost_share,
         error: point.error_mm,
@@ -191,7 +192,7 @@ pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> TradeT
 pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
     let cut = match (plan.cut.range, plan.cut.threshold_mm > 0.0) {
         (None, false) => "without a cut".to_owned(),
-        _ => format!("cut at {}", plan.cut.words()),
+        _ => format!("cut at {}", plan.cut.description()),
     };
     let mut lines = vec![
         format!("{0} x {0} nodes, {cut}", plan.mesh.nodes),

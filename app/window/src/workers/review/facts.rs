@@ -1,14 +1,14 @@
 //! Facts of a session apart from its samples.
 
-use palpate_analysis::analysed::Passing;
+use palpate_analysis::analysed_session::StreamedAnalysis;
 use palpate_model::calibration::Calibration;
-use palpate_model::signal::track::Track;
+use palpate_model::signal::track::SignalTrack;
 use palpate_protocols::engine::{Effect, Record};
-use palpate_sessions::analyses::{Input, inputs_of};
+use palpate_sessions::analyses::{AnalysisInput, read_session_inputs};
 use palpate_sessions::contacts::contacts;
-use palpate_sessions::edits::Verdict;
+use palpate_sessions::edits::DataQuality;
 use palpate_sessions::health::HealthSummary;
-use palpate_sessions::record::{EndRecord, Entry, EntryKind};
+use palpate_sessions::record::{EndRecord, EntryKind, LogEntry};
 use serde_json::Value;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub struct SessionFacts {
     /// The calibration that the forces are made with.
     pub calibration: Option<Calibration>,
     /// With its reason.
-    pub verdict: Option<(Verdict, String)>,
+    pub verdict: Option<(DataQuality, String)>,
     pub end: Option<EndRecord>,
     pub health: HealthSummary,
     /// In order, without phases.
@@ -56,18 +56,18 @@ pub struct SessionFacts {
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
     /// SHA-256 of each file it is made of.
-    pub hashes: Vec<Input>,
+    pub hashes: Vec<AnalysisInput>,
     /// Remarks of the reader, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl SessionFacts {
     #[must_use]
-    pub fn of(path: &Path, passing: &Passing) -> Self {
+    pub fn of(path: &Path, passing: &StreamedAnalysis) -> Self {
         let (outline, edits) = (&passing.edited.outline, &passing.edited.edits);
         let manifest = &outline.manifest;
         let mut notes = outline.notes.clone();
-        let hashes = inputs_of(path).unwrap_or_else(|err| {
+        let hashes = read_session_inputs(path).unwrap_or_else(|err| {
             notes.push(format!("the hashes of its files cannot be computed: {err}"));
             Vec::new()
         });
@@ -82,7 +82,7 @@ impl SessionFacts {
             calibration: serde_json::from_value(manifest.calibration.clone()).ok(),
             verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.clone())),
             end: outline.end.clone(),
-            health: outline.beside.health.clone(),
+            health: outline.auxiliary.health.clone(),
             events: outline.entries.iter().filter_map(event).collect(),
             contact: first_contact.map(|found| found.after_sample as usize),
             left_out_s: passing.left_out_s.clone(),
@@ -108,13 +108,13 @@ impl SessionFacts {
     }
 
     /// Time of the first contact in s since the first sample.
-    pub fn contact_time(&self, track: &Track) -> Option<f64> {
+    pub fn contact_time(&self, track: &SignalTrack) -> Option<f64> {
         track.time_of(self.contact?)
     }
 }
 
 /// An entry in words; none for entries that the plots show in another way.
-fn event(entry: &Entry) -> Option<SessionEvent> {
+fn event(entry: &LogEntry) -> Option<SessionEvent> {
     let made = |text: String, is_alarm: bool, is_note: bool| {
         Some(SessionEvent {
             after_sample: usize::try_from(entry.after_sample).unwrap_or(usize::MAX),

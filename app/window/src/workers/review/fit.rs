@@ -1,9 +1,9 @@
 //! Fits of the sessions shown, and the prediction of one session by the fit of another.
 
-use palpate_analysis::fit::{Fitted, IntervalsWanted, Recipe};
+use palpate_analysis::fit::{FitRecipe, IntervalRequest, SourceFit};
 use palpate_analysis::progress::Progress;
-use palpate_analysis::source::Wanted;
-use palpate_model::signal::track::{SEGMENT, Segment, Track};
+use palpate_analysis::source::SourceSelection;
+use palpate_model::signal::track::{SEGMENT, SignalTrack, TrackSegment};
 use palpate_model::units::Newtons;
 use palpate_rheology::fit::{FitOptions, FitReport, FitSample, ProfileInterval};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ pub struct SessionFit {
     /// Intervals from the profile likelihood, or why there are none.
     pub profile: Result<Vec<ProfileInterval>, String>,
     /// Modelled force and residual over the session's time.
-    pub track: Track,
+    pub track: SignalTrack,
     /// Remarks of the reader of the session.
     pub notes: Vec<String>,
 }
@@ -54,7 +54,7 @@ pub struct SessionPrediction {
     /// Of the first session.
     pub fit: FitReport,
     /// Predicted force and residual over the time of the second session.
-    pub track: Track,
+    pub track: SignalTrack,
     /// RMSE.
     pub rms_n: f64,
     /// The highest measured force.
@@ -64,17 +64,19 @@ pub struct SessionPrediction {
     pub samples: usize,
 }
 
-fn samples_of(subject: &FitSubject) -> Result<Fitted, String> {
+fn samples_of(subject: &FitSubject) -> Result<SourceFit, String> {
     let is_rejected_included = subject.is_rejected_included;
-    let wanted = Wanted { is_rejected_included, ..Wanted::default() };
-    let recipe =
-        Recipe { analysis: subject.analysis.clone(), ..Recipe::new(subject.options()?, wanted) };
+    let wanted = SourceSelection { is_rejected_included, ..SourceSelection::default() };
+    let recipe = FitRecipe {
+        analysis: subject.analysis.clone(),
+        ..FitRecipe::new(subject.options()?, wanted)
+    };
     recipe.fit(&subject.path).map_err(|err| err.to_string())
 }
 
 /// Modelled forces in N and residuals in mN, from the start of the ramp.
-fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
-    let mut track = Track::default();
+fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> SignalTrack {
+    let mut track = SignalTrack::default();
     for (samples, modelled) in samples.chunks(SEGMENT).zip(modelled.chunks(SEGMENT)) {
         let residual = samples.iter().zip(modelled).map(|(one, fit)| match one.is_measured() {
             true => ((one.force.0 - fit.0) * 1e3) as f32,
@@ -82,7 +84,7 @@ fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
         });
         let columns = [modelled.iter().map(|fit| fit.0 as f32).collect(), residual.collect()];
         let times = samples.iter().map(|one| ramp_t + one.t.0).collect();
-        track.push(Arc::new(Segment::new(times, &columns)));
+        track.push(Arc::new(TrackSegment::new(times, &columns)));
     }
     track
 }
@@ -92,7 +94,7 @@ pub fn fit_session(subject: &FitSubject) -> Result<SessionFit, String> {
     let report = fitted.result.clone().map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
     let options = subject.options()?;
-    let wanted = IntervalsWanted { with_profile: true, bootstrap: None };
+    let wanted = IntervalRequest { with_profile: true, bootstrap: None };
     let found = fitted.intervals(&options, wanted, |_| ());
     let profile = found.map(|found| found.profile).map_err(|err| err.to_string());
     Ok(SessionFit {
@@ -114,7 +116,7 @@ pub fn fit_sessions(
     for (number, subject) in subjects.iter().enumerate() {
         let name = subject.path.file_name().unwrap_or_default();
         let what = name.to_string_lossy();
-        if progress.tell(number, subjects.len(), &what).is_break() {
+        if progress.report(number, subjects.len(), &what).is_break() {
             return Err("cancelled".into());
         }
         answers.push((subject.clone(), fit_session(subject).map(Arc::new)));
@@ -128,11 +130,11 @@ pub fn predict(
     progress: &dyn Progress,
 ) -> Result<SessionPrediction, String> {
     let [known, other] = pair;
-    if progress.tell(0, 2, "fitting the first").is_break() {
+    if progress.report(0, 2, "fitting the first").is_break() {
         return Err("cancelled".into());
     }
     let fit = samples_of(known)?.result.map_err(|err| err.to_string())?;
-    if progress.tell(1, 2, "predicting the second").is_break() {
+    if progress.report(1, 2, "predicting the second").is_break() {
         return Err("cancelled".into());
     }
     let samples = samples_of(other)?.samples;
@@ -157,9 +159,9 @@ pub fn predict(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_analysis::analyses::{Who, judge};
-    use palpate_analysis::progress::Unwatched;
-    use palpate_sessions::edits::Verdict;
+    use palpate_analysis::progress::NoProgress;
+    use palpate_analysis::session_actions::{Attribution, set_data_quality};
+    use palpate_sessions::edits::DataQuality;
     use std::path::Path;
 
     fn recorded() -> FitSubject {
@@ -194,12 +196,12 @@ mod tests {
             let file = file.unwrap().path();
             std::fs::copy(&file, path.join(file.file_name().unwrap())).unwrap();
         }
-        let who = Who { by: "Ada".into(), reason: "a hair".into() };
-        judge(&path, Verdict::Rejected, &who).unwrap();
+        let who = Attribution { by: "Ada".into(), reason: "a hair".into() };
+        set_data_quality(&path, DataQuality::Rejected, &who).unwrap();
         let mut subject = FitSubject { path, ..recorded() };
         assert!(fit_session(&subject).unwrap_err().contains("a hair"));
         let pair = [recorded(), subject.clone()];
-        assert!(predict(&pair, &Unwatched).unwrap_err().contains("a hair"));
+        assert!(predict(&pair, &NoProgress).unwrap_err().contains("a hair"));
         subject.is_rejected_included = true;
         assert!(fit_session(&subject).is_ok());
     }
@@ -207,13 +209,13 @@ mod tests {
     #[test]
     fn a_session_predicts_itself_as_well_as_it_is_fitted() {
         let pair = [recorded(), recorded()];
-        let found = predict(&pair, &Unwatched).unwrap();
+        let found = predict(&pair, &NoProgress).unwrap();
         assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
         assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
         let gone = FitSubject { path: "/nowhere/at-all".into(), ..recorded() };
-        let refused = predict(&[gone.clone(), recorded()], &Unwatched);
+        let refused = predict(&[gone.clone(), recorded()], &NoProgress);
         assert!(refused.unwrap_err().contains("/nowhere/at-all"));
-        let answers = fit_sessions(&[gone, recorded()], &Unwatched).unwrap();
+        let answers = fit_sessions(&[gone, recorded()], &NoProgress).unwrap();
         assert!(answers[0].1.is_err() && answers[1].1.is_ok());
     }
 }

@@ -9,8 +9,8 @@ pub use read::read;
 
 use eframe::egui::Context;
 use palpate_model::rig::Phase;
-use palpate_model::signal::track::{Segment, Track};
-use palpate_sessions::log::Summary;
+use palpate_model::signal::track::{SignalTrack, TrackSegment};
+use palpate_sessions::log::SessionSummary;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -64,10 +64,10 @@ pub struct TrackStretch<T> {
 /// A piece of a session, from the thread that reads it.
 pub enum ReadUpdate {
     /// From the first and the last chunk.
-    Head(Box<Summary>),
+    Head(Box<SessionSummary>),
     /// The next samples, and the phases and cycles that begin in them.
     Samples {
-        segment: Arc<Segment>,
+        segment: Arc<TrackSegment>,
         phases: Vec<TrackStretch<Phase>>,
         /// 0 for none.
         cycles: Vec<TrackStretch<u32>>,
@@ -94,10 +94,10 @@ pub struct ReviewRecording {
     pub path: PathBuf,
     /// The analysis by which it is read.
     pub analysis: Option<String>,
-    pub track: Track,
+    pub track: SignalTrack,
     pub phases: Vec<TrackStretch<Phase>>,
     pub cycles: Vec<TrackStretch<u32>>,
-    pub head: Option<Box<Summary>>,
+    pub head: Option<Box<SessionSummary>>,
     /// Once it is read to its end.
     pub facts: Option<Box<SessionFacts>>,
     pub stage: Stage,

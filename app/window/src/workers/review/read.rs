@@ -1,18 +1,18 @@
 //! Reads a session through once, or twice where its edits or an analysis change its samples, and never holds
 //! more than one block of rows.
 //!
-//! The memory of a sample is described at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
+//! The memory of a sample is described at [`SignalTrack`](palpate_model::signal::track::Track): 26.7 bytes for time,
 //! force, depth, signal and position, 267 MB for ten million samples.
 
 use super::facts::SessionFacts;
 use super::{Quantity, ReadUpdate, TrackStretch};
-use palpate_analysis::analysed;
+use palpate_analysis::analysed_session;
 use palpate_model::rig::Phase;
-use palpate_model::signal::track::{SEGMENT, Segment};
-use palpate_sessions::edits::{Change, Edits};
-use palpate_sessions::log::{Session, Summary};
+use palpate_model::signal::track::{SEGMENT, TrackSegment};
+use palpate_sessions::edits::{EditChange, Edits};
+use palpate_sessions::log::{Session, SessionSummary};
 use palpate_sessions::manifest::Manifest;
-use palpate_sessions::record::Row;
+use palpate_sessions::record::SampleRow;
 use std::cell::RefCell;
 use std::path::Path;
 use std::sync::Arc;
@@ -26,10 +26,10 @@ pub fn read(
     analysis: Option<&str>,
     send: &dyn Fn(ReadUpdate) -> bool,
 ) -> Result<(), String> {
-    let summary = Summary::read(path).map_err(|err| err.to_string())?;
+    let summary = SessionSummary::read(path).map_err(|err| err.to_string())?;
     let manifest = summary.manifest.clone();
     let edits = Edits::read(path, &manifest.session_id).map_err(|err| err.to_string())?;
-    let is_moved = |change: &Change| matches!(change, Change::Contact { .. });
+    let is_moved = |change: &EditChange| matches!(change, EditChange::Contact { .. });
     let is_as_recorded = analysis.is_none() && !edits.all.iter().any(|edit| is_moved(&edit.change));
     if !send(ReadUpdate::Head(Box::new(summary))) {
         return Ok(());
@@ -41,13 +41,14 @@ pub fn read(
             block.rows().for_each(|row| builder.take(&row));
         })
         .map_err(|err| err.to_string())?;
-        analysed::of_outline(path, outline, None)
+        analysed_session::of_outline(path, outline, None)
     } else {
-        analysed::passing(path, analysis)
+        analysed_session::stream_analysed(path, analysis)
     };
     let passing = passing.map_err(|err| err.to_string())?;
     if !is_as_recorded {
-        let take = &mut |rows: &[Row]| rows.iter().for_each(|row| builder.borrow_mut().take(row));
+        let take =
+            &mut |rows: &[SampleRow]| rows.iter().for_each(|row| builder.borrow_mut().take(row));
         passing.rows(path, take).map_err(|err| err.to_string())?;
     }
     let mut builder = builder.into_inner();
@@ -95,7 +96,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn take(&mut self, row: &Row) {
+    fn take(&mut self, row: &SampleRow) {
         // The receiver is gone; the rest is read and dropped.
         if !self.is_received {
             return;
@@ -128,7 +129,7 @@ impl<'a> Builder<'a> {
             return;
         }
         let times = std::mem::take(&mut self.times);
-        let segment = Arc::new(Segment::new(times, &self.columns));
+        let segment = Arc::new(TrackSegment::new(times, &self.columns));
         self.columns.iter_mut().for_each(Vec::clear);
         self.is_received = (self.send)(ReadUpdate::Samples {
             segment,
@@ -143,7 +144,7 @@ mod tests {
     use super::super::ReviewRecording;
     use super::*;
     use eframe::egui::Context;
-    use palpate_model::signal::track::Track;
+    use palpate_model::signal::track::SignalTrack;
     use std::path::PathBuf;
 
     fn recorded(name: &str) -> PathBuf {
@@ -160,7 +161,7 @@ mod tests {
             true
         })
         .unwrap();
-        let (mut track, mut phases) = (Track::default(), Vec::new());
+        let (mut track, mut phases) = (SignalTrack::default(), Vec::new());
         let mut facts = None;
         for piece in updates.into_inner() {
             match piece {

@@ -91,7 +91,7 @@ impl<E: EmulatedCell> CellBench<E> {
             let Ok(count) = self.read(&mut buffer, Duration::from_millis(1)) else {
                 break;
             };
-            dialogue.received(clock(), &buffer[..count]);
+            dialogue.handle_bytes(clock(), &buffer[..count]);
             samples.extend(std::iter::from_fn(|| dialogue.take_sample()));
         }
         samples

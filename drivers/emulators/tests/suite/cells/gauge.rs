@@ -75,7 +75,7 @@ fn the_description_is_what_was_found_and_set() {
     assert_eq!(found.adc.volts_per_count, 1e-3);
     assert_eq!((found.adc.counts_min, found.adc.counts_max), (-27_500, 27_500));
     assert!((found.noise_expected.0 - 1e-3 / 12.0_f64.sqrt()).abs() < 1e-9);
-    assert_eq!(cell.farewell, b"AOUT0\r");
+    assert_eq!(cell.closing_bytes, b"AOUT0\r");
     let sent: Vec<u8> = cell
         .raw
         .iter()
@@ -102,7 +102,7 @@ fn readings_come_at_their_rate_and_the_farewell_ends_them() {
         assert_eq!(sample.counts, (sample.volts.0 * 1e3).round() as i32);
     }
     assert_eq!(cell.dialogue.garbled(), 0);
-    let farewell = String::from_utf8(cell.farewell).expect("text");
+    let farewell = String::from_utf8(cell.closing_bytes).expect("text");
     bench.ask(&farewell, 5);
     assert_eq!(bench.ask("", 500), "");
 }

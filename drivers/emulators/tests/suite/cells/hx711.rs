@@ -51,7 +51,7 @@ fn the_description_is_what_was_found() {
     assert_eq!(adc.volts_per_count, 5.0 / 8_388_608.0);
     assert_eq!(noise_expected, Volts(0.3e-3));
     assert_eq!(newtons_per_volt, None);
-    assert!(cell.farewell.is_empty());
+    assert!(cell.closing_bytes.is_empty());
     assert!(cell.raw.iter().any(|piece| piece.is_sent && piece.bytes == b"?\r\n"));
 }
 

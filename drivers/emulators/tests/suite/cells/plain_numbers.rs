@@ -96,12 +96,12 @@ fn emulated_cells_are_those_of_the_table() {
 #[test]
 fn numbers_follow_the_signal() {
     let mut bench = emulated();
-    let OpenedCell { description, mut dialogue, raw, farewell } =
+    let OpenedCell { description, mut dialogue, raw, closing_bytes } =
         opened(&bench, USUAL).expect("a cell");
     assert!((description.rate - 80.0).abs() < 1.0, "{}", description.rate);
     assert_eq!((description.adc.counts_min, description.adc.counts_max), (-8_388_607, 8_388_607));
     assert_eq!(description.newtons_per_volt, None);
-    assert!(raw.iter().all(|piece| !piece.is_sent) && farewell.is_empty());
+    assert!(raw.iter().all(|piece| !piece.is_sent) && closing_bytes.is_empty());
     bench.feel(1.25, 0.0);
     bench.run(dialogue.as_mut(), 50);
     let samples = bench.run(dialogue.as_mut(), 1_000);

@@ -16,7 +16,7 @@ use palpate_model::units::{Newtons, Volts};
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// Pieces that reach further than bytes alone do: of gauges, boards, and what they are asked.
+/// ContactPieces that reach further than bytes alone do: of gauges, boards, and what they are asked.
 const PIECES: &[&str] = &[
     "4.285 N",
     "-18.78 lbF",
@@ -106,7 +106,7 @@ type Told = (Vec<CellSample>, Vec<String>, u64, Option<String>);
 fn printed(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
     let at = Nanos::from_millis(20);
     for part in bytes.chunks(piece) {
-        dialogue.received(at, part);
+        dialogue.handle_bytes(at, part);
     }
     let samples: Vec<CellSample> = std::iter::from_fn(|| dialogue.take_sample()).collect();
     let troubles = std::iter::from_fn(|| dialogue.take_trouble()).collect();
@@ -200,13 +200,13 @@ fn check(bench: &CellBench<Babbler>, opened: Result<OpenedCell, DeviceError>, se
 fn what_nobody_takes_is_bounded() {
     let mut gauge = gauge();
     for _ in 0..100_000 {
-        gauge.received(Nanos(1), b"4.285 N\r\n");
+        gauge.handle_bytes(Nanos(1), b"4.285 N\r\n");
     }
     let count = std::iter::from_fn(|| gauge.take_sample()).count();
     assert_eq!(count, 4_800);
     let mut board = board();
     for micros in 1..100_000_u32 {
-        board.received(Nanos(1), line(&Message::Value { micros, count: 1 }).as_bytes());
+        board.handle_bytes(Nanos(1), line(&Message::Value { micros, count: 1 }).as_bytes());
     }
     assert_eq!(std::iter::from_fn(|| board.take_sample()).count(), 4_800);
 }

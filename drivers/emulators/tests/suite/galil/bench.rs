@@ -1,7 +1,7 @@
 //! A controller in simulated time.
 
 use palpate_emulators::EmulatedDevice;
-use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
 use palpate_model::Nanos;
 
 /// One controller and the time.
@@ -11,14 +11,14 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(settings: GalilSettings) -> Self {
+    pub fn new(settings: EmulatedGalilSettings) -> Self {
         Self { emulator: GalilEmulator::new(settings), now: Nanos::ZERO }
     }
 
     /// On one serial line.
     pub fn serial(model: GalilModel) -> Self {
         let converter = if model == GalilModel::Dmc2143 { None } else { Some(16) };
-        Self::new(GalilSettings { model, converter, ..GalilSettings::default() })
+        Self::new(EmulatedGalilSettings { model, converter, ..EmulatedGalilSettings::default() })
     }
 
     /// Bytes to a channel and what comes back at once.

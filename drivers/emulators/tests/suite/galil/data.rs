@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use palpate_emulators::EmulatedDevice;
-use palpate_emulators::galil::{GalilModel, GalilSettings};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilModel};
 
 #[test]
 fn record_arrays_lose_no_sample_in_ninety_seconds() {
@@ -73,7 +73,8 @@ fn a_data_record_says_what_the_commands_say() {
 
 #[test]
 fn records_are_pushed_to_another_handle() {
-    let mut bench = Bench::new(GalilSettings { is_serial: false, ..GalilSettings::default() });
+    let mut bench =
+        Bench::new(EmulatedGalilSettings { is_serial: false, ..EmulatedGalilSettings::default() });
     bench.emulator.connect(bench.now, 0);
     assert_eq!(bench.ask("DR 4,B;TC1"), "?126 Can not use closed Ethernet handle\r\n:");
     bench.emulator.connect(bench.now, 1);

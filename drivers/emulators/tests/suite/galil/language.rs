@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use palpate_emulators::EmulatedDevice;
-use palpate_emulators::galil::{GalilModel, GalilSettings};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilModel};
 
 /// Where it is from, what is sent, what comes back. One controller, in this order.
 const TRANSCRIPT: &[(&str, &str, &str)] = &[
@@ -134,7 +134,8 @@ fn what_clients_send_is_accepted() {
 
 #[test]
 fn echo_sends_back_what_came() {
-    let mut bench = Bench::new(GalilSettings { has_echo: true, ..GalilSettings::default() });
+    let mut bench =
+        Bench::new(EmulatedGalilSettings { has_echo: true, ..EmulatedGalilSettings::default() });
     assert_eq!(bench.ask("MG 1"), "MG 1\r 1.0000\r\n:");
     assert_eq!(bench.ask("EO 0"), "EO 0\r:");
     assert_eq!(bench.ask("MG 1"), " 1.0000\r\n:");
@@ -185,7 +186,8 @@ fn a_burn_takes_two_seconds_and_a_reset_forgets() {
 
 #[test]
 fn eight_clients_each_have_a_line_of_their_own() {
-    let mut bench = Bench::new(GalilSettings { is_serial: false, ..GalilSettings::default() });
+    let mut bench =
+        Bench::new(EmulatedGalilSettings { is_serial: false, ..EmulatedGalilSettings::default() });
     assert_eq!(bench.emulator.channels(), 8);
     for channel in 0..8 {
         bench.emulator.connect(bench.now, channel);

@@ -2,7 +2,7 @@
 
 use super::bench::Bench;
 use palpate_emulators::galil::GalilModel;
-use palpate_model::rig::Profile;
+use palpate_model::rig::MotionProfile;
 use palpate_model::{MmPerS, MmPerS2, Position, Seconds};
 
 const SAMPLE: f64 = 1.0 / 1024.0;
@@ -19,7 +19,8 @@ fn a_move_follows_its_trapezoid_and_pulses_come_later() {
     bench.tell("PRA=3000");
     bench.tell("BGA");
     // In counts: 1 count stands for 1 mm.
-    let exact = Profile::to_rest(Position(0.0), Position(3000.0), MmPerS(1332.0), MmPerS2(4096.0));
+    let exact =
+        MotionProfile::to_rest(Position(0.0), Position(3000.0), MmPerS(1332.0), MmPerS2(4096.0));
     let mut ended_before_pulses = false;
     let mut is_moving = true;
     let mut at = 0;

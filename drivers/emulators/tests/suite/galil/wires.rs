@@ -1,7 +1,7 @@
 //! The controller on a pseudo-terminal and on a TCP port, in real time.
 
-use palpate_emulators::galil::{GalilEmulator, GalilSettings};
-use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator};
+use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
 use palpate_model::Nanos;
 use palpate_test_support::skip;
 use palpate_test_support::wait::{PATIENCE, until};
@@ -15,12 +15,12 @@ use std::thread::JoinHandle;
 struct Served {
     address: String,
     orders: SyncSender<String>,
-    printed: Receiver<Told>,
+    printed: Receiver<ServeEvent>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-fn start(place: Place, is_serial: bool) -> Served {
+fn start(place: EmulatorAddress, is_serial: bool) -> Served {
     let (orders, received) = sync_channel(16);
     let (sender, printed) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
@@ -28,10 +28,12 @@ fn start(place: Place, is_serial: bool) -> Served {
     let thread = std::thread::Builder::new()
         .name("emulator".into())
         .spawn(move || {
-            let mut device =
-                GalilEmulator::new(GalilSettings { is_serial, ..GalilSettings::default() });
+            let mut device = GalilEmulator::new(EmulatedGalilSettings {
+                is_serial,
+                ..EmulatedGalilSettings::default()
+            });
             let options = ServeOptions {
-                place,
+                address: place,
                 baud: None,
                 latency: Nanos::ZERO,
                 faults: Vec::new(),
@@ -41,7 +43,7 @@ fn start(place: Place, is_serial: bool) -> Served {
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
+    let Ok(ServeEvent::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Served { address, orders, printed, stop, thread: Some(thread) }
@@ -80,7 +82,7 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     let folder = std::env::temp_dir().join(format!("palpate-galil-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let link = folder.join("galil");
-    let served = start(Place::Pty(Some(link.clone())), true);
+    let served = start(EmulatorAddress::Pty(Some(link.clone())), true);
     assert_eq!(served.address, link.display().to_string());
     let open = || {
         let attempt = || {
@@ -119,7 +121,7 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
 
 #[test]
 fn eight_clients_connect_and_the_ninth_is_reset() {
-    let served = start(Place::Tcp(([127, 0, 0, 1], 0).into()), false);
+    let served = start(EmulatorAddress::Tcp(([127, 0, 0, 1], 0).into()), false);
     let connect = || {
         let stream = TcpStream::connect(&served.address).unwrap();
         stream.set_nodelay(true).unwrap();

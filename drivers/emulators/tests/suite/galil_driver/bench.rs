@@ -2,8 +2,8 @@
 
 use palpate_drivers::RigEventBody;
 use palpate_drivers::galil::{
-    AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Sampling, Session,
-    connect,
+    AnalogRange, ConnectedGalil, GalilOpenError, GalilSession, GalilSettings, MotorType, Sampling,
+    SwitchLevel, connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_emulators::EmulatedDevice;
@@ -106,8 +106,8 @@ pub fn thesis() -> GalilSettings {
         acceleration: MmPerS2(61.44),
         unseen: RigDescription::UNSEEN_USUAL,
         motor_type: MotorType::ActiveLow,
-        limits: Levels::ActiveLow,
-        home: Levels::ActiveLow,
+        limits: SwitchLevel::ActiveLow,
+        home: SwitchLevel::ActiveLow,
         range: AnalogRange::Bipolar10,
         bits: 16,
         noise: Volts(0.001),
@@ -119,7 +119,7 @@ pub fn thesis() -> GalilSettings {
     }
 }
 
-pub fn wired(settings: galil::GalilSettings) -> Shared {
+pub fn wired(settings: galil::EmulatedGalilSettings) -> Shared {
     Shared(Arc::new(Mutex::new(Wire {
         emulator: GalilEmulator::new(settings),
         now: Nanos::ZERO,
@@ -135,15 +135,18 @@ pub fn clock_of(wire: &Shared) -> HostClock {
     Arc::new(move || wire.lock().now)
 }
 
-pub fn try_connect(wire: &Shared, settings: &GalilSettings) -> Result<Connected, GalilOpenError> {
+pub fn try_connect(
+    wire: &Shared,
+    settings: &GalilSettings,
+) -> Result<ConnectedGalil, GalilOpenError> {
     connect(&mut wire.clone(), &clock_of(wire), settings, &"galil".into())
 }
 
 /// The host's side after it has connected.
 pub struct Host {
     pub wire: Shared,
-    pub session: Session,
-    pub connected: Connected,
+    pub session: GalilSession,
+    pub connected: ConnectedGalil,
     pub readings: Vec<Reading>,
     pub acks: Vec<RigCommand>,
     pub faults: Vec<Fault>,
@@ -154,13 +157,13 @@ pub struct Host {
 
 impl Host {
     pub fn new(settings: &GalilSettings) -> Self {
-        Self::on(wired(galil::GalilSettings::default()), settings)
+        Self::on(wired(galil::EmulatedGalilSettings::default()), settings)
     }
 
     pub fn on(wire: Shared, settings: &GalilSettings) -> Self {
         let connected = try_connect(&wire, settings).expect("it connects");
         let now = wire.lock().now;
-        let session = Session::new(settings.clone(), &connected, now);
+        let session = GalilSession::new(settings.clone(), &connected, now);
         Self {
             wire,
             session,
@@ -180,7 +183,7 @@ impl Host {
     pub fn turn(&mut self) -> io::Result<()> {
         let now = self.now();
         if self.is_attended {
-            self.session.attended(now);
+            self.session.note_attendance(now);
         }
         while let Some(line) = self.session.take_line(self.now()) {
             self.wire.write(&line)?;
@@ -189,7 +192,7 @@ impl Host {
         let wait = self.session.next_at(self.now()).since(self.now());
         let wait = wait.min(Nanos(500_000)).max(Nanos(20_000));
         let count = self.wire.read(&mut buffer, Duration::from_nanos(wait.0))?;
-        self.session.received(self.now(), &buffer[..count]);
+        self.session.handle_bytes(self.now(), &buffer[..count]);
         while let Some((_, body)) = self.session.take_event() {
             match body {
                 RigEventBody::Reading(reading) => self.readings.push(reading),

@@ -6,12 +6,12 @@
 use super::bench::{thesis, to};
 use super::wires::opened;
 use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
-use palpate_drivers::wire::Place;
+use palpate_drivers::wire::DeviceAddress;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
-use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
-use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
+use palpate_emulators::galil::{EmulatedGalilSettings as Emulated, GalilEmulator};
+use palpate_emulators::serve::{EmulatorAddress as At, ServeEvent, ServeOptions, serve};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{Fault, HandAction, Oscillation, RigCommand};
@@ -130,7 +130,7 @@ fn run(seed: u64) -> Result<(), String> {
                 most: f64::NEG_INFINITY,
             };
             let options = ServeOptions {
-                place: At::Pty(None),
+                address: At::Pty(None),
                 baud: None,
                 latency: Nanos::ZERO,
                 faults: Vec::new(),
@@ -141,10 +141,10 @@ fn run(seed: u64) -> Result<(), String> {
             device
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
+    let Ok(ServeEvent::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         return Err("the emulator did not start".into());
     };
-    let place = Place::Serial { port: address, baud: 115_200, has_handshake: false };
+    let place = DeviceAddress::Serial { port: address, baud: 115_200, has_handshake: false };
     let settings =
         GalilSettings { sampling: [Sampling::Poll, Sampling::Record][random.below(2)], ..thesis() };
     let verdict = opened(&place, &settings).map_err(|err| err.to_string()).and_then(|rig| {

@@ -156,7 +156,7 @@ fn random_bytes_never_break_the_dialogue() {
             let mut now = start;
             for _ in 0..1 + random.below(30) {
                 now = now + Nanos::from_millis(random.below(40) as u64);
-                session.attended(now);
+                session.note_attendance(now);
                 if random.below(4) == 0 {
                     let command = match random.below(4) {
                         0 => RigCommand::Stop,
@@ -177,7 +177,7 @@ fn random_bytes_never_break_the_dialogue() {
                     let at = random.below(bytes.len());
                     bytes[at] = random.below(256) as u8;
                 }
-                session.received(now, &bytes);
+                session.handle_bytes(now, &bytes);
                 let mut events = 0;
                 while session.take_event().is_some() {
                     events += 1;

@@ -2,7 +2,7 @@
 
 use super::bench::{Host, clock_of, thesis, try_connect, wired};
 use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, Sampling, connect};
-use palpate_drivers::wire::pair;
+use palpate_drivers::wire::memory_link_pair;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::faults::DeviceFault;
 use palpate_emulators::galil::{self, GalilModel};
@@ -38,11 +38,14 @@ fn rates_are_those_read_back() {
 #[test]
 fn other_series_and_clocks_are_driven_too() {
     for model in [GalilModel::Dmc4183, GalilModel::Dmc4040] {
-        let wire = wired(galil::GalilSettings { model, ..galil::GalilSettings::default() });
+        let wire = wired(galil::EmulatedGalilSettings {
+            model,
+            ..galil::EmulatedGalilSettings::default()
+        });
         let found = try_connect(&wire, &thesis()).unwrap();
         assert_eq!(found.board.axes, model.axes());
     }
-    let wire = wired(galil::GalilSettings::default());
+    let wire = wired(galil::EmulatedGalilSettings::default());
     {
         let mut wire = wire.lock();
         let now = wire.now;
@@ -61,7 +64,7 @@ fn what_is_not_the_rig_of_the_file_is_refused_in_words() {
     let speed = GalilSettings { speed_max: palpate_model::MmPerS(1e6), ..thesis() };
     for (settings, words) in [(serial, "serial number 1820"), (axis, "no axis F"), (speed, "SPA=")]
     {
-        let wire = wired(galil::GalilSettings::default());
+        let wire = wired(galil::EmulatedGalilSettings::default());
         let err = try_connect(&wire, &settings).unwrap_err().to_string();
         assert!(err.contains(words), "{err}");
     }
@@ -69,14 +72,14 @@ fn what_is_not_the_rig_of_the_file_is_refused_in_words() {
 
 #[test]
 fn a_controller_without_inputs_is_refused() {
-    let wire = wired(galil::GalilSettings {
+    let wire = wired(galil::EmulatedGalilSettings {
         model: GalilModel::Dmc2143,
         converter: None,
-        ..galil::GalilSettings::default()
+        ..galil::EmulatedGalilSettings::default()
     });
     let err = try_connect(&wire, &thesis()).unwrap_err();
     assert!(err.to_string().contains("no analog inputs"), "{err}");
-    let other = wired(galil::GalilSettings::default());
+    let other = wired(galil::EmulatedGalilSettings::default());
     other.lock().emulator.apply_fault(Nanos::ZERO, DeviceFault::WrongDevice, true);
     let err = try_connect(&other, &thesis()).unwrap_err();
     assert!(matches!(err, GalilOpenError::Unsupported { .. }), "{err}");
@@ -96,8 +99,10 @@ fn another_range_has_other_counts() {
 #[test]
 fn echo_half_a_line_and_half_a_download_are_got_rid_of() {
     for left in [&b"PAA=10"[..], b"DL\r#X\rJP #", b"EO 1\rMG 1,2\r"] {
-        let wire =
-            wired(galil::GalilSettings { has_echo: true, ..galil::GalilSettings::default() });
+        let wire = wired(galil::EmulatedGalilSettings {
+            has_echo: true,
+            ..galil::EmulatedGalilSettings::default()
+        });
         {
             let mut wire = wire.lock();
             let now = wire.now;
@@ -109,7 +114,7 @@ fn echo_half_a_line_and_half_a_download_are_got_rid_of() {
 
 #[test]
 fn nobody_on_the_wire_is_told() {
-    let (mut here, _there) = pair();
+    let (mut here, _there) = memory_link_pair();
     // A clock of its own: each look is a tenth of a second later.
     let now = std::sync::atomic::AtomicU64::new(0);
     let clock: palpate_drivers::wire::HostClock = std::sync::Arc::new(move || {
@@ -117,7 +122,7 @@ fn nobody_on_the_wire_is_told() {
     });
     let err = connect(&mut here, &clock, &thesis(), &"galil".into()).unwrap_err();
     assert_eq!(err, GalilOpenError::Silent);
-    let wire = wired(galil::GalilSettings::default());
+    let wire = wired(galil::EmulatedGalilSettings::default());
     wire.lock().is_cut = true;
     let lost = connect(&mut wire.clone(), &clock_of(&wire), &thesis(), &"galil".into());
     assert!(matches!(lost, Err(GalilOpenError::Lost { .. })));
@@ -128,7 +133,7 @@ fn nobody_on_the_wire_is_told() {
 fn the_identity_is_the_same_each_time() {
     for sampling in [Sampling::Poll, Sampling::Record] {
         let settings = GalilSettings { sampling, ..thesis() };
-        let wire = wired(galil::GalilSettings::default());
+        let wire = wired(galil::EmulatedGalilSettings::default());
         let first = try_connect(&wire, &settings).unwrap();
         let second = try_connect(&wire, &settings).unwrap();
         assert_eq!(first.description.identity, second.description.identity);
@@ -138,7 +143,7 @@ fn the_identity_is_the_same_each_time() {
 
 #[test]
 fn switches_set_otherwise_are_an_error_that_names_them() {
-    let wire = wired(galil::GalilSettings::default());
+    let wire = wired(galil::EmulatedGalilSettings::default());
     // Every sign is lost on the way here, so that `CN -1,-1` is not what is read back.
     wire.lock().spoil = Box::new(|byte| if byte == b'-' { Vec::new() } else { vec![byte] });
     let err = try_connect(&wire, &thesis()).unwrap_err();

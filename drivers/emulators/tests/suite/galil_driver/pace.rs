@@ -6,9 +6,9 @@
 use super::bench::{thesis, to};
 use super::wires::{Runner, Served, start};
 use palpate_drivers::galil::{GalilSettings, Sampling};
-use palpate_drivers::wire::Place;
+use palpate_drivers::wire::DeviceAddress;
 use palpate_drivers::{Rig, RigEventBody};
-use palpate_emulators::serve::Place as At;
+use palpate_emulators::serve::EmulatorAddress as At;
 use palpate_model::Nanos;
 use palpate_model::rig::{Reading, RigCommand};
 use palpate_test_support::skip;
@@ -30,19 +30,20 @@ const KEPT_AT_LEAST: Nanos = Nanos::from_millis(1_000);
 /// From a stop to the wire, 999 times of 1000.
 const STOP_MAX_MS: f64 = 2.0;
 
-fn on_pty(latency: Nanos, baud: Option<u32>) -> Option<(Served, Place)> {
+fn on_pty(latency: Nanos, baud: Option<u32>) -> Option<(Served, DeviceAddress)> {
     if skip::lacks_terminals() {
         return None;
     }
     let served = start(At::Pty(None), true, latency, baud);
-    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
+    let place =
+        DeviceAddress::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     Some((served, place))
 }
 
-fn on_tcp() -> (Served, Place) {
+fn on_tcp() -> (Served, DeviceAddress) {
     let at = At::Tcp(([127, 0, 0, 1], 0).into());
     let served = start(at, false, Nanos::ZERO, None);
-    let place = Place::Tcp(served.address.clone());
+    let place = DeviceAddress::Tcp(served.address.clone());
     (served, place)
 }
 
@@ -100,7 +101,7 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
          round trip {:.2} {:.2} {:.2} ms; {}",
         samples as f64 / ((newest - first) as f64 * tick),
         (newest - first) / step,
-        stats.lost,
+        stats.samples_lost,
         ms(age_max),
         ms(uncertainty_max),
         description.tick_nanos,
@@ -117,13 +118,13 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     if settings.sampling == Sampling::Record {
         // Every sample comes once, or is counted as lost; and none is lost but by a computer that stood still for longer
         // than the controller keeps samples.
-        assert_eq!(gaps, stats.lost, "{what}");
+        assert_eq!(gaps, stats.samples_lost, "{what}");
         let is_late = age_max.max(stats.round_trip_max) > KEPT_AT_LEAST;
         assert!(gaps == 0 || is_late, "{what}: {gaps} lost in time");
     }
     if is_soak("PALPATE_GALIL_SECONDS") && (latency, baud) == (Nanos::ZERO, None) {
         match (settings.sampling, settings.sample_us) {
-            (Sampling::Record, _) => assert_eq!((gaps, stats.lost), (0, 0), "{what}"),
+            (Sampling::Record, _) => assert_eq!((gaps, stats.samples_lost), (0, 0), "{what}"),
             (Sampling::Poll, None) => {
                 let share = samples as f64 / (newest - first) as f64;
                 assert!(share >= POLLED_MIN, "{what}: {share:.3} of all samples");

@@ -41,7 +41,7 @@ fn every_second_sample_comes_and_none_is_lost() {
         let readings = &host.readings[before..];
         assert!((readings.len() as f64 / 5.0 - rate).abs() < 0.01 * rate, "{}", readings.len());
         assert!(readings.windows(2).all(|pair| pair[1].tick == pair[0].tick + 2));
-        assert_eq!(host.session.stats().lost, 0);
+        assert_eq!(host.session.stats().samples_lost, 0);
         assert_eq!(host.faults, []);
         // The signal is noise around a small positive voltage, as polls give it too.
         let mean = readings.iter().map(|one| one.volts.0).sum::<f64>() / readings.len() as f64;
@@ -133,7 +133,7 @@ fn a_garbled_fetch_is_done_again() {
         let ticks: Vec<u64> = host.readings.iter().map(|one| one.tick).collect();
         let skipped = ticks.windows(2).filter(|pair| pair[1] != pair[0] + 2).count();
         assert!(
-            skipped == 0 || stats.lost > 0 || !host.faults.is_empty(),
+            skipped == 0 || stats.samples_lost > 0 || !host.faults.is_empty(),
             "seed {seed}: {stats:?}"
         );
         assert!(ticks.windows(2).all(|pair| pair[0] < pair[1]));
@@ -157,7 +157,7 @@ fn a_computer_that_is_late_loses_only_what_was_written_over() {
         let ticks: Vec<u64> = host.readings[before - 1..].iter().map(|one| one.tick).collect();
         let missing: u64 = ticks.windows(2).map(|pair| (pair[1] - pair[0]) / 2 - 1).sum();
         assert_eq!(missing > 0, is_lost, "{late_ms}");
-        assert_eq!(host.session.stats().lost, missing);
+        assert_eq!(host.session.stats().samples_lost, missing);
         assert!(ticks.len() > 1_000, "{}", ticks.len());
     }
 }
@@ -195,7 +195,7 @@ fn a_reset_ends_the_recording() {
 }
 
 fn board(model: GalilModel) -> Shared {
-    wired(galil::GalilSettings { model, ..galil::GalilSettings::default() })
+    wired(galil::EmulatedGalilSettings { model, ..galil::EmulatedGalilSettings::default() })
 }
 
 #[test]

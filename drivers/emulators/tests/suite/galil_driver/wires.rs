@@ -5,10 +5,10 @@
 use super::bench::{thesis, to};
 use palpate_drivers::device::OpenError;
 use palpate_drivers::galil::{GalilDevice, GalilOpenError, GalilRig, GalilSettings};
-use palpate_drivers::wire::{HostClock, Place, WireError};
+use palpate_drivers::wire::{DeviceAddress, HostClock, WireError};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
-use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
-use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
+use palpate_emulators::galil::{EmulatedGalilSettings as Emulated, GalilEmulator};
+use palpate_emulators::serve::{EmulatorAddress as At, ServeEvent, ServeOptions, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand};
 use palpate_test_support::skip;
@@ -35,13 +35,14 @@ pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> S
         .name("emulator".into())
         .spawn(move || {
             let mut device = GalilEmulator::new(Emulated { is_serial, ..Emulated::default() });
-            let options = ServeOptions { place, baud, latency, faults: Vec::new(), seed: 1 };
+            let options =
+                ServeOptions { address: place, baud, latency, faults: Vec::new(), seed: 1 };
             // Only where it is matters here.
             let mut tell = |printed| drop(sender.try_send(printed));
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = printed.recv_timeout(PATIENCE) else {
+    let Ok(ServeEvent::Ready(address)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Served { address, orders, stop, thread: Some(thread) }
@@ -63,7 +64,7 @@ pub fn clock() -> HostClock {
 }
 
 /// The rig at a place, asked for as often as it takes: a computer with much else to do may hear no answer in time.
-pub fn opened(place: &Place, settings: &GalilSettings) -> Result<GalilRig, OpenError> {
+pub fn opened(place: &DeviceAddress, settings: &GalilSettings) -> Result<GalilRig, OpenError> {
     let device = || GalilDevice::new(place.clone(), settings.clone());
     let attempt = || match GalilRig::open(device(), clock()) {
         Err(OpenError::Galil(GalilOpenError::Silent)) => None,
@@ -81,7 +82,7 @@ pub struct Runner {
 }
 
 impl Runner {
-    pub fn open(place: &Place, settings: &GalilSettings) -> Self {
+    pub fn open(place: &DeviceAddress, settings: &GalilSettings) -> Self {
         let rig = opened(place, settings).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
         Self { rig, now: Nanos::ZERO, newest: None, events: Vec::new() }
@@ -207,7 +208,7 @@ impl Runner {
 fn a_controller_on_a_network() {
     let at = At::Tcp(([127, 0, 0, 1], 0).into());
     let served = start(at, false, Nanos::ZERO, None);
-    Runner::open(&Place::Tcp(served.address.clone()), &thesis()).exercise(&served);
+    Runner::open(&DeviceAddress::Tcp(served.address.clone()), &thesis()).exercise(&served);
 }
 
 #[test]
@@ -219,7 +220,8 @@ fn a_controller_on_a_serial_port_that_only_one_program_has() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = At::Pty(Some(folder.path().join("galil")));
     let served = start(at, true, Nanos::ZERO, None);
-    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
+    let place =
+        DeviceAddress::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     let runner = Runner::open(&place, &thesis());
     let Err(err) = place.open() else {
         panic!("two programs have one port");
@@ -234,7 +236,8 @@ fn a_converter_that_waits_is_measured() {
         return;
     }
     let served = start(At::Pty(None), true, Nanos::from_millis(16), None);
-    let place = Place::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
+    let place =
+        DeviceAddress::Serial { port: served.address.clone(), baud: 115_200, has_handshake: false };
     let mut runner = Runner::open(&place, &thesis());
     runner.until("samples", |runner| runner.events.len() > 50);
     let stats = runner.rig.links()[0].1;

@@ -2,10 +2,10 @@
 
 use palpate_drivers::RigEventBody;
 use palpate_drivers::grbl::{
-    Connected, GrblOpenError, GrblSettings, HomeSwitch, Session, SharedTrack, connect,
+    ConnectedGrbl, GrblOpenError, GrblSession, GrblSettings, HomeSwitch, SharedTrack, connect,
 };
-use palpate_drivers::parts::Track;
 use palpate_drivers::sim::SimSettings;
+use palpate_drivers::split_rig::AxisTrack;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_emulators::EmulatedPlant;
 use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
@@ -155,7 +155,7 @@ pub fn wired(settings: grbl::EmulatedGrblSettings) -> Shared {
     })))
 }
 
-pub fn try_connect(wire: &Shared, settings: &GrblSettings) -> Result<Connected, GrblOpenError> {
+pub fn try_connect(wire: &Shared, settings: &GrblSettings) -> Result<ConnectedGrbl, GrblOpenError> {
     let clock: HostClock = {
         let wire = wire.clone();
         Arc::new(move || wire.lock().now)
@@ -166,9 +166,9 @@ pub fn try_connect(wire: &Shared, settings: &GrblSettings) -> Result<Connected, 
 /// The host's side after it has connected.
 pub struct Host {
     pub wire: Shared,
-    pub session: Session,
+    pub session: GrblSession,
     pub track: SharedTrack,
-    pub connected: Connected,
+    pub connected: ConnectedGrbl,
     pub acks: Vec<RigCommand>,
     pub faults: Vec<Fault>,
     pub is_attended: bool,
@@ -181,11 +181,12 @@ impl Host {
 
     pub fn on(wire: Shared, settings: &GrblSettings) -> Self {
         let connected = try_connect(&wire, settings).expect("it connects");
-        let track = Arc::new(Mutex::new(Track::at_rest(settings.sign() * connected.facts.steps)));
+        let track =
+            Arc::new(Mutex::new(AxisTrack::at_rest(settings.sign() * connected.parameters.steps)));
         let now = wire.lock().now;
-        let session = Session::new(
+        let session = GrblSession::new(
             settings.clone(),
-            connected.facts,
+            connected.parameters,
             Arc::clone(&track),
             connected.stats,
             now,
@@ -209,14 +210,14 @@ impl Host {
 
     pub fn turn(&mut self) -> io::Result<()> {
         if self.is_attended {
-            self.session.attended(self.now());
+            self.session.note_attendance(self.now());
         }
         while let Some(line) = self.session.take_line(self.now()) {
             self.wire.write(&line)?;
         }
         let mut buffer = [0_u8; 256];
         let count = self.wire.read(&mut buffer, Duration::from_micros(500))?;
-        self.session.received(self.now(), &buffer[..count]);
+        self.session.handle_bytes(self.now(), &buffer[..count]);
         while let Some((_, body)) = self.session.take_event() {
             match body {
                 RigEventBody::Reading(_) => panic!("a board has no samples"),

@@ -145,7 +145,7 @@ fn a_jog_of_somebody_else_is_ended() {
     }
     let connected = try_connect(&wire, &slide()).expect("it connects");
     let truth = (wire.lock().board.counter_mm() / 0.0025).round();
-    assert_eq!(connected.facts.steps as f64, truth);
+    assert_eq!(connected.parameters.steps as f64, truth);
     assert!(truth < 4_000.0);
 }
 

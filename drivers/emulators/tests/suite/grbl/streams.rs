@@ -2,7 +2,7 @@
 //! work afterwards.
 
 use super::bench::{Host, slide, wired};
-use palpate_drivers::grbl::protocol::{Incoming, Parser};
+use palpate_drivers::grbl::protocol::{GrblLine, GrblParser};
 use palpate_drivers::wire::Dialogue;
 use palpate_emulators::DeviceFault;
 use palpate_emulators::bench::{EmulatedAxis, SlideSwitches};
@@ -11,7 +11,7 @@ use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::RigCommand;
 
-/// Pieces that reach further than bytes alone do: of the board, and of whoever talks to it.
+/// ContactPieces that reach further than bytes alone do: of the board, and of whoever talks to it.
 const PIECES: &[&[u8]] = &[
     b"ok\r\n",
     b"error:",
@@ -75,8 +75,8 @@ fn stream(random: &mut SplitMix) -> Vec<u8> {
     bytes
 }
 
-fn parsed(bytes: &[u8], piece: usize) -> Vec<Incoming> {
-    let mut parser = Parser::default();
+fn parsed(bytes: &[u8], piece: usize) -> Vec<GrblLine> {
+    let mut parser = GrblParser::default();
     let mut all = Vec::new();
     for part in bytes.chunks(piece) {
         all.extend(part.iter().filter_map(|byte| parser.take(*byte)));
@@ -102,7 +102,7 @@ fn streams_to_parser_and_emulator_do_no_harm_however_they_are_cut() {
         let bytes = stream(&mut random);
         let piece = 1 + random.below(9);
         for incoming in parsed(&bytes, 4_096) {
-            if let Incoming::Status(status) = incoming {
+            if let GrblLine::Status(status) = incoming {
                 let places = status.machine.iter().chain(&status.work).flatten();
                 assert!(places.into_iter().all(|place| place.is_finite()), "{seed}");
             }
@@ -141,7 +141,7 @@ fn streams_to_the_session_end_at_rest() {
         host.pass(0.2);
         for _ in 0..20 {
             let now = host.now();
-            host.session.received(now, &stream(&mut random));
+            host.session.handle_bytes(now, &stream(&mut random));
             if host.session.is_dead(now).is_some() {
                 break;
             }

@@ -8,7 +8,7 @@ use palpate_emulators::ScheduledFault;
 use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::emulated_cell;
 use palpate_emulators::grbl::{EmulatedGrblSettings, Grbl};
-use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
@@ -61,7 +61,7 @@ fn start_at(
             let board = Grbl::new(EmulatedGrblSettings::default());
             let mut device = EmulatedBench::new(&SimSettings::default(), Box::new(board), cell);
             let options = ServeOptions {
-                place: Place::Ptys(links),
+                address: EmulatorAddress::Ptys(links),
                 baud: None,
                 latency: Nanos::ZERO,
                 faults,
@@ -72,7 +72,7 @@ fn start_at(
             served.expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(places)) = printed.recv_timeout(PATIENCE) else {
+    let Ok(ServeEvent::Ready(places)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Some(Served {

@@ -184,7 +184,7 @@ impl Host {
     pub fn turn(&mut self) -> io::Result<()> {
         let now = self.now();
         if self.is_attended {
-            self.session.attended(now);
+            self.session.note_attendance(now);
         }
         while let Some(line) = self.session.take_line(self.now()) {
             self.wire.write(&line)?;
@@ -193,7 +193,7 @@ impl Host {
         let wait = self.session.next_at(self.now()).since(self.now());
         let wait = wait.min(Nanos(500_000)).max(Nanos(20_000));
         let count = self.wire.read(&mut buffer, Duration::from_nanos(wait.0))?;
-        self.session.received(self.now(), &buffer[..count]);
+        self.session.handle_bytes(self.now(), &buffer[..count]);
         while let Some((_, body)) = self.session.take_event() {
             match body {
                 RigEventBody::Reading(reading) => {

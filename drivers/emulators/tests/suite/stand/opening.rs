@@ -2,9 +2,9 @@
 #![expect(clippy::disallowed_methods, reason = "the clock of a test stands for the runner's")]
 
 use super::bench::{Shared, to, usual};
-use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
+use palpate_drivers::device::{DeviceRig, OpenError, OpenedDevices, RigDevice};
 use palpate_drivers::mark10::stand;
-use palpate_drivers::wire::{HostClock, Link, pair};
+use palpate_drivers::wire::{HostClock, Link, memory_link_pair};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
@@ -116,7 +116,7 @@ fn who_does_not_fit_is_told_in_words() {
 struct OnLink(Option<Box<dyn Link>>);
 
 impl RigDevice for OnLink {
-    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+    fn open(&mut self, clock: &HostClock) -> Result<OpenedDevices, OpenError> {
         let gone = || OpenError::Thread("the link was used".into());
         stand::open(self.0.take().ok_or_else(gone)?, &usual(), clock)
     }
@@ -125,7 +125,7 @@ impl RigDevice for OnLink {
 /// The whole of it: a thread, a wire, the host's clock.
 #[test]
 fn a_rig_moves_stops_and_says_farewell() {
-    let (ours, mut theirs) = pair();
+    let (ours, mut theirs) = memory_link_pair();
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
     let is_over = Arc::new(AtomicBool::new(false));

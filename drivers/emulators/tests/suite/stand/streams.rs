@@ -1,8 +1,8 @@
 //! Random bytes to both sides: no panic, bounded memory, equal events however they are cut.
 
 use super::bench::{Host, Shared, to, usual};
-use palpate_drivers::mark10::stand::protocol::{Pair, Status, number, travel};
-use palpate_drivers::text::{Lines, Taken};
+use palpate_drivers::mark10::stand::protocol::{ForceTravelPair, StandStatus, number, travel};
+use palpate_drivers::text::{Lines, ReceivedLine};
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
@@ -110,12 +110,13 @@ fn the_emulated_stand_takes_anything() {
 
 /// Everything that a stream could mean, line by line.
 fn meant(bytes: &[u8], piece: usize) -> Vec<String> {
-    let (mut lines, mut pair) = (Lines::default(), Pair::default());
+    let (mut lines, mut pair) = (Lines::default(), ForceTravelPair::default());
     let mut all = Vec::new();
     for part in bytes.chunks(piece) {
         for byte in part {
-            if let Some(Taken::Line(line)) = lines.take(*byte) {
-                let read = (Status::parse(&line), travel(&line), number(&line).map(f64::to_bits));
+            if let Some(ReceivedLine::Line(line)) = lines.take(*byte) {
+                let read =
+                    (StandStatus::parse(&line), travel(&line), number(&line).map(f64::to_bits));
                 all.push(format!("{read:?} {:?}", pair.take(&line)));
             }
         }

@@ -3,10 +3,10 @@
 
 use super::bench::{to, usual};
 use palpate_drivers::mark10::{StandDevice, StandRig};
-use palpate_drivers::wire::{HostClock, Place};
+use palpate_drivers::wire::{DeviceAddress, HostClock};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
-use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
+use palpate_emulators::serve::{EmulatorAddress as At, ServeEvent, ServeOptions, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, RigCommand};
 use palpate_test_support::skip;
@@ -53,7 +53,7 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
     let work = move || {
         let mut device = EmulatedStand::new(EmulatedStandSettings::default());
         let options = ServeOptions {
-            place: At::Pty(None),
+            address: At::Pty(None),
             baud: None,
             latency: Nanos::ZERO,
             faults: Vec::new(),
@@ -64,10 +64,10 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
         serve(&mut device, &options, &received, &is_over, &mut tell).is_ok()
     };
     let thread = std::thread::Builder::new().name("stand".into()).spawn(work).expect("a thread");
-    let Ok(Told::Ready(port)) = printed.recv_timeout(PATIENCE) else {
+    let Ok(ServeEvent::Ready(port)) = printed.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
-    let place = Place::Serial { port, baud: 115_200, has_handshake: false };
+    let place = DeviceAddress::Serial { port, baud: 115_200, has_handshake: false };
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
     let open = || {

@@ -1,8 +1,8 @@
-//! Answers: each belongs to the one open question.
+//! PromptResponder: each belongs to the one open question.
 
 use super::{GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandQuestion, StandSession};
-use crate::mark10::stand::protocol::{Status, number};
-use crate::text::Taken;
+use crate::mark10::stand::protocol::{StandStatus, number};
+use crate::text::ReceivedLine;
 use palpate_model::Nanos;
 
 impl StandSession {
@@ -32,7 +32,7 @@ impl StandSession {
                 }
             }
             StandQuestion::Status => {
-                if let Some(status) = Status::parse(line) {
+                if let Some(status) = StandStatus::parse(line) {
                     self.answered(now);
                     self.status = Some(status);
                 }
@@ -76,12 +76,12 @@ impl StandSession {
         self.stop_due |= self.is_going() && self.lost_answers >= GARBLED_MAX;
     }
 
-    pub(super) fn on_taken(&mut self, now: Nanos, taken: Taken) {
+    pub(super) fn on_taken(&mut self, now: Nanos, taken: ReceivedLine) {
         if self.question.is_none() {
             return;
         }
         self.lines_since += 1;
-        if let Taken::Line(line) = taken {
+        if let ReceivedLine::Line(line) = taken {
             self.on_line(now, &line);
         }
         let lines = match self.question {

@@ -7,7 +7,7 @@ use crate::mark10::stand::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, SPEED_TOLERANCE
 use crate::rig::{RigEventBody, axis_status};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_model::rig::{Age, AxisStatus, Fault, MoveTo, Profile, Reading};
+use palpate_model::rig::{AxisStatus, Fault, MotionProfile, MoveTo, Reading, SampleAge};
 use palpate_model::units::{Seconds, Volts};
 
 impl StandSession {
@@ -45,7 +45,7 @@ impl StandSession {
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
             status: inputs | moving,
-            age: Some(Age { by: now.since(at), within: now.since(at) }),
+            age: Some(SampleAge { by: now.since(at), within: now.since(at) }),
         };
         self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
         self.report(now, RigEventBody::Reading(reading));
@@ -83,7 +83,7 @@ impl StandSession {
                 }
                 let command = stand_move.command;
                 let from = self.at_rest(self.reported_pulses(stand_move.from));
-                let course = Profile::to_rest(
+                let course = MotionProfile::to_rest(
                     position_from_pulses(from, MM_PER_PULSE),
                     position_from_pulses(command.target_pulses, MM_PER_PULSE),
                     command.speed,
@@ -113,7 +113,7 @@ impl StandSession {
         now: Nanos,
         tick: u64,
         stand_move: StandMove,
-        course: Profile,
+        course: MotionProfile,
         (start_tick, stopped_tick): (u64, Option<u64>),
     ) -> (i64, AxisStatus) {
         let true_pulses = self.reported_pulses(self.travel);

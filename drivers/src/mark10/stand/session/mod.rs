@@ -4,7 +4,7 @@ mod answers;
 mod following;
 
 use super::open::ConnectedStand;
-use super::protocol::{Pair, STOP, Status, ask_limit, set_limit, set_speed};
+use super::protocol::{ForceTravelPair, STOP, StandStatus, ask_limit, set_limit, set_speed};
 use super::{MM_PER_PULSE, StandSettings};
 use crate::mark10::gauge::GaugeScale;
 use crate::rig::RigEventBody;
@@ -12,7 +12,7 @@ use crate::text::Lines;
 use crate::wire::{ATTENDED_MAX, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
 use palpate_model::Nanos;
 use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{Ack, MoveTo, Profile, RigCommand};
+use palpate_model::rig::{Ack, MotionProfile, MoveTo, RigCommand};
 use palpate_model::units::Position;
 use std::collections::VecDeque;
 
@@ -73,7 +73,7 @@ enum Motion {
     /// Seen to move; the course began with that sample.
     Moving {
         stand_move: StandMove,
-        course: Profile,
+        course: MotionProfile,
         start_tick: u64,
         stopped_tick: Option<u64>,
     },
@@ -86,7 +86,7 @@ pub struct StandSession {
     pace: StandPace,
     opened: Nanos,
     lines: Lines,
-    pair: Pair,
+    pair: ForceTravelPair,
     question: Option<(StandQuestion, Nanos)>,
     lines_since: usize,
     next_sample: Nanos,
@@ -101,7 +101,7 @@ pub struct StandSession {
     unconfirmed: Vec<RigCommand>,
     orders: VecDeque<RigCommand>,
     motion: Motion,
-    status: Option<Status>,
+    status: Option<StandStatus>,
     travel: i64,
     travel_changed: Nanos,
     /// Reported pulses at the stand's travel zero.
@@ -128,7 +128,7 @@ impl StandSession {
             pace,
             opened: now,
             lines: Lines::default(),
-            pair: Pair::default(),
+            pair: ForceTravelPair::default(),
             question: None,
             lines_since: 0,
             next_sample: now,
@@ -257,7 +257,7 @@ impl StandSession {
     ) -> Option<Vec<u8>> {
         self.question = Some((question, now));
         self.lines_since = 0;
-        self.pair = Pair::default();
+        self.pair = ForceTravelPair::default();
         Some(text.into())
     }
 
@@ -275,7 +275,7 @@ fn pulses_of(position: Position) -> i64 {
 }
 
 impl Dialogue for StandSession {
-    fn attended(&mut self, at: Nanos) {
+    fn note_attendance(&mut self, at: Nanos) {
         self.attended_at = Some(at);
     }
 
@@ -289,7 +289,7 @@ impl Dialogue for StandSession {
         self.orders.push_back(command);
     }
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
         if let Some(until) = self.quiet_until.as_mut().filter(|_| !bytes.is_empty()) {
             *until = now + self.quiet;
             return;

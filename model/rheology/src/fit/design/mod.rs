@@ -12,10 +12,10 @@ mod rows;
 mod step_table;
 
 use super::sample::FitSample;
-use crate::vectors::wide;
+use crate::vectors::run_wide;
 use forcing::Forcing;
 use palpate_model::viscoelastic::{
-    Compensated, NEGLIGIBLE, PSI_COUNT, Pieces, StepWeights, forcing as drive,
+    CompensatedSum, ContactPieces, NEGLIGIBLE, PSI_COUNT, StepWeights, forcing as drive,
 };
 pub(super) use rows::{
     Coefficients, LANES, LINEAR_COUNT, Lane, Rows, legendre_from_powers, linear_units,
@@ -32,7 +32,7 @@ pub(super) struct Columns<const SLOPES: bool> {
     /// `Compensated`, side by side.
     filtered: [f64; 4],
     carry: [f64; 4],
-    decay: Compensated,
+    decay: CompensatedSum,
     /// Derivatives of `filtered` by `log tau`.
     tau_slopes: [f64; 4],
     /// Filtered "in contact" (the zeroth power) and filtered speed in contact.
@@ -50,7 +50,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
             table: StepTable::new(tau),
             filtered: [0.0; 4],
             carry: [0.0; 4],
-            decay: Compensated::new(1.0),
+            decay: CompensatedSum::new(1.0),
             tau_slopes: [0.0; 4],
             touch: 0.0,
             speed: 0.0,
@@ -66,14 +66,14 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         self.depth = to;
         self.elapsed += dt;
         let weights = self.table.get(dt);
-        match Pieces::of(from, to) {
-            Pieces::Inside => self.piece(from, to - from, 1.0, &weights),
-            Pieces::Outside => self.piece(0.0, 0.0, 0.0, &weights),
-            Pieces::Entering([outside, inside]) => {
+        match ContactPieces::of(from, to) {
+            ContactPieces::Inside => self.piece(from, to - from, 1.0, &weights),
+            ContactPieces::Outside => self.piece(0.0, 0.0, 0.0, &weights),
+            ContactPieces::Entering([outside, inside]) => {
                 self.part(0.0, 0.0, 0.0, dt * outside);
                 self.part(0.0, to, 1.0, dt * inside);
             }
-            Pieces::Leaving([inside, outside]) => {
+            ContactPieces::Leaving([inside, outside]) => {
                 self.part(from, -from, 1.0, dt * inside);
                 self.part(0.0, 0.0, 0.0, dt * outside);
             }
@@ -135,7 +135,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
             }
         }
         if self.decay.value.abs() < NEGLIGIBLE {
-            self.decay = Compensated::default();
+            self.decay = CompensatedSum::default();
         }
         for slope in &mut self.tau_slopes {
             if slope.abs() < NEGLIGIBLE {
@@ -187,7 +187,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
             return;
         };
         let weights = *self.table.newest();
-        wide(
+        run_wide(
             #[inline(always)]
             || self.recur(samples, scale, &forcing, &weights, rows),
         );
@@ -246,7 +246,7 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         }
         let mut from = [self.depth; LANES];
         from[1..].copy_from_slice(&x[..LANES - 1]);
-        Some(wide(
+        Some(run_wide(
             #[inline(always)]
             || Forcing::new::<SLOPES>(&from, &x, &dt, (nominal, r, tau), &psi, &slope),
         ))

@@ -4,10 +4,10 @@
 //! and stored once for all of them. Nodes lie side by side in chunks: the same operation on eight
 //! neighbours is what a compiler turns into vector instructions on any machine.
 
-use crate::vectors::wide;
-use palpate_model::viscoelastic::{NEGLIGIBLE, Pieces, psi_all};
+use crate::vectors::run_wide;
+use palpate_model::viscoelastic::{ContactPieces, NEGLIGIBLE, psi_all};
 
-/// Relaxation times in the bank unless asked otherwise: on the protocol of the thesis twice as many are no
+/// StressRelaxation times in the bank unless asked otherwise: on the protocol of the thesis twice as many are no
 /// more exact and half as many leave tau off by 2e-6 (`palpate trade`).
 pub(super) const NODES: usize = 64;
 /// Fewest: a factor of two between neighbours. Most: what a sample at 1 kHz leaves time for.
@@ -89,7 +89,7 @@ pub(super) struct Bank {
     shared: [f64; 3],
 }
 
-/// Relaxation times evenly placed by their logarithm.
+/// StressRelaxation times evenly placed by their logarithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
     /// How many: a whole number of chunks.
@@ -108,7 +108,7 @@ impl Grid {
         (TAU_RANGE[1] / TAU_RANGE[0]).ln() / (self.nodes - 1) as f64
     }
 
-    /// Relaxation time in s at a place between nodes, counted in nodes.
+    /// StressRelaxation time in s at a place between nodes, counted in nodes.
     pub fn tau_at(self, place: f64) -> f64 {
         TAU_RANGE[0] * (self.spacing() * place).exp()
     }
@@ -140,14 +140,14 @@ impl Bank {
 
     /// Moves straight from scaled depth `from` to `to` within `dt` seconds.
     pub fn advance(&mut self, from: f64, to: f64, dt: f64) {
-        match Pieces::of(from, to) {
-            Pieces::Inside => self.push_piece(from, to - from, dt),
-            Pieces::Outside => self.push_piece(0.0, 0.0, dt),
-            Pieces::Entering([outside, inside]) => {
+        match ContactPieces::of(from, to) {
+            ContactPieces::Inside => self.push_piece(from, to - from, dt),
+            ContactPieces::Outside => self.push_piece(0.0, 0.0, dt),
+            ContactPieces::Entering([outside, inside]) => {
                 self.push_piece(0.0, 0.0, dt * outside);
                 self.push_piece(0.0, to, dt * inside);
             }
-            Pieces::Leaving([inside, outside]) => {
+            ContactPieces::Leaving([inside, outside]) => {
                 self.push_piece(from, -from, dt * inside);
                 self.push_piece(0.0, 0.0, dt * outside);
             }
@@ -196,7 +196,7 @@ impl Bank {
     /// Takes the samples that wait.
     pub fn flush(&mut self) {
         let (chunks, waiting) = (&mut self.chunks, &self.waiting);
-        wide(
+        run_wide(
             #[inline(always)]
             || {
                 for chunk in chunks.iter_mut() {

@@ -16,7 +16,7 @@ mod stencil;
 use super::design::linear_units;
 use super::noise;
 use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
-use super::report::{Parameter, student_t975};
+use super::report::{FittedParameter, student_t975};
 use bank::{Bank, COLUMNS, Grid, NODES};
 use blocks::Blocks;
 use identifiability::BlindParameters;
@@ -313,8 +313,8 @@ fn uncertainty_reason(index: usize, value: f64, error: f64) -> Option<String> {
     })
 }
 
-fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> Parameter {
-    Parameter {
+fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> FittedParameter {
+    FittedParameter {
         name: PARAMETER_NAMES[index].into(),
         value,
         unit: PARAMETER_UNITS[index].into(),

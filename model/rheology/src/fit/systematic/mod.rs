@@ -8,9 +8,9 @@
 
 use super::options::FitOptions;
 use super::sample::{FitError, FitSample, NamedSamples};
-use super::solve::Fitted;
+use super::solve::FitSolution;
 use crate::distinct;
-use palpate_model::calibration::{ForceUncertainty, Term};
+use palpate_model::calibration::{ForceUncertainty, UncertaintyTerm};
 use palpate_model::units::{Depth, Newtons};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ const SAMPLES_MAX: usize = 4000;
 
 /// A record and what its forces and depths were read with.
 #[derive(Clone, Copy, Debug)]
-pub struct Traced<'a> {
+pub struct TracedRecord<'a> {
     pub name: &'a str,
     pub samples: &'a [FitSample],
     /// The calibration by name, and its uncertainty; `None` where it is not known, as of a table.
@@ -36,7 +36,7 @@ pub struct Traced<'a> {
 
 /// Uncertainty of a fit from calibration and machine compliance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Systematic {
+pub struct SystematicUncertainty {
     pub calibrations: Vec<StatedTerms>,
     /// Names of the compliances that were taken from the depths.
     pub compliances: Vec<String>,
@@ -51,8 +51,8 @@ pub struct Systematic {
 pub struct StatedTerms {
     pub name: String,
     /// Terms whose errors were moved.
-    pub terms: Vec<Term>,
-    pub not_stated: Vec<Term>,
+    pub terms: Vec<UncertaintyTerm>,
+    pub not_stated: Vec<UncertaintyTerm>,
 }
 
 impl StatedTerms {
@@ -80,7 +80,7 @@ pub struct SystematicError {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TermError {
-    pub term: Term,
+    pub term: UncertaintyTerm,
     /// Its standard uncertainty.
     pub error: f64,
 }
@@ -89,24 +89,27 @@ pub struct TermError {
 ///
 /// Costs a fit of at most 4000 samples for each independent error, of which there are as many as twice
 /// the weights or more.
-pub fn systematic(record: Traced<'_>, options: &FitOptions) -> Result<Systematic, FitError> {
-    let mut found = systematic_joint(&[record], options, &[])?;
+pub fn estimate_systematic(
+    record: TracedRecord<'_>,
+    options: &FitOptions,
+) -> Result<SystematicUncertainty, FitError> {
+    let mut found = estimate_systematic_jointly(&[record], options, &[])?;
     Ok(found.pop().unwrap_or_default())
 }
 
 /// The same of a fit of several records together, one for each; [`super::fit_joint`] says what `shared` is.
-pub fn systematic_joint(
-    records: &[Traced<'_>],
+pub fn estimate_systematic_jointly(
+    records: &[TracedRecord<'_>],
     options: &FitOptions,
     shared: &[&str],
-) -> Result<Vec<Systematic>, FitError> {
+) -> Result<Vec<SystematicUncertainty>, FitError> {
     let taken: Vec<Vec<FitSample>> = records.iter().map(|one| thinned(one.samples)).collect();
     let mut spread = Spread::default();
     let mut names = Vec::new();
     let calibrations = records.iter().filter_map(|one| one.calibration);
     let is_stated = calibrations.into_iter().any(|(_, one)| one.is_stated());
     if is_stated || records.iter().any(|one| one.compliance.is_some()) {
-        let fitted = Fitted::joint(&name_samples(records, &taken), options, shared)?;
+        let fitted = FitSolution::fit_jointly(&name_samples(records, &taken), options, shared)?;
         names = fitted.value_names();
         spread = Spread::of(records, &taken, &fitted)?;
     }
@@ -116,7 +119,7 @@ pub fn systematic_joint(
 
 /// Samples under the names of their records.
 fn name_samples<'a>(
-    records: &[Traced<'a>],
+    records: &[TracedRecord<'a>],
     samples: &'a [Vec<FitSample>],
 ) -> Vec<NamedSamples<'a>> {
     let names = records.iter().map(|one| one.name);
@@ -126,16 +129,16 @@ fn name_samples<'a>(
 /// Squared changes of everything a fit finds.
 #[derive(Default)]
 struct Spread {
-    terms: BTreeMap<Term, Vec<f64>>,
+    terms: BTreeMap<UncertaintyTerm, Vec<f64>>,
     compliance: Option<Vec<f64>>,
 }
 
 impl Spread {
     /// Of what is found in records, of which these samples were `taken` and `fitted`.
     fn of(
-        records: &[Traced<'_>],
+        records: &[TracedRecord<'_>],
         taken: &[Vec<FitSample>],
-        fitted: &Fitted<'_>,
+        fitted: &FitSolution<'_>,
     ) -> Result<Self, FitError> {
         let mut spread = Self::default();
         let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
@@ -180,12 +183,17 @@ impl Spread {
     }
 
     /// The values from `first` on, by name.
-    fn summarise(&self, records: &[Traced<'_>], names: &[String], first: usize) -> Systematic {
+    fn summarise(
+        &self,
+        records: &[TracedRecord<'_>],
+        names: &[String],
+        first: usize,
+    ) -> SystematicUncertainty {
         let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
         let compliances = distinct(records.iter().filter_map(|one| one.compliance));
         let is_stated = self.compliance.is_some() || !self.terms.is_empty();
         let parameters = names.iter().zip(first..).filter(|_| is_stated);
-        Systematic {
+        SystematicUncertainty {
             calibrations: calibrations.iter().copied().map(StatedTerms::of).collect(),
             compliances: compliances.iter().map(|(name, _)| (*name).to_owned()).collect(),
             is_extrapolated: records.iter().any(|one| {
@@ -221,9 +229,9 @@ fn thinned(samples: &[FitSample]) -> Vec<FitSample> {
 
 /// The samples taken, those of the chosen records as another calibration or compliance would have read them.
 fn reread_records(
-    records: &[Traced<'_>],
+    records: &[TracedRecord<'_>],
     taken: &[Vec<FitSample>],
-    is_chosen: impl Fn(&Traced<'_>) -> bool,
+    is_chosen: impl Fn(&TracedRecord<'_>) -> bool,
     read: impl Fn(&[FitSample]) -> Vec<FitSample>,
 ) -> Vec<Vec<FitSample>> {
     let pairs = records.iter().zip(taken);

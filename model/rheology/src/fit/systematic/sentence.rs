@@ -1,8 +1,8 @@
 //! Systematic errors in a sentence, and in a report next to the statistical ones.
 
 use super::super::report::{FitReport, JointReport};
-use super::{StatedTerms, Systematic};
-use palpate_model::calibration::Term;
+use super::{StatedTerms, SystematicUncertainty};
+use palpate_model::calibration::UncertaintyTerm;
 
 impl StatedTerms {
     /// Its own part of a sentence.
@@ -18,12 +18,12 @@ impl StatedTerms {
     }
 }
 
-fn words(terms: &[Term]) -> String {
+fn words(terms: &[UncertaintyTerm]) -> String {
     let words: Vec<&str> = terms.iter().map(|term| term.name()).collect();
     words.join(", ")
 }
 
-impl Systematic {
+impl SystematicUncertainty {
     /// One sentence on what was added and what could not be.
     pub fn sentence(&self) -> String {
         let calibrations = self.calibrations.iter();
@@ -46,7 +46,7 @@ impl Systematic {
             (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
         };
         let parts = if self.calibrations.windows(2).all(is_alike) {
-            let terms: Vec<Term> = first.terms.iter().map(|one| one.term).collect();
+            let terms: Vec<UncertaintyTerm> = first.terms.iter().map(|one| one.term).collect();
             let stated = Some(words(&terms)).filter(|words| !words.is_empty());
             let stated: Vec<String> = stated.into_iter().chain(bends).collect();
             match self.calibrations.first().map(|one| one.not_stated.as_slice()) {
@@ -80,13 +80,13 @@ impl Systematic {
 impl FitReport {
     /// This report with the systematic errors next to the statistical ones, and the sentence on them.
     #[must_use]
-    pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
+    pub fn with_systematic(mut self, systematic: &SystematicUncertainty) -> Self {
         self.add_systematic(systematic);
         self.findings.push(systematic.sentence());
         self
     }
 
-    fn add_systematic(&mut self, systematic: &Systematic) {
+    fn add_systematic(&mut self, systematic: &SystematicUncertainty) {
         let known = self.parameters.iter_mut();
         for parameter in known.filter(|one| one.std_error.is_some()) {
             parameter.systematic_error = systematic.error(&parameter.name);
@@ -97,7 +97,7 @@ impl FitReport {
 impl JointReport {
     /// This report with the systematic errors of every record next to the statistical ones.
     #[must_use]
-    pub fn with_systematic(mut self, systematic: &[Systematic]) -> Self {
+    pub fn with_systematic(mut self, systematic: &[SystematicUncertainty]) -> Self {
         for (record, own) in self.records.iter_mut().zip(systematic) {
             record.report.add_systematic(own);
         }

@@ -26,8 +26,8 @@ fn traced<'a>(
     samples: &'a [FitSample],
     name: &'a str,
     uncertainty: &'a ForceUncertainty,
-) -> Traced<'a> {
-    Traced { name, samples, calibration: Some((name, uncertainty)), compliance: None }
+) -> TracedRecord<'a> {
+    TracedRecord { name, samples, calibration: Some((name, uncertainty)), compliance: None }
 }
 
 /// The thesis's table as if it were printed with a digit more: small errors, so that the draws do not
@@ -41,12 +41,12 @@ fn systematic_error_equals_the_scatter_of_drawn_calibrations() {
     let (samples, options) = (record(5.0), FitOptions::default());
     let calibration = calibration();
     let uncertainty = ForceUncertainty::of(&calibration).unwrap();
-    let found = systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
+    let found = estimate_systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
     let curve = calibration.curve().unwrap();
     let tare = curve.volts_from_newtons(Newtons(0.0));
     let mut random = SplitMix::seeded(5);
     let values = |samples: &[FitSample]| {
-        let fitted = Fitted::of(samples, &options).unwrap();
+        let fitted = FitSolution::of(samples, &options).unwrap();
         fitted.system.physical_values(0, &fitted.refined.points[0])
     };
     let before = values(&samples);
@@ -70,7 +70,7 @@ fn systematic_error_equals_the_scatter_of_drawn_calibrations() {
         }
     }
     for (k, own) in found.parameters.iter().enumerate().take(5) {
-        let digits = own.terms.iter().find(|one| one.term == Term::Resolution).unwrap();
+        let digits = own.terms.iter().find(|one| one.term == UncertaintyTerm::Resolution).unwrap();
         let drawn = squares[k].sqrt();
         // 600 draws know a standard deviation to 3 %, three times that and a little bend.
         assert!(
@@ -89,7 +89,7 @@ fn systematic_error_does_not_depend_on_thinning() {
     let options = FitOptions::default();
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let of = |samples: &[FitSample]| {
-        systematic(traced(samples, "thesis", &uncertainty), &options).unwrap()
+        estimate_systematic(traced(samples, "thesis", &uncertainty), &options).unwrap()
     };
     // Of 18 000 samples every fifth is taken; 1800 are taken whole.
     let (long, short) = (of(&record(200.0)), of(&record(20.0)));
@@ -103,19 +103,21 @@ fn a_calibration_that_states_nothing_adds_nothing_and_says_so() {
     let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
     let uncertainty = ForceUncertainty::of(&line).unwrap();
     let (samples, options) = (record(5.0), FitOptions::default());
-    let found = systematic(traced(&samples, "line", &uncertainty), &options).unwrap();
+    let found = estimate_systematic(traced(&samples, "line", &uncertainty), &options).unwrap();
     let report = super::super::fit(&samples, &options).unwrap().with_systematic(&found);
     assert!(report.parameters.iter().all(|one| one.systematic_error.is_none()));
     let sentence = report.findings.last().unwrap();
     assert!(sentence.contains("\"line\" states nothing"), "{sentence}");
     let uncertainty = ForceUncertainty::of(&Calibration::thesis()).unwrap();
-    let found = systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
+    let found = estimate_systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
     let report = super::super::fit(&samples, &options).unwrap().with_systematic(&found);
     let terms = &found.calibrations[0];
-    assert_eq!(terms.terms, [Term::Resolution, Term::Interpolation]);
-    assert!(terms.not_stated.contains(&Term::Weights), "{terms:?}");
+    assert_eq!(terms.terms, [UncertaintyTerm::Resolution, UncertaintyTerm::Interpolation]);
+    assert!(terms.not_stated.contains(&UncertaintyTerm::Weights), "{terms:?}");
     let sentence = report.findings.last().unwrap();
-    for term in [Term::Resolution, Term::Interpolation, Term::Weights] {
+    for term in
+        [UncertaintyTerm::Resolution, UncertaintyTerm::Interpolation, UncertaintyTerm::Weights]
+    {
         assert!(sentence.contains(term.name()), "{sentence}");
     }
     assert!(!found.is_extrapolated);
@@ -130,9 +132,9 @@ fn records_of_one_calibration_move_together_and_of_two_apart() {
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let joint = |names: [&str; 2]| {
         let both = names.map(|name| traced(&one, name, &uncertainty));
-        systematic_joint(&both, &options, &options.body_names()).unwrap()
+        estimate_systematic_jointly(&both, &options, &options.body_names()).unwrap()
     };
-    let alone = systematic(traced(&one, "a", &uncertainty), &options).unwrap();
+    let alone = estimate_systematic(traced(&one, "a", &uncertainty), &options).unwrap();
     let (same, apart) = (joint(["a", "a"]), joint(["a", "b"]));
     for (k, own) in alone.parameters.iter().enumerate().take(5) {
         // Twice the same record with the same error: the same as once.
@@ -159,15 +161,15 @@ fn sentence_names_what_each_of_two_calibrations_states() {
     let uncertainty = |second: &Calibration| {
         let both = [&calibration(), second].map(|one| ForceUncertainty::of(one).unwrap());
         let records = [traced(&one, "a", &both[0]), traced(&one, "b", &both[1])];
-        systematic_joint(&records, &options, &options.body_names()).unwrap()[0].clone()
+        estimate_systematic_jointly(&records, &options, &options.body_names()).unwrap()[0].clone()
     };
     let found = uncertainty(&drifting);
     // Each of them is named, and what the second alone states stands once as stated and once as not.
     let sentence = found.sentence();
     assert!(sentence.contains("\"a\"") && sentence.contains("\"b\""), "{sentence}");
-    assert_eq!(sentence.matches(Term::ZeroDrift.name()).count(), 2, "{sentence}");
-    assert!(found.calibrations[1].terms.contains(&Term::ZeroDrift));
-    assert!(found.calibrations[0].not_stated.contains(&Term::ZeroDrift));
+    assert_eq!(sentence.matches(UncertaintyTerm::ZeroDrift.name()).count(), 2, "{sentence}");
+    assert!(found.calibrations[1].terms.contains(&UncertaintyTerm::ZeroDrift));
+    assert!(found.calibrations[0].not_stated.contains(&UncertaintyTerm::ZeroDrift));
     assert_eq!(uncertainty(&straight).calibrations[1].terms, []);
 }
 
@@ -176,14 +178,14 @@ fn every_family_reports_the_systematic_error_of_the_calibration() {
     let samples = record(5.0);
     let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
     let traced = traced(&samples, "thesis", &uncertainty);
-    let known = systematic(traced, &FitOptions::default()).unwrap();
-    let of = |name: &str, found: &Systematic| {
+    let known = estimate_systematic(traced, &FitOptions::default()).unwrap();
+    let of = |name: &str, found: &SystematicUncertainty| {
         let own = found.parameters.iter().find(|one| one.name == name);
         own.map(|one| one.error)
     };
     for key in ["series-4", "series-5", "exponential"] {
         let options = FitOptions::by_key(key).unwrap();
-        let found = systematic(traced, &options).unwrap();
+        let found = estimate_systematic(traced, &options).unwrap();
         // The sensor offset moves with the zero, whatever the body is.
         let [own, other] = [&found, &known].map(|one| of("f_offset", one).unwrap());
         assert!(own > 0.1 * other && own < 30.0 * other, "{key}: {own} {other}");
@@ -201,11 +203,11 @@ fn uncertain_compliance_makes_stiffness_uncertain() {
     let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
     let uncertainty = ForceUncertainty::of(&line).unwrap();
     let with = |std_error| {
-        let traced = Traced {
+        let traced = TracedRecord {
             compliance: Some(("stand", std_error)),
             ..traced(&samples, "line", &uncertainty)
         };
-        systematic(traced, &options).unwrap()
+        estimate_systematic(traced, &options).unwrap()
     };
     // 1 um/N moves a depth of 30 mm by some micrometres; twice of it, twice as far.
     let (one, two) = (with(1e-3), with(2e-3));

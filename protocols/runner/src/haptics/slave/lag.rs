@@ -1,9 +1,9 @@
 //! How far a slave is behind, and how well the force at the handle agrees with the force of its cell.
 
 use super::{FILTER_MS, SlaveSettings};
-use crate::Felt;
-use crate::haptics::timing::Kept;
-use palpate_haptics::margin::{Device, Watch};
+use crate::SlaveSample;
+use crate::haptics::timing::LoopTiming;
+use palpate_haptics::margin::{LoopDevice, MarginSettings};
 use palpate_model::Nanos;
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -21,12 +21,12 @@ const PLACES_MAX: usize = 5000;
 const LAGS_MAX: usize = 3_600_000;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct LagSpread {
     pub median: f64,
     pub worst: f64,
 }
 
-impl Spread {
+impl LagSpread {
     fn of(values: &[f32]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f32::total_cmp);
@@ -39,7 +39,7 @@ impl Spread {
 
 /// How two forces differ, in N.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Difference {
+pub struct ForceDifference {
     /// The largest either way.
     pub worst_n: f64,
     /// Root of the mean square.
@@ -47,7 +47,7 @@ pub struct Difference {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Slaved {
+pub struct SlaveReport {
     pub samples: u64,
     /// Greatest depth of the slave in mm.
     pub depth_max_mm: f64,
@@ -58,13 +58,13 @@ pub struct Slaved {
     /// Greatest force of the slave's cell.
     pub cell_max_n: f64,
     /// The model at the depth of the slave minus the cell: how the body differs from the specimen.
-    pub model_less_cell: Difference,
+    pub model_less_cell: ForceDifference,
     /// The handle minus the cell: the same, plus the lag of the slave.
-    pub handle_less_cell: Difference,
+    pub handle_less_cell: ForceDifference,
     /// How long ago the master was where the slave is, in ms; none if it hardly moved.
-    pub lag_ms: Option<Spread>,
+    pub lag_ms: Option<LagSpread>,
     /// How far the slave is from the master, in mm.
-    pub lag_mm: Spread,
+    pub lag_mm: LagSpread,
     /// How often the slave's cell detected contact or its loss.
     pub contact_changes: u64,
     /// Damping that the device would need at the greatest depth if its force came through the slave, at the median lag,
@@ -84,7 +84,7 @@ pub struct MasterLoop {
     /// The priority that the system granted, in words.
     pub priority: String,
     #[serde(flatten)]
-    pub kept: Kept,
+    pub timing: LoopTiming,
 }
 
 /// A sum of squares and the largest.
@@ -102,15 +102,18 @@ impl DifferenceSums {
         self.count += 1;
     }
 
-    fn summary(&self) -> Difference {
-        Difference { worst_n: self.worst, rms_n: (self.squares / self.count.max(1) as f64).sqrt() }
+    fn summary(&self) -> ForceDifference {
+        ForceDifference {
+            worst_n: self.worst,
+            rms_n: (self.squares / self.count.max(1) as f64).sqrt(),
+        }
     }
 }
 
 #[derive(Debug)]
 pub(super) struct SlaveMeter {
     body: ModifiedKelvin,
-    watch: Watch,
+    watch: MarginSettings,
     depth_max: Depth,
     mm_per_pulse: f64,
     model: KelvinState,
@@ -154,7 +157,13 @@ impl SlaveMeter {
         }
     }
 
-    pub fn push(&mut self, sample: &Felt, master: Depth, handle: Newtons, contact_changes: u64) {
+    pub fn push(
+        &mut self,
+        sample: &SlaveSample,
+        master: Depth,
+        handle: Newtons,
+        contact_changes: u64,
+    ) {
         self.samples += 1;
         self.contact_changes = contact_changes;
         self.deepest = self.deepest.max(sample.depth.0);
@@ -185,7 +194,7 @@ impl SlaveMeter {
     }
 
     /// Where the master was when it was where the slave is now: the last time it passed that place.
-    fn take_lag(&mut self, sample: &Felt, master: f64) {
+    fn take_lag(&mut self, sample: &SlaveSample, master: f64) {
         if self.places.len() == PLACES_MAX {
             self.places.pop_front();
         }
@@ -207,19 +216,19 @@ impl SlaveMeter {
         }
     }
 
-    pub fn report(&self) -> Option<Slaved> {
-        let lag_mm = Spread::of(&self.lags_mm)?;
-        let lag_ms = Spread::of(&self.lags_ms);
+    pub fn report(&self) -> Option<SlaveReport> {
+        let lag_mm = LagSpread::of(&self.lags_mm)?;
+        let lag_ms = LagSpread::of(&self.lags_ms);
         let [handle_max_n, model_max_n, cell_max_n] = self.maxima;
         let at = Depth(self.deepest.max(0.0));
         let period = self.watch.period.seconds().0;
         let needed = |ticks: f64| {
-            let device = Device { delay_ticks: ticks, ..self.watch.device };
-            let watch = Watch { device, ..self.watch };
+            let device = LoopDevice { delay_ticks: ticks, ..self.watch.device };
+            let watch = MarginSettings { device, ..self.watch };
             // N s/m as catalogues have it.
             1e3 * watch.at(at, MmPerS(0.0)).needed
         };
-        Some(Slaved {
+        Some(SlaveReport {
             samples: self.samples,
             depth_max_mm: self.deepest,
             handle_max_n,

@@ -8,10 +8,10 @@
 mod lag;
 
 use lag::SlaveMeter;
-pub use lag::{Difference, MasterLoop, Slaved, Spread};
+pub use lag::{ForceDifference, LagSpread, MasterLoop, SlaveReport};
 
-use super::{Beat, Ticking};
-use crate::{Felt, Leading};
+use super::{LoopTask, RealTimeLoop};
+use crate::{LeadSource, SlaveSample};
 use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
 use palpate_haptics::{ContactSettings, MasterSlaveError, Period};
 use palpate_model::Nanos;
@@ -86,12 +86,12 @@ impl Master {
     }
 }
 
-impl Ticking for Master {
+impl LoopTask for Master {
     type View = MasterView;
 
     fn tick(&mut self, elapsed: u64) {
         for _ in 1..elapsed.min(LED_MAX) {
-            let _away = self.simulation.stalled();
+            let _away = self.simulation.tick_stalled();
         }
         let count = self.mailbox.count.load(Ordering::Acquire);
         self.silent_ticks =
@@ -118,7 +118,7 @@ enum MasterDrive {
         begun: Nanos,
         done: u64,
     },
-    RealTime(Beat<Master>),
+    RealTime(RealTimeLoop<Master>),
 }
 
 /// Leads a slave and measures its lag. The hand starts with the first sample of the step that follows.
@@ -156,17 +156,19 @@ impl SlaveLeader {
     }
 
     /// What came of it; none if nothing was led.
-    pub fn slaved(&self) -> Option<Slaved> {
+    pub fn report(&self) -> Option<SlaveReport> {
         let mut report = self.meter.report()?;
         if let Some(MasterDrive::RealTime(beat)) = &self.drive {
-            report.master_loop =
-                Some(MasterLoop { priority: beat.granted().to_string(), kept: beat.kept() });
+            report.master_loop = Some(MasterLoop {
+                priority: beat.granted_priority().to_string(),
+                timing: beat.timing(),
+            });
         }
         Some(report)
     }
 
     /// Contact must stand above the noise of this cell, averaged as it is.
-    fn begin(&mut self, sample: &Felt) -> Result<MasterDrive, String> {
+    fn begin(&mut self, sample: &SlaveSample) -> Result<MasterDrive, String> {
         let samples = self.settings.rig.means_in(FILTER_MS) as f64
             * f64::from(self.settings.rig.samples_per_ms());
         let above = ContactSettings::above_noise(Newtons(sample.sigma.0 / samples.sqrt()));
@@ -185,11 +187,11 @@ impl SlaveLeader {
             });
         }
         let first = made.seen;
-        let beat = Beat::start(made, period, first).map_err(|err| err.to_string())?;
+        let beat = RealTimeLoop::start(made, period, first).map_err(|err| err.to_string())?;
         Ok(MasterDrive::RealTime(beat))
     }
 
-    fn see(&mut self, sample: &Felt) -> Option<MasterView> {
+    fn see(&mut self, sample: &SlaveSample) -> Option<MasterView> {
         if self.drive.is_none() && self.failure.is_none() {
             match self.begin(sample) {
                 Ok(drive) => self.drive = Some(drive),
@@ -207,13 +209,13 @@ impl SlaveLeader {
                 *done = due;
                 Some(master.seen)
             }
-            MasterDrive::RealTime(beat) => Some(*beat.seen()),
+            MasterDrive::RealTime(beat) => Some(*beat.view()),
         }
     }
 }
 
-impl Leading for SlaveLeader {
-    fn lead(&mut self, sample: &Felt) -> Option<f64> {
+impl LeadSource for SlaveLeader {
+    fn lead(&mut self, sample: &SlaveSample) -> Option<f64> {
         let cell = self.filter.push(sample.force.0);
         self.mailbox.cell.store(cell.to_bits(), Ordering::Relaxed);
         self.mailbox.count.fetch_add(1, Ordering::Release);

@@ -2,7 +2,7 @@
 
 use super::super::header::{Quantity, Scale};
 use super::layout::Header;
-use super::options::Told;
+use super::options::ImportOptions;
 use super::readings::ReadingList;
 
 /// The column of a quantity and the conversion of its values.
@@ -127,7 +127,7 @@ pub(super) enum ColumnError {
 pub(super) fn find(
     header: &Header,
     words: LayoutNames,
-    options: &Told,
+    options: &ImportOptions,
     readings: &mut ReadingList,
 ) -> Result<Columns, ColumnError> {
     let other = ColumnError::Other;
@@ -168,7 +168,7 @@ fn column(
     quantity: Quantity,
     header: &Header,
     words: LayoutNames,
-    options: &Told,
+    options: &ImportOptions,
     readings: &mut ReadingList,
 ) -> Result<Option<Column>, String> {
     let what = quantity.name();

@@ -3,7 +3,7 @@
 palpate_model::named! {
     /// The decimal sign of a text.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Decimal {
+    pub enum DecimalSign {
         /// 1.5
         Point = "point",
         /// 1,5
@@ -11,7 +11,7 @@ palpate_model::named! {
     }
 }
 
-impl Decimal {
+impl DecimalSign {
     /// The decimal sign, and the sign between groups of three digits.
     fn signs(self) -> (char, char) {
         match self {
@@ -21,7 +21,7 @@ impl Decimal {
     }
 }
 
-impl std::str::FromStr for Decimal {
+impl std::str::FromStr for DecimalSign {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -34,7 +34,7 @@ impl std::str::FromStr for Decimal {
 }
 
 /// Parses a number. The other sign may only separate groups of three digits.
-pub(in crate::import) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
+pub(in crate::import) fn parse(cell: &str, decimal: DecimalSign) -> Option<f64> {
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.,eE".contains(c);
     if cell.is_empty() || !cell.chars().all(is_of_number) {
         return None;
@@ -69,7 +69,7 @@ pub(in crate::import) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
 
 /// Whether a cell is a number with either decimal sign.
 pub(super) fn looks_numeric(cell: &str) -> bool {
-    parse(cell, Decimal::Point).is_some() || parse(cell, Decimal::Comma).is_some()
+    parse(cell, DecimalSign::Point).is_some() || parse(cell, DecimalSign::Comma).is_some()
 }
 
 /// What a cell reveals of the decimal sign.
@@ -78,22 +78,22 @@ pub(in crate::import) enum Evidence {
     /// It has no such sign or is not a number.
     None,
     /// It is a number only with this sign.
-    Only(Decimal),
+    Only(DecimalSign),
     /// Both signs give numbers, and different ones.
     Either,
 }
 
 pub(in crate::import) fn evidence(cell: &str) -> Evidence {
-    let readings = [Decimal::Point, Decimal::Comma].map(|decimal| parse(cell, decimal));
+    let readings = [DecimalSign::Point, DecimalSign::Comma].map(|decimal| parse(cell, decimal));
     match readings {
-        [Some(_), None] => Evidence::Only(Decimal::Point),
-        [None, Some(_)] => Evidence::Only(Decimal::Comma),
+        [Some(_), None] => Evidence::Only(DecimalSign::Point),
+        [None, Some(_)] => Evidence::Only(DecimalSign::Comma),
         [Some(point), Some(comma)] if point.to_bits() != comma.to_bits() => {
             // A zero never precedes a group of thousands: 0,125 is an eighth.
             let digits = cell.trim_start_matches(['+', '-']);
             match digits.strip_prefix('0').and_then(|rest| rest.chars().next()) {
-                Some('.') => Evidence::Only(Decimal::Point),
-                Some(',') => Evidence::Only(Decimal::Comma),
+                Some('.') => Evidence::Only(DecimalSign::Point),
+                Some(',') => Evidence::Only(DecimalSign::Comma),
                 _ => Evidence::Either,
             }
         }
@@ -104,7 +104,7 @@ pub(in crate::import) fn evidence(cell: &str) -> Evidence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Decimal::{Comma, Point};
+    use DecimalSign::{Comma, Point};
 
     #[test]
     fn numbers_are_parsed_exactly_or_refused() {

@@ -3,13 +3,13 @@
 use super::{ForeignPart, ForeignSample};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_sessions::atomic;
 use palpate_sessions::folder::{FolderError, SessionFolder, check_free_space};
-use palpate_sessions::import_origin::{Imported, ORIGINAL_FOLDER};
+use palpate_sessions::import_origin::{ImportOrigin, ORIGINAL_FOLDER};
 use palpate_sessions::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
 use palpate_sessions::manifest::{IMPORTED_TICKS_PER_S, Manifest, RECORD_VERSION};
-use palpate_sessions::record::{EndRecord, Row};
+use palpate_sessions::record::{EndRecord, SampleRow};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ const ROWS_PER_BATCH: usize = 1 << 14;
 const BYTES_PER_ROW: u64 = 64;
 
 #[derive(Debug, Error)]
-pub enum KeepError {
+pub enum StoreImportError {
     #[error(transparent)]
     Folder(#[from] FolderError),
     #[error(transparent)]
@@ -33,7 +33,7 @@ pub enum KeepError {
 
 /// The session to make.
 #[derive(Clone, Debug)]
-pub struct Kept<'a> {
+pub struct ImportTarget<'a> {
     /// Must be new or empty.
     pub folder: &'a Path,
     /// The bytes of the whole file.
@@ -41,11 +41,11 @@ pub struct Kept<'a> {
     pub session_id: String,
     pub at: DateTime<Utc>,
     pub software_version: &'a str,
-    pub labels: Labels,
+    pub labels: SessionLabels,
 }
 
 /// Stores the original, then the log; both are on the disk when this returns.
-pub fn keep(part: &ForeignPart, target: Kept<'_>) -> Result<(), KeepError> {
+pub fn store_import(part: &ForeignPart, target: ImportTarget<'_>) -> Result<(), StoreImportError> {
     let ticks = ticks(&part.samples)?;
     let rows = part.samples.len() as u64 * BYTES_PER_ROW;
     check_free_space(target.folder, target.original.len() as u64 + rows)?;
@@ -78,22 +78,22 @@ pub fn keep(part: &ForeignPart, target: Kept<'_>) -> Result<(), KeepError> {
     Ok(log.finish(EndRecord { outcome, reason, ended_at, ..EndRecord::default() })?)
 }
 
-fn row(sample: &ForeignSample, tick: u64) -> Row {
-    Row {
+fn row(sample: &ForeignSample, tick: u64) -> SampleRow {
+    SampleRow {
         tick,
         host: Nanos(tick / 1000),
         volts: sample.signal,
         force: sample.force,
         depth: sample.depth,
         phase: sample.phase,
-        ..Row::default()
+        ..SampleRow::default()
     }
 }
 
 /// Times since the first sample, in ticks.
-fn ticks(samples: &[ForeignSample]) -> Result<Vec<u64>, KeepError> {
+fn ticks(samples: &[ForeignSample]) -> Result<Vec<u64>, StoreImportError> {
     let first = samples.first().map_or(0.0, |first| first.t);
-    let refused = |reason: String| KeepError::Times { reason };
+    let refused = |reason: String| StoreImportError::Times { reason };
     let mut ticks: Vec<u64> = Vec::with_capacity(samples.len());
     for sample in samples {
         let tick = ((sample.t - first) * IMPORTED_TICKS_PER_S).round();
@@ -116,16 +116,16 @@ fn ticks(samples: &[ForeignSample]) -> Result<Vec<u64>, KeepError> {
     Ok(ticks)
 }
 
-fn store_original(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), KeepError> {
+fn store_original(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), StoreImportError> {
     let below = folder.join(ORIGINAL_FOLDER);
     let path = below.join(name);
     let written = fs::create_dir(&below).and_then(|()| atomic::create(&path, bytes));
-    written.map_err(|source| KeepError::Original { path, source })
+    written.map_err(|source| StoreImportError::Original { path, source })
 }
 
 /// A folder's name from the names of file and part, without characters that are special in paths.
 #[must_use]
-pub fn folder_name(imported: &Imported) -> String {
+pub fn folder_name(imported: &ImportOrigin) -> String {
     let stem = Path::new(&imported.file).file_stem().unwrap_or_default();
     let part = match imported.part.as_str() {
         "" => String::new(),

@@ -1,9 +1,9 @@
 //! Detection of header, units, first row of numbers, and decimal sign.
 
 use super::columns::{is_known_unit_cell, is_quantity_name, is_unit_cell};
-use super::decimal::{Decimal, Evidence, evidence};
+use super::decimal::{DecimalSign, Evidence, evidence};
 use super::formats::Head;
-use super::options::Told;
+use super::options::ImportOptions;
 use super::readings::ReadingList;
 use super::rows::{Cell, Rows};
 
@@ -72,7 +72,7 @@ fn is_names(cells: &[Cell]) -> bool {
 /// Finds header, units and the first row of numbers; `None` without numbers.
 pub(super) fn find(
     rows: &Rows<'_>,
-    options: &Told,
+    options: &ImportOptions,
     known: Option<Head>,
     readings: &mut ReadingList,
 ) -> Result<Option<Header>, String> {
@@ -140,7 +140,7 @@ pub(super) fn find(
 /// Detects the rows of names and units above the first row of numbers, unless the options give them.
 fn header_and_units(
     rows: &Rows<'_>,
-    options: &Told,
+    options: &ImportOptions,
     first: usize,
     header: Option<usize>,
     units: Option<usize>,
@@ -174,16 +174,16 @@ pub(super) fn decimal(
     rows: &Rows<'_>,
     header: &Header,
     columns: &[usize],
-    chosen: Option<Decimal>,
+    chosen: Option<DecimalSign>,
     readings: &mut ReadingList,
-) -> Result<Decimal, String> {
+) -> Result<DecimalSign, String> {
     let option = "--decimal point or comma";
     if let Some(decimal) = chosen {
         readings.add("decimal sign", decimal.name(), true, option);
         return Ok(decimal);
     }
     let word = rows.word();
-    let mut found: Option<(Decimal, String)> = None;
+    let mut found: Option<(DecimalSign, String)> = None;
     let mut either: Option<String> = None;
     for index in header.first..rows.len() {
         if found.is_some() && index > header.first + ROWS_FOR_DECIMAL {
@@ -225,7 +225,7 @@ pub(super) fn decimal(
         )),
         (None, None) => {
             readings.add("decimal sign", "none needed", false, option);
-            Ok(Decimal::Point)
+            Ok(DecimalSign::Point)
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Files of other programs. Layout, encoding, delimiter, decimal sign, header and units are detected and reported, and options
 //! override them. An ambiguous file is refused with a question.
 //!
-//! Start at [`open_foreign`]; [`keep`] makes a session of a part.
+//! Start at [`open_foreign`]; [`store_import`] makes a session of a part.
 
 mod columns;
 pub(super) mod decimal;
@@ -14,18 +14,18 @@ mod readings;
 mod rows;
 mod samples;
 
-pub use decimal::Decimal;
+pub use decimal::DecimalSign;
 pub use encoding::TextEncoding;
-pub use formats::Format;
-pub use keep::{KeepError, Kept, folder_name, keep};
-pub use options::{ColumnChoice, Fault, Told, UnitChoice, ZeroChoice};
+pub use formats::ForeignFormat;
+pub use keep::{ImportTarget, StoreImportError, folder_name, store_import};
+pub use options::{ColumnChoice, ImportOptions, RowFault, UnitChoice, ZeroChoice};
 pub use rows::Delimiter;
 pub use samples::ForeignSample;
 
 use super::truncated;
 use columns::ColumnError;
 use formats::{Content, Head, Layout};
-use palpate_sessions::import_origin::Imported;
+use palpate_sessions::import_origin::ImportOrigin;
 use readings::ReadingList;
 use rows::Rows;
 use std::io;
@@ -45,7 +45,7 @@ pub enum ForeignError {
 }
 
 #[derive(Clone, Debug)]
-pub struct Foreign {
+pub struct ForeignFile {
     pub bytes: Vec<u8>,
     pub parts: Vec<ForeignPart>,
     /// Parts that are not measurements, one sentence each.
@@ -55,12 +55,12 @@ pub struct Foreign {
 /// One measurement of a foreign file.
 #[derive(Clone, Debug)]
 pub struct ForeignPart {
-    pub imported: Imported,
+    pub imported: ImportOrigin,
     /// At least two, in order of time.
     pub samples: Vec<ForeignSample>,
 }
 
-pub fn open_foreign(path: &Path, options: &Told) -> Result<Foreign, ForeignError> {
+pub fn open_foreign(path: &Path, options: &ImportOptions) -> Result<ForeignFile, ForeignError> {
     let failed = |source| ForeignError::Io { path: path.into(), source };
     let refused = |reason| ForeignError::Content { path: path.into(), reason };
     let size = std::fs::metadata(path).map_err(failed)?;
@@ -79,11 +79,15 @@ pub fn open_foreign(path: &Path, options: &Told) -> Result<Foreign, ForeignError
 }
 
 /// Like [`open_foreign`], from bytes; the error is one sentence.
-pub fn parse_foreign(file: &str, bytes: Vec<u8>, options: &Told) -> Result<Foreign, String> {
+pub fn parse_foreign(
+    file: &str,
+    bytes: Vec<u8>,
+    options: &ImportOptions,
+) -> Result<ForeignFile, String> {
     if bytes.is_empty() {
         return Err("it is empty".into());
     }
-    let format = options.format.or_else(|| Format::of_bytes(&bytes));
+    let format = options.format.or_else(|| ForeignFormat::of_bytes(&bytes));
     let (parts, left_out) = match format.map(|format| (format, &format.0.content)) {
         Some((format, Content::Sheets { read, .. })) => {
             let sheets = read(&bytes)?.into_iter().map(|(name, rows)| RawPart {
@@ -99,32 +103,32 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, options: &Told) -> Result<Forei
         }
         _ => parse_text(file, &bytes, options)?,
     };
-    Ok(Foreign { bytes, parts, left_out })
+    Ok(ForeignFile { bytes, parts, left_out })
 }
 
 /// The origin that all parts of a file share.
-fn origin(file: &str, bytes: &[u8], format: Format, readings: ReadingList) -> Imported {
-    Imported {
+fn origin(file: &str, bytes: &[u8], format: ForeignFormat, readings: ReadingList) -> ImportOrigin {
+    ImportOrigin {
         file: file.into(),
         bytes: bytes.len() as u64,
         checksum: format!("{:08x}", crc32fast::hash(bytes)),
         format: format.name().into(),
         readings: readings.0,
-        ..Imported::default()
+        ..ImportOrigin::default()
     }
 }
 
 /// The measurements of a file, and remarks about other parts.
 type ParsedParts = (Vec<ForeignPart>, Vec<String>);
 
-fn parse_text(file: &str, bytes: &[u8], options: &Told) -> Result<ParsedParts, String> {
+fn parse_text(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<ParsedParts, String> {
     let (text, how) = encoding::decode(bytes, options.encoding)?;
     let lines = formats::lines_of(&text);
     let delimiter = options.delimiter.or_else(|| Delimiter::detect(&lines));
     let delimiter = delimiter.ok_or(
         "no line has two numbers, so it is not a table; if the delimiter is unusual, give it",
     )?;
-    let detect = || Format::of_text(&lines, delimiter);
+    let detect = || ForeignFormat::of_text(&lines, delimiter);
     let format = options.format.unwrap_or_else(detect);
     let Content::Text { cut, .. } = format.0.content else {
         return Err(format!("it is text, not a {}", format.name()));
@@ -163,8 +167,8 @@ struct RawPart<'a> {
 /// Reads the selected parts; one without a time is left out.
 fn parse_parts(
     cut: Vec<RawPart<'_>>,
-    origin: &Imported,
-    options: &Told,
+    origin: &ImportOrigin,
+    options: &ImportOptions,
 ) -> Result<ParsedParts, String> {
     let is_whole = cut.len() == 1 && cut[0].name.is_empty();
     let is_it = |selector: &String, index: usize, part: &RawPart<'_>| {
@@ -207,8 +211,8 @@ fn parse_parts(
 
 fn parse_part(
     part: &RawPart<'_>,
-    origin: &Imported,
-    options: &Told,
+    origin: &ImportOrigin,
+    options: &ImportOptions,
 ) -> Result<ForeignPart, ColumnError> {
     let mut readings = ReadingList(origin.readings.clone());
     let header = layout::find(&part.rows, options, part.head, &mut readings)
@@ -226,7 +230,7 @@ fn parse_part(
     let (samples, remarks) = samples::read(&part.rows, &header, &columns, decimal, &options.skip)
         .map_err(ColumnError::Other)?;
     Ok(ForeignPart {
-        imported: Imported {
+        imported: ImportOrigin {
             part: part.name.clone(),
             first_time_s: samples.first().map_or(0.0, |first| first.t),
             readings: readings.0,

@@ -1,18 +1,18 @@
 //! Options for reading a foreign file; everything else is detected.
 
 use super::super::header::Quantity;
-use super::decimal::Decimal;
+use super::decimal::DecimalSign;
 use super::encoding::TextEncoding;
-use super::formats::Format;
+use super::formats::ForeignFormat;
 use super::rows::Delimiter;
 
 /// An option that is not set is detected.
 #[derive(Clone, Debug, Default)]
-pub struct Told {
-    pub format: Option<Format>,
+pub struct ImportOptions {
+    pub format: Option<ForeignFormat>,
     pub delimiter: Option<Delimiter>,
     pub encoding: Option<TextEncoding>,
-    pub decimal: Option<Decimal>,
+    pub decimal: Option<DecimalSign>,
     /// Names of all columns, in order, for a file without names.
     pub names: Vec<String>,
     pub columns: Vec<ColumnChoice>,
@@ -25,13 +25,13 @@ pub struct Told {
     /// Sheets, blocks or intervals by name or number from 1; empty for all.
     pub parts: Vec<String>,
     /// Rows to leave out instead of refusing them.
-    pub skip: Vec<Fault>,
+    pub skip: Vec<RowFault>,
 }
 
 palpate_model::named! {
     /// A fault of a row.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-    pub enum Fault {
+    pub enum RowFault {
         /// A value is empty or NaN.
         Missing = "missing",
         /// The time equals that of the row before.
@@ -41,7 +41,7 @@ palpate_model::named! {
     }
 }
 
-impl std::str::FromStr for Fault {
+impl std::str::FromStr for RowFault {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

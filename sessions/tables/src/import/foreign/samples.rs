@@ -3,9 +3,9 @@
 
 use super::super::header::Quantity;
 use super::columns::{Column, Columns, Zero};
-use super::decimal::{Decimal, parse};
+use super::decimal::{DecimalSign, parse};
 use super::layout::Header;
-use super::options::Fault;
+use super::options::RowFault;
 use super::rows::{Cell, Rows};
 use palpate_model::rig::Phase;
 
@@ -26,10 +26,10 @@ pub struct ForeignSample {
 
 struct Reader<'a> {
     rows: &'a Rows<'a>,
-    decimal: Decimal,
-    skip: &'a [Fault],
+    decimal: DecimalSign,
+    skip: &'a [RowFault],
     /// Rows left out by fault: how many, and the number of the first.
-    skipped: [(usize, usize); Fault::ALL.len()],
+    skipped: [(usize, usize); RowFault::ALL.len()],
 }
 
 impl Reader<'_> {
@@ -90,16 +90,16 @@ impl Reader<'_> {
         let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
         let is_needed =
             matches!(phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
-        let missing = |what: &str| (Fault::Missing, format!("the {what} is missing"));
+        let missing = |what: &str| (RowFault::Missing, format!("the {what} is missing"));
         let (fault, what) = match (t, depth, force, last) {
             (None, ..) => missing("time"),
             (_, None, ..) if is_needed => missing("depth"),
             (_, _, None, _) if is_needed => missing("force"),
             (Some(t), .., Some(last)) if t == last => {
-                (Fault::Repeated, format!("the time {t} s equals that of the row before"))
+                (RowFault::Repeated, format!("the time {t} s equals that of the row before"))
             }
             (Some(t), .., Some(last)) if t < last => {
-                (Fault::Backward, format!("the time decreases from {last} to {t} s"))
+                (RowFault::Backward, format!("the time decreases from {last} to {t} s"))
             }
             (Some(t), ..) => {
                 return Ok(Some(ForeignSample { t, depth, force, signal, phase }));
@@ -109,7 +109,7 @@ impl Reader<'_> {
     }
 
     /// Refuses a row, or counts it as left out.
-    fn fault(&mut self, fault: Fault, number: usize, what: &str) -> Result<(), String> {
+    fn fault(&mut self, fault: RowFault, number: usize, what: &str) -> Result<(), String> {
         if !self.skip.contains(&fault) {
             return Err(format!(
                 "{} {number}: {what}; correct the file, or skip such rows: {}",
@@ -131,10 +131,10 @@ pub(super) fn read(
     rows: &Rows<'_>,
     header: &Header,
     columns: &Columns,
-    decimal: Decimal,
-    skip: &[Fault],
+    decimal: DecimalSign,
+    skip: &[RowFault],
 ) -> Result<(Vec<ForeignSample>, Vec<String>), String> {
-    let mut reader = Reader { rows, decimal, skip, skipped: [(0, 0); Fault::ALL.len()] };
+    let mut reader = Reader { rows, decimal, skip, skipped: [(0, 0); RowFault::ALL.len()] };
     let mut samples: Vec<ForeignSample> = Vec::new();
     let mut numbers: Vec<usize> = Vec::new();
     for index in header.first..rows.len() {
@@ -177,11 +177,11 @@ fn phase_of(name: &str) -> Phase {
 
 fn left_out(reader: &Reader<'_>) -> Vec<String> {
     let description = |fault| match fault {
-        Fault::Missing => "without a value",
-        Fault::Repeated => "with the time of the row before",
-        Fault::Backward => "with decreasing time",
+        RowFault::Missing => "without a value",
+        RowFault::Repeated => "with the time of the row before",
+        RowFault::Backward => "with decreasing time",
     };
-    Fault::ALL
+    RowFault::ALL
         .into_iter()
         .map(|fault| (fault, reader.skipped[fault as usize]))
         .filter(|(_, (count, _))| *count > 0)

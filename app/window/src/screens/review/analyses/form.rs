@@ -5,8 +5,8 @@ use crate::widgets::{
     text_row, tick_box,
 };
 use eframe::egui::{Ui, vec2};
-use palpate_analysis::analyses::{Deed, FitWanted, Known};
-use palpate_analysis::report::dossier::Wanted;
+use palpate_analysis::report::dossier::SessionReading;
+use palpate_analysis::session_actions::{SessionAction, SessionActionContext, SessionFitRequest};
 use std::path::PathBuf;
 
 /// The kind of analysis.
@@ -60,10 +60,10 @@ impl AnalysisForm {
     pub fn ui(
         &mut self,
         ui: &mut Ui,
-        known: &Known,
+        known: &SessionActionContext,
         read_by: Option<&str>,
-        others: &[Wanted],
-    ) -> Result<Deed, String> {
+        others: &[SessionReading],
+    ) -> Result<SessionAction, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
                 ui.selectable_value(&mut self.kind, kind, words).named(words);
@@ -106,7 +106,7 @@ impl AnalysisForm {
         }
     }
 
-    fn calibration_ui(&mut self, ui: &mut Ui, known: &Known) {
+    fn calibration_ui(&mut self, ui: &mut Ui, known: &SessionActionContext) {
         let none = if known.calibrations.is_empty() { "no calibration there" } else { "none" };
         let all = known.calibrations.iter().map(|(id, _)| (Some(id.clone()), id.as_str()));
         let all: Vec<_> = std::iter::once((None, none)).chain(all).collect();
@@ -116,10 +116,10 @@ impl AnalysisForm {
 
     fn action(
         &self,
-        known: &Known,
+        known: &SessionActionContext,
         read_by: Option<&str>,
-        others: &[Wanted],
-    ) -> Result<Deed, String> {
+        others: &[SessionReading],
+    ) -> Result<SessionAction, String> {
         let name = self.name.trim().to_owned();
         require(!name.is_empty(), "give the new analysis a name")?;
         let is_used = known.analyses.all.iter().any(|one| one.name == name);
@@ -128,9 +128,9 @@ impl AnalysisForm {
         );
         require(!is_used, taken)?;
         match self.kind {
-            Kind::Fit => Ok(Deed::Fit {
+            Kind::Fit => Ok(SessionAction::Fit {
                 name,
-                how: FitWanted {
+                how: SessionFitRequest {
                     family: self.model.family.clone(),
                     with_unload: self.with_unload && self.model.family.is_some(),
                     is_rejected_included: self.model.is_rejected_included,
@@ -144,12 +144,16 @@ impl AnalysisForm {
                 let [from, until] = self.span.each_ref().map(|field| field.value.clone());
                 let (from, until) = (from?, until?);
                 require(from < until, "type two times, the earlier first")?;
-                Ok(Deed::Mask { name, left_out_s: vec![[from, until]] })
+                Ok(SessionAction::Mask { name, left_out_s: vec![[from, until]] })
             }
         }
     }
 
-    fn recalibration(&self, known: &Known, name: String) -> Result<Deed, String> {
+    fn recalibration(
+        &self,
+        known: &SessionActionContext,
+        name: String,
+    ) -> Result<SessionAction, String> {
         let file = self.file.trim();
         let chosen = self.calibration.as_ref().and_then(|id| {
             let found = known.calibrations.iter().find(|(own, _)| own == id);
@@ -157,11 +161,11 @@ impl AnalysisForm {
         });
         match (chosen, file) {
             (Some(calibration), "") => {
-                Ok(Deed::Recalibrate { name, calibration: Box::new(calibration) })
+                Ok(SessionAction::Recalibrate { name, calibration: Box::new(calibration) })
             }
             (Some(_), _) => Err("choose a calibration or type a file, not both".to_owned()),
             (None, "") => Err("choose a calibration, or type its file".to_owned()),
-            (None, file) => Ok(Deed::RecalibrateFrom { name, file: PathBuf::from(file) }),
+            (None, file) => Ok(SessionAction::RecalibrateFrom { name, file: PathBuf::from(file) }),
         }
     }
 }

@@ -1,28 +1,28 @@
 //! The analyses there are, and what the one chosen found.
 
-use super::super::Looked;
+use super::super::ReviewSource;
 use super::OwnFit;
 use crate::widgets::{
     NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_analysis::analyses::{Deed, Known};
-use palpate_analysis::report::said;
-use palpate_analysis::report::{kept, text};
-use palpate_sessions::analyses::{Analysed, Analysis};
+use palpate_analysis::report::session_text;
+use palpate_analysis::report::{stored_analysis, text};
+use palpate_analysis::session_actions::{SessionAction, SessionActionContext};
+use palpate_sessions::analyses::{Analysis, AnalysisContent};
 
 const AS_MEASURED: &str = "as measured";
 
 /// Draws the list and the analysis chosen; true when "Compare" is pressed.
 pub(super) fn list_ui(
     ui: &mut Ui,
-    known: &Known,
-    source: &mut Looked,
+    known: &SessionActionContext,
+    source: &mut ReviewSource,
     own: Option<&OwnFit>,
 ) -> bool {
     ui.radio_value(&mut source.analysis, None, AS_MEASURED).named(AS_MEASURED);
     for one in &known.analyses.all {
-        if one.what != Analysed::Withdrawal {
+        if one.what != AnalysisContent::Withdrawal {
             line_ui(ui, known, one, source);
         }
     }
@@ -31,9 +31,9 @@ pub(super) fn list_ui(
     chosen.is_some_and(|one| found_ui(ui, one, own))
 }
 
-fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, source: &mut Looked) {
+fn line_ui(ui: &mut Ui, known: &SessionActionContext, one: &Analysis, source: &mut ReviewSource) {
     let tokens = tokens_of(ui);
-    match kept::withdrawn(&known.analyses, &one.name) {
+    match stored_analysis::describe_withdrawal(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());
             ui.radio_value(&mut source.analysis, choice, &one.name).named(&one.name);
@@ -45,7 +45,7 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, source: &mut Looked) {
         }
     }
     let colon = if one.reason.is_empty() { "" } else { ": " };
-    let (what, at) = (one.what.word(), said::at(&one.at));
+    let (what, at) = (one.what.word(), session_text::format_utc(&one.at));
     quiet_ui(ui, format!("{what}, {at} by {}{colon}{}", one.by, one.reason));
 }
 
@@ -53,9 +53,9 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, source: &mut Looked) {
 fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.add_space(4.0);
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
-    quiet_ui(ui, kept::deed(&one.what));
-    let Analysed::Fit { results, .. } = &one.what else { return false };
-    for parameter in kept::parameters(results) {
+    quiet_ui(ui, stored_analysis::describe_analysis(&one.what));
+    let AnalysisContent::Fit { results, .. } = &one.what else { return false };
+    for parameter in stored_analysis::parameters(results) {
         let unit = text::typeset(&parameter.unit);
         fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(&parameter)));
         let mut own = own.iter().flat_map(|own| &own.parameters);
@@ -75,7 +75,7 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
             fact_ui(ui, name, ends);
         }
     }
-    for sentence in kept::sentences(results) {
+    for sentence in stored_analysis::sentences(results) {
         small_ui(ui, sentence);
     }
     match own {
@@ -95,22 +95,22 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
 /// Draws the buttons that withdraw an analysis.
 pub(super) fn withdraw_ui(
     ui: &mut Ui,
-    known: &Known,
-    source: &Looked,
+    known: &SessionActionContext,
+    source: &ReviewSource,
     verdict: &Result<(), String>,
-) -> Option<Deed> {
+) -> Option<SessionAction> {
     ui.add_space(4.0);
     let chosen = source.analysis.clone();
     let own = require(chosen.is_some(), "choose the analysis to withdraw in the list");
     let own = own.and(verdict.clone());
     let size = vec2(170.0, 26.0);
     if reason_button(ui, "Withdraw analysis", size, &own) {
-        return chosen.map(|name| Deed::Withdraw { name });
+        return chosen.map(|name| SessionAction::Withdraw { name });
     }
-    let last = known.analyses.counting().last();
+    let last = known.analyses.active().last();
     let own = require(last.is_some(), "there is no analysis to withdraw").and(verdict.clone());
     let is_pressed = reason_button(ui, "Withdraw last analysis", size, &own);
     let last = last?;
     quiet_ui(ui, format!("the last is '{}', by {}", last.name, last.by));
-    is_pressed.then(|| Deed::Withdraw { name: last.name.clone() })
+    is_pressed.then(|| SessionAction::Withdraw { name: last.name.clone() })
 }

@@ -4,37 +4,42 @@ use crate::widgets::{
     QuantityField, choice_ui, quantity_ui, quiet_ui, reason_button, require, section_ui,
 };
 use eframe::egui::{Ui, vec2};
-use palpate_analysis::analyses::{Deed, Known};
+use palpate_analysis::session_actions::{SessionAction, SessionActionContext};
 use palpate_model::units::Position;
-use palpate_sessions::edits::Verdict;
+use palpate_sessions::edits::DataQuality;
 
 pub(super) struct QualityForm {
-    verdict: Verdict,
+    verdict: DataQuality,
     contact: usize,
     position: QuantityField,
 }
 
 impl Default for QualityForm {
     fn default() -> Self {
-        Self { verdict: Verdict::Valid, contact: 0, position: QuantityField::new(0.0) }
+        Self { verdict: DataQuality::Valid, contact: 0, position: QuantityField::new(0.0) }
     }
 }
 
 impl QualityForm {
     /// Draws the form; `verdict` says whether something can be done that needs a reason.
-    pub fn ui(&mut self, ui: &mut Ui, known: &Known, verdict: &Result<(), String>) -> Option<Deed> {
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        known: &SessionActionContext,
+        verdict: &Result<(), String>,
+    ) -> Option<SessionAction> {
         section_ui(ui, "Data quality");
         let words = match &known.verdict {
             Some((verdict, by, reason)) => format!("{verdict}, by {by}: {reason}"),
             None => "no verdict yet".to_owned(),
         };
         quiet_ui(ui, words);
-        let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+        let verdicts = [DataQuality::Valid, DataQuality::Suspect, DataQuality::Rejected];
         let verdicts = verdicts.map(|one| (one, one.name()));
         choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
         let size = vec2(170.0, 26.0);
         if reason_button(ui, "Set verdict", size, verdict) {
-            return Some(Deed::Judge(self.verdict));
+            return Some(SessionAction::SetDataQuality(self.verdict));
         }
         section_ui(ui, "Contact");
         self.contact_ui(ui, known);
@@ -44,10 +49,13 @@ impl QualityForm {
         let is_possible = position.clone().map(|_| ());
         let is_pressed = reason_button(ui, "Correct contact", size, &is_possible);
         let number = self.contact as u32 + 1;
-        position.ok().filter(|_| is_pressed).map(|position| Deed::Correct { number, position })
+        position
+            .ok()
+            .filter(|_| is_pressed)
+            .map(|position| SessionAction::CorrectContact { number, position })
     }
 
-    fn contact_ui(&mut self, ui: &mut Ui, known: &Known) {
+    fn contact_ui(&mut self, ui: &mut Ui, known: &SessionActionContext) {
         if known.contacts.is_empty() {
             return;
         }

@@ -1,14 +1,14 @@
 //! Report and figure of the session in front, as new files.
 
-use super::super::Looked;
+use super::super::ReviewSource;
 use crate::widgets::{
     alarm_ui, choice_ui, quiet_ui, require, section_ui, task_ui, text_row, tick_box,
 };
 use crate::workers::{BackgroundTask, Dialog};
 use eframe::egui::Ui;
-use palpate_analysis::analyses::{Done, Paper, paper};
-use palpate_analysis::report::dossier::{Figure, Wanted, name_of};
-use palpate_analysis::report::figures::Window;
+use palpate_analysis::report::dossier::{SessionFigure, SessionReading, folder_name};
+use palpate_analysis::report::figures::TimeWindow;
+use palpate_analysis::session_actions::{ActionReport, SessionDocument, write_document};
 use std::path::PathBuf;
 
 /// A file to be written: its path and the work.
@@ -16,7 +16,7 @@ use std::path::PathBuf;
 struct NewFile {
     path: String,
     dialog: Dialog<PathBuf>,
-    work: BackgroundTask<Done>,
+    work: BackgroundTask<ActionReport>,
 }
 
 impl NewFile {
@@ -34,11 +34,11 @@ impl NewFile {
         name: &'static str,
         ending: &'static str,
         hint: &str,
-        source: &Looked,
+        source: &ReviewSource,
     ) {
         text_row(ui, &format!("{} file", name.to_lowercase()), hint, &mut self.path);
         if ui.button(format!("{name}...")).clicked() {
-            let file = format!("{}.{ending}", name_of(&source.session));
+            let file = format!("{}.{ending}", folder_name(&source.session));
             // Without a dialog the path is typed.
             let _ = self.dialog.open(ui.ctx(), move |dialog| {
                 let dialog = dialog.set_title(name).set_file_name(file);
@@ -53,11 +53,13 @@ impl NewFile {
         ui: &mut Ui,
         text: &str,
         endings: &[&str],
-        make: impl FnOnce() -> Paper,
+        make: impl FnOnce() -> SessionDocument,
     ) {
         if task_ui(ui, text, &self.work, &path_verdict(&self.path, endings)) {
             let (document, to) = (make(), PathBuf::from(self.path.trim()));
-            self.work.start("report", ui.ctx(), move |progress| paper(&document, &to, progress));
+            self.work.start("report", ui.ctx(), move |progress| {
+                write_document(&document, &to, progress)
+            });
         }
         done_ui(ui, &self.work);
     }
@@ -68,7 +70,7 @@ pub(super) struct ReportPanel {
     report: NewFile,
     is_of_all: bool,
     figure: NewFile,
-    of: Figure,
+    of: SessionFigure,
     /// The stretch between the cursors in s, the earlier first.
     pub span: Option<[f64; 2]>,
     /// The figure shows that stretch alone.
@@ -82,29 +84,30 @@ impl ReportPanel {
         self.figure.poll();
     }
 
-    pub fn ui(&mut self, ui: &mut Ui, source: &Looked, shown: &[Looked]) {
+    pub fn ui(&mut self, ui: &mut Ui, source: &ReviewSource, shown: &[ReviewSource]) {
         section_ui(ui, "Report");
         self.report.path_ui(ui, "Report", "html", "a new .html file", source);
         if shown.len() > 1 {
             tick_box(ui, &mut self.is_of_all, &format!("of all {} shown", shown.len()));
         }
         let all = if self.is_of_all { shown } else { std::slice::from_ref(source) };
-        let page = || Paper::Page(all.iter().map(report_source).collect());
+        let page = || SessionDocument::Page(all.iter().map(report_source).collect());
         self.report.write_ui(ui, "Write report", &["html", "htm"], page);
 
         section_ui(ui, "Figure");
-        let figures = Figure::ALL.map(|one| (one, one.name()));
+        let figures = SessionFigure::ALL.map(|one| (one, one.name()));
         choice_ui(ui, "of", &mut self.of, &figures);
         self.figure.path_ui(ui, "Figure", "svg", "a new .svg or .png file", source);
-        let is_over_samples = matches!(self.of, Figure::ForceTime | Figure::ForceDepth);
+        let is_over_samples =
+            matches!(self.of, SessionFigure::ForceTime | SessionFigure::ForceDepth);
         let span = self.span.filter(|_| is_over_samples);
         if let Some([from, until]) = span {
             let words = format!("only {from:.3} to {until:.3} s");
             tick_box(ui, &mut self.is_of_span, &words);
         }
         let span = span.filter(|_| self.is_of_span);
-        let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
-        let figure = || Paper::Figure(report_source(source), self.of, window);
+        let window = span.map_or(TimeWindow::WHOLE, |[from, until]| TimeWindow { from, until });
+        let figure = || SessionDocument::Figure(report_source(source), self.of, window);
         self.figure.write_ui(ui, "Write figure", &["svg", "png"], figure);
     }
 }
@@ -122,12 +125,12 @@ fn path_verdict(path: &str, endings: &[&str]) -> Result<(), String> {
 }
 
 /// A session as reports and fits take it.
-pub(super) fn report_source(one: &Looked) -> Wanted {
-    Wanted { session: one.session.clone(), analysis: one.analysis.clone() }
+pub(super) fn report_source(one: &ReviewSource) -> SessionReading {
+    SessionReading { session: one.session.clone(), analysis: one.analysis.clone() }
 }
 
 /// The last answer of work that has ended.
-pub(super) fn done_ui(ui: &mut Ui, task: &BackgroundTask<Done>) {
+pub(super) fn done_ui(ui: &mut Ui, task: &BackgroundTask<ActionReport>) {
     match task.answer().filter(|_| !task.is_busy()) {
         None => {}
         Some(Ok(done)) => quiet_ui(ui, &done.sentence),

@@ -56,9 +56,9 @@ const TABLE: Layout = Layout {
 };
 
 #[derive(Clone, Copy, Debug)]
-pub struct Format(pub(super) &'static Layout);
+pub struct ForeignFormat(pub(super) &'static Layout);
 
-impl Format {
+impl ForeignFormat {
     /// The layout of a file that is not text.
     pub(super) fn of_bytes(bytes: &[u8]) -> Option<Self> {
         let claims =
@@ -95,7 +95,7 @@ fn in_words(all: impl Iterator<Item = &'static str>) -> String {
     format!("{} or {last}", words.join(", "))
 }
 
-impl std::str::FromStr for Format {
+impl std::str::FromStr for ForeignFormat {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

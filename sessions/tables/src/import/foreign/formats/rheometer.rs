@@ -65,7 +65,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
     Ok(parts)
 }
 
-/// The value of a heading such as `Result:<tab>Relaxation 1`.
+/// The value of a heading such as `Result:<tab>StressRelaxation 1`.
 fn heading(line: &str) -> Option<String> {
     let after =
         ["Project:", "Test:", "Result:"].into_iter().find_map(|word| line.strip_prefix(word))?;

@@ -43,7 +43,7 @@ fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     } else if bytes.starts_with(COMPOUND) {
         legacy::check(bytes)?;
         // `calamine` trusts lengths in an .xls, and panics if damage has changed them.
-        palpate_model::contained::contained(|| read_xls(bytes))
+        palpate_model::panics::catch_panic(|| read_xls(bytes))
             .unwrap_or_else(|_| Err(damaged("its records contradict each other")))
     } else {
         Err("it is not a workbook: it begins neither like an .xlsx nor like an .xls".into())

@@ -1,22 +1,22 @@
 //! Edits, reviews and facts of a session in the words that command line, window and page share.
 
 use palpate_model::rig::SignalFacts;
-use palpate_sessions::{Change, HealthSummary, Review};
+use palpate_sessions::{EditChange, HealthSummary, Review};
 
 /// A time to the second, UTC.
 #[must_use]
-pub fn at(time: &chrono::DateTime<chrono::Utc>) -> String {
+pub fn format_utc(time: &chrono::DateTime<chrono::Utc>) -> String {
     time.format("%Y-%m-%d %H:%M:%SZ").to_string()
 }
 
 #[must_use]
-pub fn change(change: &Change) -> String {
+pub fn describe_edit(change: &EditChange) -> String {
     match change {
-        Change::Verdict { verdict } => verdict.to_string(),
-        Change::Note => "note".to_owned(),
-        Change::Tags { add, remove } => tags(add, remove),
-        Change::Review { decision, .. } => format!("review, {}", decision.name()),
-        Change::Contact { number, position_mm, was_mm } => {
+        EditChange::Verdict { verdict } => verdict.to_string(),
+        EditChange::Note => "note".to_owned(),
+        EditChange::Tags { add, remove } => tags(add, remove),
+        EditChange::Review { decision, .. } => format!("review, {}", decision.name()),
+        EditChange::Contact { number, position_mm, was_mm } => {
             format!("contact {number} at {:.3} mm instead of {:.3} mm", position_mm.0, was_mm.0)
         }
     }
@@ -30,7 +30,7 @@ pub(crate) fn tags(add: &[String], remove: &[String]) -> String {
 }
 
 #[must_use]
-pub fn review(review: &Review) -> String {
+pub fn describe_review(review: &Review) -> String {
     let stands = match review.changed.as_slice() {
         [] => "everything is as it was seen".to_owned(),
         changed => format!("but {} changed since; it is to be reviewed again", changed.join(", ")),
@@ -41,7 +41,7 @@ pub fn review(review: &Review) -> String {
 
 /// The worst readings of the computer, each with its name.
 #[must_use]
-pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
+pub fn describe_health(health: &HealthSummary) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
     if let Some(worst) = &health.worst {
         let mut parts = vec![
@@ -70,7 +70,7 @@ pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
 }
 
 #[must_use]
-pub fn signal(signal: &SignalFacts) -> [String; 3] {
+pub fn describe_signal(signal: &SignalFacts) -> [String; 3] {
     let range = signal
         .range_v
         .map_or(String::new(), |[low, high]| format!(", range {low:.3} to {high:.3} V"));

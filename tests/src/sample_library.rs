@@ -1,9 +1,9 @@
 //! A library of many small sessions, each the beginning of a recorded one under another manifest.
 
 use crate::workspace;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_sessions::{
-    Change, Edit, EndRecord, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
+    DataQuality, Edit, EditChange, EndRecord, LogWriter, Manifest, Session, Sink, add_edit,
 };
 use std::fs;
 use std::io;
@@ -38,7 +38,7 @@ impl Sink for Memory {
 /// # Panics
 /// If it cannot be read.
 #[must_use]
-pub fn original() -> Session {
+pub fn read_original() -> Session {
     let recorded = workspace().join("tests/sessions/ramp-hold-lab");
     Session::open(&recorded).expect("the recorded session")
 }
@@ -49,14 +49,14 @@ pub fn original() -> Session {
 /// # Panics
 /// If it cannot be written.
 pub fn write(library: &Path, original: &Session, number: usize) -> PathBuf {
-    let mut labels = Labels::default();
+    let mut labels = SessionLabels::default();
     let thickness = 5.0 + (number % 100) as f64 / 10.0;
     let metadata = [
         ("specimen.thickness_mm", thickness.to_string()),
         ("specimen.source", "pig stomach, fundus".into()),
     ];
     for (key, value) in metadata {
-        labels.tell(key, &value).expect("a key that is known");
+        labels.set(key, &value).expect("a key that is known");
     }
     let mut plan = original.manifest.plan.clone();
     plan["source"]["values"]["depth"] = format!("{} mm", number % 30).into();
@@ -88,12 +88,12 @@ pub fn write(library: &Path, original: &Session, number: usize) -> PathBuf {
     fs::create_dir_all(&folder).expect("a folder");
     let bytes = memory.0.lock().expect("no other writer");
     fs::write(folder.join("000.mcap"), bytes.as_slice()).expect("room on the disk");
-    let verdict = [Verdict::Valid, Verdict::Suspect][usize::from(number % 9 == 8)];
+    let verdict = [DataQuality::Valid, DataQuality::Suspect][usize::from(number % 9 == 8)];
     let edit = Edit {
         at: manifest.started_at,
         by: "palpate".into(),
         reason: "finished, no sample missing".into(),
-        change: Change::Verdict { verdict },
+        change: EditChange::Verdict { verdict },
     };
     add_edit(&folder, &manifest.session_id, &edit).expect("a verdict");
     folder

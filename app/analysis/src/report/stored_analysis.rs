@@ -1,20 +1,20 @@
 //! The content of a stored analysis in words.
 
 use super::text::parameter_lines;
-use crate::analysed::ForceChange;
-use palpate_rheology::fit::Parameter;
-use palpate_sessions::analyses::{Analysed, Analyses, Analysis};
+use crate::analysed_session::ForceChange;
+use palpate_rheology::fit::FittedParameter;
+use palpate_sessions::analyses::{Analyses, Analysis, AnalysisContent};
 use serde::Deserialize;
 use serde_json::Value;
 
 /// The parameters that a kept fit found; those that cannot be understood are left out.
 #[must_use]
-pub fn parameters(results: &Value) -> Vec<Parameter> {
+pub fn parameters(results: &Value) -> Vec<FittedParameter> {
     let parameter = |one: &Value| {
         let mut one = one.clone();
         // Fits of other families were once stored without it.
         one.as_object_mut()?.entry("is_fixed").or_insert(false.into());
-        Parameter::deserialize(one).ok()
+        FittedParameter::deserialize(one).ok()
     };
     results["parameters"].as_array().into_iter().flatten().filter_map(parameter).collect()
 }
@@ -27,7 +27,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
 }
 
 #[must_use]
-pub fn change(change: &ForceChange) -> String {
+pub fn describe_force_change(change: &ForceChange) -> String {
     let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
     format!(
         "{} forces, changed by {:.4} N rms and at most {:.4} N; peak {} instead of {}",
@@ -40,9 +40,9 @@ pub fn change(change: &ForceChange) -> String {
 }
 
 #[must_use]
-pub fn deed(what: &Analysed) -> String {
+pub fn describe_analysis(what: &AnalysisContent) -> String {
     match what {
-        Analysed::Fit { based_on, results, .. } => {
+        AnalysisContent::Fit { based_on, results, .. } => {
             let family = results["name"].as_str().or(results["model"].as_str());
             let family = family.unwrap_or("a model").to_owned();
             match based_on {
@@ -50,26 +50,26 @@ pub fn deed(what: &Analysed) -> String {
                 None => family,
             }
         }
-        Analysed::Recalibration { calibration, results } => {
+        AnalysisContent::Recalibration { calibration, results } => {
             let name = calibration["name"].as_str().unwrap_or("another");
             match ForceChange::deserialize(results) {
-                Ok(found) => format!("calibration {name}: {}", change(&found)),
+                Ok(found) => format!("calibration {name}: {}", describe_force_change(&found)),
                 Err(_) => format!("calibration {name}"),
             }
         }
-        Analysed::Mask { left_out_s } => {
+        AnalysisContent::Mask { left_out_s } => {
             let spans = left_out_s.iter();
             let spans: Vec<String> = spans.map(|[a, b]| format!("{a} to {b} s")).collect();
             format!("left out: {}", spans.join(", "))
         }
-        Analysed::Withdrawal => "withdrawn".to_owned(),
+        AnalysisContent::Withdrawal => "withdrawn".to_owned(),
     }
 }
 
 /// The lines of a kept fit: parameters, then sentences; empty for what is no fit.
 #[must_use]
 pub fn fit_lines(one: &Analysis) -> Vec<String> {
-    let Analysed::Fit { results, .. } = &one.what else { return Vec::new() };
+    let AnalysisContent::Fit { results, .. } = &one.what else { return Vec::new() };
     let mut lines = parameter_lines(&parameters(results));
     lines.extend(sentences(results).iter().map(|one| format!("- {one}")));
     lines
@@ -77,9 +77,14 @@ pub fn fit_lines(one: &Analysis) -> Vec<String> {
 
 /// Author and reason of a withdrawal; `None` while the analysis counts.
 #[must_use]
-pub fn withdrawn(analyses: &Analyses, name: &str) -> Option<String> {
+pub fn describe_withdrawal(analyses: &Analyses, name: &str) -> Option<String> {
     let by = analyses.withdrawal(name)?;
-    Some(format!("withdrawn by {} at {}: {}", by.by, super::said::at(&by.at), by.reason))
+    Some(format!(
+        "withdrawn by {} at {}: {}",
+        by.by,
+        super::session_text::format_utc(&by.at),
+        by.reason
+    ))
 }
 
 #[cfg(test)]
@@ -107,14 +112,14 @@ mod tests {
 
     #[test]
     fn an_analysis_is_described_by_its_content() {
-        let mask = Analysed::Mask { left_out_s: vec![[1.0, 2.5], [3.0, 4.0]] };
-        assert_eq!(deed(&mask), "left out: 1 to 2.5 s, 3 to 4 s");
+        let mask = AnalysisContent::Mask { left_out_s: vec![[1.0, 2.5], [3.0, 4.0]] };
+        assert_eq!(describe_analysis(&mask), "left out: 1 to 2.5 s, 3 to 4 s");
         let change = ForceChange { samples: 7, peak_after_n: Some(2.0), ..ForceChange::default() };
-        let other = Analysed::Recalibration {
+        let other = AnalysisContent::Recalibration {
             calibration: json!({"name": "June"}),
             results: serde_json::to_value(change).unwrap(),
         };
-        let words = deed(&other);
+        let words = describe_analysis(&other);
         assert!(words.starts_with("calibration June: 7 forces"), "{words}");
         assert!(words.ends_with("peak 2.000 N instead of -"), "{words}");
     }

@@ -32,7 +32,7 @@ pub struct PlaybackRequest {
 }
 
 /// What opens windows. Each call returns when its window has closed.
-pub trait Windows {
+pub trait WindowOpener {
     fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
 
     fn playback(&self, request: PlaybackRequest) -> Result<(), String>;

@@ -2,14 +2,14 @@
 
 use crate::cycles;
 use crate::progress::Progress;
-use crate::report::cycles::{CycleReport, Question};
+use crate::report::cycles::{CycleReport, CycleSettings};
 use crate::source::SourceError;
 use palpate_tables::import::ColumnNames;
 use std::path::PathBuf;
 use thiserror::Error;
 
 #[derive(Debug, Error)]
-pub enum AnalyseFailure {
+pub enum CycleAnalysisError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
@@ -23,18 +23,18 @@ pub enum AnalyseFailure {
 pub fn analyse(
     paths: &[PathBuf],
     columns: Option<&ColumnNames>,
-    question: &Question,
+    question: &CycleSettings,
     progress: &dyn Progress,
-) -> Result<Vec<CycleReport>, AnalyseFailure> {
+) -> Result<Vec<CycleReport>, CycleAnalysisError> {
     let mut reports = Vec::with_capacity(paths.len());
     for path in paths {
         let name = path.display().to_string();
-        if progress.tell(reports.len(), paths.len(), &name).is_break() {
-            return Err(AnalyseFailure::Cancelled);
+        if progress.report(reports.len(), paths.len(), &name).is_break() {
+            return Err(CycleAnalysisError::Cancelled);
         }
         let report = CycleReport::of(name, cycles::read(path, columns)?, question);
         if report.cycles.is_empty() && report.sines.is_empty() {
-            return Err(AnalyseFailure::NoCycles(path.clone()));
+            return Err(CycleAnalysisError::NoCycles(path.clone()));
         }
         reports.push(report);
     }

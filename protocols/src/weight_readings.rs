@@ -6,7 +6,7 @@ use palpate_model::rig::Phase;
 use palpate_model::units::Volts;
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Weighed {
+pub struct WeightReading {
     pub step_index: usize,
     pub direction: Direction,
     /// Which pass through the masses, from 1.
@@ -14,7 +14,7 @@ pub struct Weighed {
     pub step: SeriesStep,
 }
 
-impl Weighed {
+impl WeightReading {
     /// The mass in g, platform included.
     pub fn mass_g(&self) -> f64 {
         self.step.mass_g
@@ -27,12 +27,12 @@ impl Weighed {
 }
 
 #[derive(Clone, Debug, Default)]
-pub struct Readings {
-    all: Vec<Weighed>,
+pub struct WeightReadings {
+    all: Vec<WeightReading>,
     step_index: usize,
 }
 
-impl Readings {
+impl WeightReadings {
     pub fn of<'a>(records: impl IntoIterator<Item = &'a Record>) -> Self {
         let mut readings = Self::default();
         records.into_iter().for_each(|one| readings.record(one));
@@ -55,7 +55,7 @@ impl Readings {
                 slope_v_per_s,
                 samples,
                 waited,
-            } => self.all.push(Weighed {
+            } => self.all.push(WeightReading {
                 step_index: self.step_index,
                 direction: match is_loading {
                     true => Direction::Loading,
@@ -76,7 +76,7 @@ impl Readings {
         }
     }
 
-    pub fn all(&self) -> &[Weighed] {
+    pub fn all(&self) -> &[WeightReading] {
         &self.all
     }
 }
@@ -110,16 +110,16 @@ mod tests {
         }
         // Back to the second weight; the third has to be laid on again too.
         records.extend(reading(3, 140.0, 1.5));
-        let so_far = Readings::of(&records);
+        let so_far = WeightReadings::of(&records);
         let found: Vec<f64> = so_far.all().iter().map(|one| one.volts().0).collect();
         assert_eq!(found, [1.28, 1.5]);
         records.extend(reading(5, 240.0, 1.6));
-        let all = Readings::of(&records);
+        let all = WeightReadings::of(&records);
         let found: Vec<(f64, f64)> =
             all.all().iter().map(|one| (one.mass_g(), one.volts().0)).collect();
         assert_eq!(found, [(0.0, 1.28), (140.0, 1.5), (240.0, 1.6)]);
         // The end of the run is none of its steps.
         records.push(Record::PhaseStarted { phase: Phase::Stopped, step_index: 5 });
-        assert_eq!(Readings::of(&records).all().len(), 3);
+        assert_eq!(WeightReadings::of(&records).all().len(), 3);
     }
 }

@@ -1,20 +1,20 @@
 //! A further fit of a session, and its stored form.
 
 use super::step;
-use crate::fit::{Fitted, IntervalsWanted, TogetherRequest, fit_together};
+use crate::fit::{IntervalRequest, JointFitRequest, SourceFit, fit_together};
 use crate::progress::Progress;
-use crate::report::dossier::{Wanted, name_of};
-use crate::report::fit_json::{Beside, FitObject, Overlay};
-use crate::report::kept;
-use crate::source::{self, FitSource, Stretch};
-use crate::sources::{Recording, Recordings, check_once};
-use palpate_rheology::fit::{FitOptions, Parameter};
+use crate::recordings::{Recording, Recordings, check_once};
+use crate::report::dossier::{SessionReading, folder_name};
+use crate::report::fit_json::{FitDetails, FitObject, FitOverlay};
+use crate::report::stored_analysis;
+use crate::source::{self, FitSource, RecordStretch};
+use palpate_rheology::fit::{FitOptions, FittedParameter};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct FitWanted {
+pub struct SessionFitRequest {
     /// Key of a model family; `None` is the modified Kelvin model.
     pub family: Option<String>,
     /// Fit the unloading too, where the family describes it.
@@ -24,7 +24,7 @@ pub struct FitWanted {
     /// Analysis through which the session is read.
     pub based_on: Option<String>,
     /// Sessions fitted together with it, with one body for all.
-    pub together_with: Vec<Wanted>,
+    pub together_with: Vec<SessionReading>,
 }
 
 /// What is kept of how a fit was asked for, so that it can be asked for again.
@@ -49,7 +49,7 @@ pub struct FitSettings {
     pub include_rejected: bool,
 }
 
-impl FitWanted {
+impl SessionFitRequest {
     fn options(&self) -> Result<FitOptions, String> {
         match &self.family {
             Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
@@ -71,7 +71,9 @@ impl FitWanted {
         if let (false, Ok(options)) = (self.together_with.is_empty(), self.options()) {
             let others = self.together_with.iter();
             let others: Vec<Value> = others
-                .map(|one| json!({ "session": name_of(&one.session), "analysis": one.analysis }))
+                .map(
+                    |one| json!({ "session": folder_name(&one.session), "analysis": one.analysis }),
+                )
                 .collect();
             settings["share"] = json!(options.body_names());
             settings["together_with"] = json!(others);
@@ -80,12 +82,12 @@ impl FitWanted {
     }
 
     fn read(&self, session: &Path, based_on: Option<&str>) -> Result<FitSource, String> {
-        let wanted = source::Wanted {
-            stretch: Stretch::with_unload(self.with_unload),
+        let wanted = source::SourceSelection {
+            stretch: RecordStretch::with_unload(self.with_unload),
             is_rejected_included: self.is_rejected_included,
         };
         let source = source::read_analysed(session, None, wanted, based_on);
-        source.map_err(|err| format!("{}: {err}", name_of(session)))
+        source.map_err(|err| format!("{}: {err}", folder_name(session)))
     }
 
     /// Fits a session; what `palpate fit --json` prints.
@@ -100,9 +102,9 @@ impl FitWanted {
         if self.together_with.is_empty() {
             return self.exact(source, &options, progress);
         }
-        let mut all = vec![Recording::of(name_of(&session), source, None)];
+        let mut all = vec![Recording::of(folder_name(&session), source, None)];
         for one in &self.together_with {
-            let name = name_of(&one.session);
+            let name = folder_name(&one.session);
             step(progress, 1, 4, &format!("reading {name}"))?;
             let source = self.read(&one.session, one.analysis.as_deref())?;
             all.push(Recording::of(name, source, None));
@@ -111,8 +113,8 @@ impl FitWanted {
         self.joint(&records, &options, progress)
     }
 
-    fn intervals(&self) -> IntervalsWanted {
-        IntervalsWanted { with_profile: self.with_profile, bootstrap: None }
+    fn intervals(&self) -> IntervalRequest {
+        IntervalRequest { with_profile: self.with_profile, bootstrap: None }
     }
 
     fn exact(
@@ -121,7 +123,7 @@ impl FitWanted {
         options: &FitOptions,
         progress: &dyn Progress,
     ) -> Result<Value, String> {
-        let fitted = Fitted::of(source, options);
+        let fitted = SourceFit::of(source, options);
         step(progress, 2, 4, "estimating the systematic uncertainty")?;
         let fitted = fitted.with_systematic(options);
         let report = fitted.result.as_ref().map_err(ToString::to_string)?;
@@ -131,8 +133,8 @@ impl FitWanted {
         let intervals = fitted.intervals(options, self.intervals(), |_| ());
         let intervals = intervals.map_err(|err| err.to_string())?;
         step(progress, 4, 4, "storing the analysis")?;
-        let overlay = Overlay::of(report, &fitted.samples);
-        let details = fitted.beside(&overlay, &intervals);
+        let overlay = FitOverlay::of(report, &fitted.samples);
+        let details = fitted.details(&overlay, &intervals);
         let object = FitObject::of(options.family(), report, details, fitted.seconds);
         serde_json::to_value(&object).map_err(|err| err.to_string())
     }
@@ -145,7 +147,7 @@ impl FitWanted {
         progress: &dyn Progress,
     ) -> Result<Value, String> {
         step(progress, 2, 4, "fitting all together")?;
-        let request = TogetherRequest {
+        let request = JointFitRequest {
             options,
             shared: options.body_names(),
             is_systematic: true,
@@ -157,9 +159,9 @@ impl FitWanted {
             return Err(reason);
         }
         step(progress, 4, 4, "storing the analysis")?;
-        let details = Beside {
+        let details = FitDetails {
             systematic: fitted.systematic.as_ref().and_then(|found| found.first()),
-            ..fitted.beside(records).remove(0)
+            ..fitted.details(records).remove(0)
         };
         let report = &fitted.report.records[0].report;
         let object = FitObject::of(options.family(), report, details, fitted.seconds);
@@ -170,12 +172,12 @@ impl FitWanted {
 }
 
 /// The session's own fit, as its edits leave it, to be compared with: parameters and sentences.
-pub fn own(
+pub fn fit_without_analysis(
     session: &Path,
     is_rejected_included: bool,
     progress: &dyn Progress,
-) -> Result<(Vec<Parameter>, Vec<String>), String> {
-    let wanted = FitWanted { is_rejected_included, ..FitWanted::default() };
+) -> Result<(Vec<FittedParameter>, Vec<String>), String> {
+    let wanted = SessionFitRequest { is_rejected_included, ..SessionFitRequest::default() };
     let results = wanted.results(session, progress)?;
-    Ok((kept::parameters(&results), kept::sentences(&results)))
+    Ok((stored_analysis::parameters(&results), stored_analysis::sentences(&results)))
 }

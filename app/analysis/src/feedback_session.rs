@@ -1,42 +1,46 @@
 //! The feedback check as a session: its table is imported like a foreign file and marked as simulated.
 
-use super::haptics::Followed;
+use super::haptics::FeedbackCheck;
 use crate::report::haptics::follow_table;
-use palpate_model::about::Labels;
+use palpate_model::metadata::SessionLabels;
 use palpate_runner::wall_now;
 use palpate_sessions::new_session_id;
-use palpate_tables::import::{Kept, Told, keep, parse_foreign};
+use palpate_tables::import::{ImportOptions, ImportTarget, parse_foreign, store_import};
 use std::path::Path;
 
 /// Name of the table that is kept beside the log.
 const TABLE: &str = "follow.csv";
 
 /// Makes the session in a folder that is new or empty; `source` is where the body is from.
-pub fn keep_followed(followed: &Followed, source: &str, folder: &Path) -> Result<(), String> {
+pub fn store_feedback_check(
+    followed: &FeedbackCheck,
+    source: &str,
+    folder: &Path,
+) -> Result<(), String> {
     let table = follow_table(followed).into_bytes();
-    let foreign = parse_foreign(TABLE, table, &Told::default())?;
+    let foreign = parse_foreign(TABLE, table, &ImportOptions::default())?;
     let at = wall_now().into();
     for mut part in foreign.parts {
         part.imported.remarks.insert(0, provenance(followed, source));
         part.imported.facts = facts(followed, source);
-        let target = Kept {
+        let target = ImportTarget {
             folder,
             original: &foreign.bytes,
             session_id: new_session_id(at),
             at,
             software_version: env!("CARGO_PKG_VERSION"),
-            labels: Labels {
+            labels: SessionLabels {
                 specimen: format!("simulated master rendering {source}"),
                 indenter: "rack of the master".into(),
-                ..Labels::default()
+                ..SessionLabels::default()
             },
         };
-        keep(&part, target).map_err(|err| err.to_string())?;
+        store_import(&part, target).map_err(|err| err.to_string())?;
     }
     Ok(())
 }
 
-fn provenance(followed: &Followed, source: &str) -> String {
+fn provenance(followed: &FeedbackCheck, source: &str) -> String {
     format!(
         "simulated, no tissue was touched: palpate haptics follow pushed the rack of a simulated master, which rendered the body of {source}, and measured its force; friction of {:.3} N and drag of {:.3} N are in it",
         followed.friction_n, followed.drag_n
@@ -44,7 +48,7 @@ fn provenance(followed: &Followed, source: &str) -> String {
 }
 
 /// Settings that reproduce the session.
-fn facts(followed: &Followed, source: &str) -> Vec<(String, String)> {
+fn facts(followed: &FeedbackCheck, source: &str) -> Vec<(String, String)> {
     let settings = &followed.settings;
     let body = &followed.body;
     let [mu1, mu2, mu3] = body.mu;

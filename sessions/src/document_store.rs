@@ -67,14 +67,14 @@ pub enum LibraryError {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kept<D> {
+pub struct StoredDocument<D> {
     /// The file's name without its ending.
     pub id: String,
     pub path: PathBuf,
     pub document: D,
 }
 
-impl<D: Document> Kept<D> {
+impl<D: Document> StoredDocument<D> {
     /// CRC-32 as in the file, eight hexadecimal digits.
     pub fn checksum(&self) -> Option<String> {
         let value = serde_json::to_value(&self.document).ok()?;
@@ -83,25 +83,25 @@ impl<D: Document> Kept<D> {
 }
 
 #[derive(Debug)]
-pub struct Shelf<D> {
-    pub kept: Vec<Kept<D>>,
+pub struct DocumentStore<D> {
+    pub documents: Vec<StoredDocument<D>>,
     pub unreadable: Vec<LibraryError>,
 }
 
-impl<D> Default for Shelf<D> {
+impl<D> Default for DocumentStore<D> {
     fn default() -> Self {
-        Self { kept: Vec::new(), unreadable: Vec::new() }
+        Self { documents: Vec::new(), unreadable: Vec::new() }
     }
 }
 
-impl<D: Document> Shelf<D> {
+impl<D: Document> DocumentStore<D> {
     /// A missing folder counts as empty.
     #[must_use]
     pub fn open(library: &Path) -> Self {
         let mut shelf = Self::default();
         for path in json_files(&library.join(D::FOLDER)) {
-            match read(&path) {
-                Ok(document) => shelf.kept.push(Kept {
+            match read_document(&path) {
+                Ok(document) => shelf.documents.push(StoredDocument {
                     id: path.file_stem().unwrap_or_default().to_string_lossy().into(),
                     path,
                     document,
@@ -114,31 +114,32 @@ impl<D: Document> Shelf<D> {
 
     /// Id of the document that supersedes this one.
     pub fn successor(&self, id: &str) -> Option<&str> {
-        let by = |one: &&Kept<D>| one.document.supersedes() == Some(id);
-        self.kept.iter().find(by).map(|one| one.id.as_str())
+        let by = |one: &&StoredDocument<D>| one.document.supersedes() == Some(id);
+        self.documents.iter().find(by).map(|one| one.id.as_str())
     }
 
     /// The latest document of a rig that is not superseded.
-    pub fn in_force(&self, rig: &str) -> Option<&Kept<D>> {
-        let own = self.kept.iter().filter(|one| one.document.rig() == rig);
+    pub fn in_force(&self, rig: &str) -> Option<&StoredDocument<D>> {
+        let own = self.documents.iter().filter(|one| one.document.rig() == rig);
         let open = own.filter(|one| self.successor(&one.id).is_none());
         open.max_by_key(|one| (taken_at(&one.document).ok().flatten(), &one.id))
     }
 
     /// Finds a document by its id, or by a name that only one document in force has.
-    pub fn find(&self, name: &str) -> Result<&Kept<D>, LibraryError> {
-        if let Some(exact) = self.kept.iter().find(|one| one.id == name) {
+    pub fn find(&self, name: &str) -> Result<&StoredDocument<D>, LibraryError> {
+        if let Some(exact) = self.documents.iter().find(|one| one.id == name) {
             return Ok(exact);
         }
-        let named = self.kept.iter().filter(|one| one.document.name() == name);
-        let open: Vec<&Kept<D>> = named.filter(|one| self.successor(&one.id).is_none()).collect();
+        let named = self.documents.iter().filter(|one| one.document.name() == name);
+        let open: Vec<&StoredDocument<D>> =
+            named.filter(|one| self.successor(&one.id).is_none()).collect();
         match open.as_slice() {
             [one] => Ok(one),
             [] => Err(LibraryError::Unknown {
                 kind: D::KIND,
                 name: name.to_owned(),
                 folder: D::FOLDER,
-                known: match self.kept.len() {
+                known: match self.documents.len() {
                     0 => ", it holds none".to_owned(),
                     count => format!(" among its {count}"),
                 },
@@ -171,7 +172,10 @@ pub fn age_days<D: Document>(document: &D, now: DateTime<Utc>) -> Option<i64> {
 }
 
 /// Stores a new document atomically; an existing file is never overwritten.
-pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, LibraryError> {
+pub fn save_document<D: Document>(
+    library: &Path,
+    document: &D,
+) -> Result<StoredDocument<D>, LibraryError> {
     check(document, document.name())?;
     let day =
         taken_at(document)?.map_or("undated".to_owned(), |at| at.format("%Y%m%d").to_string());
@@ -197,22 +201,26 @@ pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, Librar
             Err(LibraryError::AlreadyThere { kind: D::KIND, id })
         }
         Err(err) => Err(failed(&path)(err)),
-        Ok(()) => Ok(Kept { id, path, document: document.clone() }),
+        Ok(()) => Ok(StoredDocument { id, path, document: document.clone() }),
     }
 }
 
 /// Stores a document that supersedes `old`; the old file stays as it is.
-pub fn supersede<D: Document>(library: &Path, old: &str, new: &D) -> Result<Kept<D>, LibraryError> {
-    let shelf = Shelf::<D>::open(library);
+pub fn supersede_document<D: Document>(
+    library: &Path,
+    old: &str,
+    new: &D,
+) -> Result<StoredDocument<D>, LibraryError> {
+    let shelf = DocumentStore::<D>::open(library);
     let old = shelf.find(old)?;
     if let Some(by) = shelf.successor(&old.id) {
         return Err(LibraryError::Superseded { id: old.id.clone(), by: by.to_owned() });
     }
-    save(library, &new.clone().superseding(old.id.clone()))
+    save_document(library, &new.clone().superseding(old.id.clone()))
 }
 
 /// Reads and verifies a file of the library, or a bare document without checksum.
-pub fn read<D: Document>(path: &Path) -> Result<D, LibraryError> {
+pub fn read_document<D: Document>(path: &Path) -> Result<D, LibraryError> {
     let not_one = |err: serde_json::Error| LibraryError::NotOne {
         kind: D::KIND,
         path: path.into(),

@@ -3,23 +3,24 @@
 //! A recalibration recalculates every force from the raw signal and the tares that were found; a mask names
 //! stretches whose forces do not count. The log itself stays as it is.
 
-use crate::edited::{self, Edited};
+use crate::edited_session::{self, EditedSession};
 use crate::source::{SourceError, calibration_of, decisions_among, records};
-use palpate_model::calibration::{Calibration, Curve};
+use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::units::{Seconds, Volts};
 use palpate_protocols::engine::{ENGINE_VERSION, Record};
 use palpate_runner::wall_now;
 use palpate_sessions::analyses::{
-    Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
+    Analyses, Analysis, AnalysisContent, AnalysisError, AnalysisInput, changed_inputs,
+    document_input, read_session_inputs,
 };
-use palpate_sessions::{Entry, Outline, ReadError, Row, Session};
+use palpate_sessions::{LogEntry, ReadError, SampleRow, Session, SessionOutline};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A session with its edits applied, as one of its analyses reads it.
 #[derive(Clone, Debug)]
-pub struct Opened {
-    pub edited: Edited,
+pub struct AnalysedSession {
+    pub edited: EditedSession,
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
@@ -41,8 +42,8 @@ pub struct ForceChange {
 }
 
 /// Opens a session as an analysis of it does; without a name as its edits leave it.
-pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
-    let mut edited = edited::open(path)?;
+pub fn open(path: &Path, name: Option<&str>) -> Result<AnalysedSession, SourceError> {
+    let mut edited = edited_session::open(path)?;
     let analyses = Analyses::read(path, &edited.session.manifest.session_id)?;
     let reading = AnalysisReading::of(path, &analyses, name)?;
     let session = &mut edited.session;
@@ -50,7 +51,7 @@ pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
     if let Some((_, calibration)) = &reading.calibration {
         recalibrate(session, calibration)?;
     }
-    Ok(Opened { edited, analyses, left_out_s: reading.left_out_s })
+    Ok(AnalysedSession { edited, analyses, left_out_s: reading.left_out_s })
 }
 
 /// Calibration and mask of an analysis and of the analyses it is based on.
@@ -70,14 +71,14 @@ impl AnalysisReading {
         let mut next = name.map(str::to_owned);
         while let Some(name) = next.take() {
             let one = analyses.get(&name)?.clone();
-            let changed = changed_inputs(&one, &inputs_of(path)?);
+            let changed = changed_inputs(&one, &read_session_inputs(path)?);
             if !changed.is_empty() {
                 let changed = changed.join(", ");
                 reading.notes.push(format!("analysis '{name}' was made before {changed} changed"));
             }
             match one.what {
-                Analysed::Fit { based_on, .. } => next = based_on,
-                Analysed::Recalibration { calibration, .. } => {
+                AnalysisContent::Fit { based_on, .. } => next = based_on,
+                AnalysisContent::Recalibration { calibration, .. } => {
                     let own: Calibration =
                         serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;
                     reading.notes.push(format!(
@@ -86,7 +87,7 @@ impl AnalysisReading {
                     ));
                     reading.calibration = Some((calibration, own));
                 }
-                Analysed::Mask { left_out_s } => {
+                AnalysisContent::Mask { left_out_s } => {
                     reading.notes.push(format!(
                         "forces in {} stretches do not count, as analysis '{name}' has it",
                         left_out_s.len()
@@ -94,14 +95,14 @@ impl AnalysisReading {
                     reading.left_out_s = left_out_s;
                 }
                 // It never counts, so it is not found.
-                Analysed::Withdrawal => {}
+                AnalysisContent::Withdrawal => {}
             }
         }
         Ok(reading)
     }
 }
 
-impl Opened {
+impl AnalysedSession {
     /// Takes the forces out that do not count, for tables that know no weights.
     pub fn blank(&mut self) {
         let session = &mut self.edited.session;
@@ -119,8 +120,12 @@ impl Opened {
     }
 
     /// What an analysis made now goes by: the session's files, its calibration, and what it is based on.
-    pub fn inputs(&self, path: &Path, based_on: Option<&str>) -> Result<Vec<Input>, AnalysisError> {
-        let mut inputs = inputs_of(path)?;
+    pub fn inputs(
+        &self,
+        path: &Path,
+        based_on: Option<&str>,
+    ) -> Result<Vec<AnalysisInput>, AnalysisError> {
+        let mut inputs = read_session_inputs(path)?;
         let calibration = &self.edited.session.manifest.calibration;
         if !calibration.is_null() {
             inputs.push(document_input("calibration", calibration));
@@ -138,7 +143,7 @@ fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
 }
 
 /// Controller time from one sample to a later one.
-pub(super) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds {
+pub(super) fn time_between(session: &Session, first: &SampleRow, row: &SampleRow) -> Seconds {
     let ticks = row.tick.saturating_sub(first.tick);
     session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
@@ -146,12 +151,12 @@ pub(super) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds
 /// What recalculates forces: a curve, and the tares found, each after so many samples.
 #[derive(Clone, Debug)]
 struct Recalibration {
-    curve: Curve,
+    curve: CalibrationCurve,
     tares: Vec<(u64, Volts)>,
 }
 
 impl Recalibration {
-    fn new(calibration: &Calibration, entries: &[Entry]) -> Result<Self, SourceError> {
+    fn new(calibration: &Calibration, entries: &[LogEntry]) -> Result<Self, SourceError> {
         let curve = calibration.curve().map_err(bad_calibration)?;
         let decisions = decisions_among(entries)?;
         let tares = records(&decisions).filter_map(|(after, record)| match record {
@@ -162,11 +167,11 @@ impl Recalibration {
     }
 
     /// The recalculated force of a sample in N. One whose force was not known, such as one before the tare, has none.
-    fn force(&self, index: u64, row: &Row) -> Option<f64> {
+    fn force(&self, index: u64, row: &SampleRow) -> Option<f64> {
         row.force?;
         let found = self.tares.partition_point(|(after, _)| *after <= index);
         let tare = found.checked_sub(1).map(|latest| self.tares[latest].1);
-        Some(self.curve.newtons_above(Volts(row.volts?), tare).0)
+        Some(self.curve.newtons_above_tare(Volts(row.volts?), tare).0)
     }
 }
 
@@ -199,9 +204,9 @@ pub fn recalibrate(
 
 /// A session as an analysis has it, whose samples pass by and are never all in memory.
 #[derive(Clone, Debug)]
-pub struct Passing {
+pub struct StreamedAnalysis {
     /// The session with its edits made; its manifest has the calibration that the forces are made with.
-    pub edited: edited::Passing,
+    pub edited: edited_session::StreamedSession,
     pub analyses: Analyses,
     /// Stretches whose forces do not count: from and to in s since the first sample.
     pub left_out_s: Vec<[f64; 2]>,
@@ -209,16 +214,16 @@ pub struct Passing {
 }
 
 /// Reads a session through, so that it is known to be whole, and keeps all but its samples.
-pub fn passing(path: &Path, name: Option<&str>) -> Result<Passing, SourceError> {
+pub fn stream_analysed(path: &Path, name: Option<&str>) -> Result<StreamedAnalysis, SourceError> {
     of_outline(path, Session::scan(path, &mut |_block| {})?, name)
 }
 
 pub fn of_outline(
     path: &Path,
-    outline: Outline,
+    outline: SessionOutline,
     name: Option<&str>,
-) -> Result<Passing, SourceError> {
-    let mut edited = edited::of_outline(path, outline)?;
+) -> Result<StreamedAnalysis, SourceError> {
+    let mut edited = edited_session::of_outline(path, outline)?;
     let analyses = Analyses::read(path, &edited.outline.manifest.session_id)?;
     let reading = AnalysisReading::of(path, &analyses, name)?;
     let outline = &mut edited.outline;
@@ -228,10 +233,10 @@ pub fn of_outline(
         recalibration = Some(Recalibration::new(&calibration, &outline.entries)?);
         outline.manifest.calibration = document;
     }
-    Ok(Passing { edited, analyses, left_out_s: reading.left_out_s, recalibration })
+    Ok(StreamedAnalysis { edited, analyses, left_out_s: reading.left_out_s, recalibration })
 }
 
-impl Passing {
+impl StreamedAnalysis {
     /// Whether samples are other than those recorded.
     pub fn is_changed(&self) -> bool {
         self.recalibration.is_some() || self.edited.is_changed()
@@ -239,7 +244,7 @@ impl Passing {
 
     /// Hands out every sample that was there when the session was first read, as the analysis has it, in order,
     /// some at a time.
-    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
+    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[SampleRow])) -> Result<(), ReadError> {
         let Some(recalibration) = &self.recalibration else { return self.edited.rows(path, visit) };
         let (mut index, mut own) = (0, Vec::new());
         self.edited.rows(path, &mut |rows| {
@@ -258,7 +263,7 @@ impl Passing {
 pub fn recalibration(
     path: &Path,
     calibration: &Calibration,
-) -> Result<(Opened, Vec<Input>, Analysed, ForceChange), SourceError> {
+) -> Result<(AnalysedSession, Vec<AnalysisInput>, AnalysisContent, ForceChange), SourceError> {
     let mut opened = open(path, None)?;
     if let Some(imported) = &opened.edited.session.manifest.imported {
         return Err(SourceError::NoSignal { file: imported.file.clone() });
@@ -268,7 +273,7 @@ pub fn recalibration(
     let change = recalibrate(&mut opened.edited.session, calibration)?;
     // The calibration that went in is the new one.
     let inputs = opened.inputs(path, None)?;
-    let what = Analysed::Recalibration {
+    let what = AnalysisContent::Recalibration {
         calibration: opened.edited.session.manifest.calibration.clone(),
         results: serde_json::to_value(change).unwrap_or_default(),
     };
@@ -277,7 +282,13 @@ pub fn recalibration(
 
 /// A record of this version of the program, dated now.
 #[must_use]
-pub fn record(name: &str, by: &str, reason: &str, inputs: Vec<Input>, what: Analysed) -> Analysis {
+pub fn record(
+    name: &str,
+    by: &str,
+    reason: &str,
+    inputs: Vec<AnalysisInput>,
+    what: AnalysisContent,
+) -> Analysis {
     Analysis {
         name: name.trim().to_owned(),
         at: wall_now().into(),
@@ -340,7 +351,7 @@ mod tests {
         palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
         for name in [None, Some("heavier")] {
             let opened = open(&path, name).unwrap().edited.session;
-            let passing = passing(&path, name).unwrap();
+            let passing = stream_analysed(&path, name).unwrap();
             assert_eq!(passing.is_changed(), name.is_some());
             let mut rows = Vec::new();
             passing.rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();

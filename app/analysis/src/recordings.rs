@@ -4,12 +4,12 @@
 //! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
 //! refused; a rejected session is left out with a note.
 
-use crate::compliance::{Correction, Corrections};
-use crate::exports::without_copied;
+use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
+use crate::exports::remove_recovered_originals;
 use crate::fit::Origin;
-use crate::source::{self, FitSource, SourceError, Wanted};
+use crate::source::{self, FitSource, SourceError, SourceSelection};
 use palpate_model::calibration::{Calibration, CalibrationError};
-use palpate_rheology::fit::{FitError, FitSample, Traced};
+use palpate_rheology::fit::{FitError, FitSample, TracedRecord};
 use palpate_sessions::folder::is_session_folder;
 use palpate_sessions::log::ReadError;
 use palpate_tables::import::ColumnNames;
@@ -19,11 +19,11 @@ use walkdir::WalkDir;
 
 /// Endings of file names that are taken for tables.
 const TABLES: [&str; 2] = ["csv", "tsv"];
-/// Ending of a session's log.
+/// FigureFormat of a session's log.
 const LOG: &str = "mcap";
 
 #[derive(Debug, Error)]
-pub enum SourcesError {
+pub enum RecordingsError {
     #[error(transparent)]
     Missing(ReadError),
     #[error("cannot look into {} ({reason}); check its permissions", path.display())]
@@ -41,24 +41,26 @@ pub enum SourcesError {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundRecordings {
     pub paths: Vec<PathBuf>,
     /// Sessions that are left out, because what was recovered from them is there too.
-    pub copied: Vec<PathBuf>,
+    pub recovered_originals: Vec<PathBuf>,
 }
 
 /// That sessions are left out for their recovered copies; nothing without any.
 #[must_use]
-pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String> {
+pub fn recovered_originals_note(names: impl IntoIterator<Item = String>) -> Option<String> {
     let names: Vec<String> = names.into_iter().collect();
     (!names.is_empty()).then(|| {
         format!("left out, because their recovered copies are included: {}", names.join(", "))
     })
 }
 
-impl Found {
+impl FoundRecordings {
     pub fn note(&self) -> Option<String> {
-        copied_sentence(self.copied.iter().map(|path| path.display().to_string()))
+        recovered_originals_note(
+            self.recovered_originals.iter().map(|path| path.display().to_string()),
+        )
     }
 }
 
@@ -84,39 +86,39 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 }
 
 /// Every recording named, and every one in the folders named: folder by folder, by name.
-pub fn find(paths: &[PathBuf]) -> Result<Found, SourcesError> {
-    let (paths, copied) = without_copied(all(paths)?, is_session);
-    Ok(Found { paths, copied })
+pub fn find(paths: &[PathBuf]) -> Result<FoundRecordings, RecordingsError> {
+    let (paths, copied) = remove_recovered_originals(all(paths)?, is_session);
+    Ok(FoundRecordings { paths, recovered_originals: copied })
 }
 
 /// Sessions alone; a table is an error.
-pub fn find_sessions(paths: &[PathBuf]) -> Result<Found, SourcesError> {
+pub fn find_sessions(paths: &[PathBuf]) -> Result<FoundRecordings, RecordingsError> {
     if let Some(table) = paths.iter().find(|path| !is_session(path)) {
-        return Err(SourcesError::Table(table.clone()));
+        return Err(RecordingsError::Table(table.clone()));
     }
     let mut found = find(paths)?;
     found.paths.retain(|path| is_session(path));
     Ok(found)
 }
 
-fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourcesError> {
+fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, RecordingsError> {
     let mut found = Vec::new();
     for path in paths {
         if !path.exists() {
             let path = path.clone();
-            return Err(SourcesError::Missing(ReadError::Missing { path }));
+            return Err(RecordingsError::Missing(ReadError::Missing { path }));
         }
         if !is_collection(path) {
             found.push(path.clone());
             continue;
         }
         let before = found.len();
-        below(path, &mut found).map_err(|err| SourcesError::Folder {
+        below(path, &mut found).map_err(|err| RecordingsError::Folder {
             path: err.path().unwrap_or(path).to_owned(),
             reason: err.io_error().map_or(err.to_string(), ToString::to_string),
         })?;
         if found.len() == before {
-            return Err(SourcesError::Nothing(path.clone()));
+            return Err(RecordingsError::Nothing(path.clone()));
         }
     }
     Ok(found)
@@ -144,14 +146,14 @@ fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), walkdir::Error> 
 
 /// Names of recordings that are analysed together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Naming {
+pub enum RecordingNames {
     #[default]
     Path,
     /// Name of the folder or file alone.
     Stem,
 }
 
-impl Naming {
+impl RecordingNames {
     fn name(self, path: &Path) -> String {
         let stem = path.file_stem().filter(|_| self == Self::Stem);
         stem.map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
@@ -159,13 +161,13 @@ impl Naming {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Reading<'a> {
+pub struct RecordingOptions<'a> {
     /// Names of the columns of tables without a header.
     pub columns: Option<&'a ColumnNames>,
     /// Which part of each, and whether rejected ones are taken.
-    pub wanted: Wanted,
-    pub corrections: &'a Corrections,
-    pub naming: Naming,
+    pub wanted: SourceSelection,
+    pub corrections: &'a ComplianceCorrections,
+    pub naming: RecordingNames,
 }
 
 /// A recording that is analysed together with others.
@@ -176,14 +178,14 @@ pub struct Recording {
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
     /// What the rig's compliance does to its depths, or would.
-    pub compliance: Option<Correction>,
+    pub compliance: Option<ComplianceCorrection>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
 }
 
 impl Recording {
     #[must_use]
-    pub fn of(name: String, source: FitSource, compliance: Option<Correction>) -> Self {
+    pub fn of(name: String, source: FitSource, compliance: Option<ComplianceCorrection>) -> Self {
         Self {
             name,
             samples: source.samples,
@@ -206,23 +208,23 @@ pub struct Recordings {
 }
 
 /// Refuses a recording that is named twice, however it is written.
-pub fn check_once<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), SourcesError> {
+pub fn check_once<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), RecordingsError> {
     let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     let mut reals: Vec<PathBuf> = paths.into_iter().map(real).collect();
     reals.sort();
     match reals.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(SourcesError::Twice(pair[0].clone())),
+        Some(pair) => Err(RecordingsError::Twice(pair[0].clone())),
         None => Ok(()),
     }
 }
 
 /// Reads recordings that are analysed together, each once.
-pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesError> {
+pub fn read(paths: &[PathBuf], how: RecordingOptions<'_>) -> Result<Recordings, RecordingsError> {
     check_once(paths)?;
     let mut read = Recordings::default();
     for path in paths {
         let name = how.naming.name(path);
-        let failed = |reason: SourceError| SourcesError::Source {
+        let failed = |reason: SourceError| RecordingsError::Source {
             path: path.clone(),
             reason: Box::new(reason),
         };
@@ -236,14 +238,14 @@ pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesEr
         };
         let compliance = how.corrections.apply(&mut source).map_err(|err| failed(err.into()))?;
         let applied = compliance.as_ref().filter(|one| one.is_applied);
-        source.notes.extend(applied.map(Correction::sentence));
+        source.notes.extend(applied.map(ComplianceCorrection::sentence));
         let notes = source.notes.iter().map(|note| format!("{name}: {note}"));
         read.notes.extend(notes);
         read.all.push(Recording::of(name, source, compliance));
     }
     match paths.len() - read.all.len() {
         0 => {}
-        all if all == paths.len() => return Err(SourcesError::Rejected(all)),
+        all if all == paths.len() => return Err(RecordingsError::Rejected(all)),
         rejected => {
             read.notes.push(format!("{} sources, {rejected} of them rejected", paths.len()))
         }
@@ -259,7 +261,7 @@ impl Recordings {
     /// What calibrations and compliances add, as `find` tells it; `None` where neither is known of any record.
     pub fn systematic<T>(
         &self,
-        find: impl FnOnce(&[Traced<'_>]) -> Result<T, FitError>,
+        find: impl FnOnce(&[TracedRecord<'_>]) -> Result<T, FitError>,
     ) -> Result<Option<T>, String> {
         let origin =
             |one: &Recording| Origin::of(one.calibration.as_ref(), one.compliance.as_ref());
@@ -309,9 +311,9 @@ mod tests {
         assert_eq!(all(&[at.join("again")]).unwrap().len(), 3);
         assert_eq!(all(&[at.join("b/s9")]).unwrap(), [at.join("b/s9")]);
         let refusal = all(&[at.join("empty")]).unwrap_err();
-        assert!(matches!(refusal, SourcesError::Nothing(_)), "{refusal}");
+        assert!(matches!(refusal, RecordingsError::Nothing(_)), "{refusal}");
         let table = find_sessions(&[at.join("b/table.CSV")]).unwrap_err();
-        assert!(matches!(table, SourcesError::Table(_)), "{table}");
+        assert!(matches!(table, RecordingsError::Table(_)), "{table}");
     }
 
     #[test]
@@ -319,16 +321,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let table = folder.path().join("one.csv");
         fs::write(&table, "t_s,depth_mm,force_N\n0,0,0\n1,1,0.5\n2,1,0.4\n").unwrap();
-        let how = Reading {
+        let how = RecordingOptions {
             columns: None,
-            wanted: Wanted::default(),
-            corrections: &Corrections::none(None),
-            naming: Naming::Stem,
+            wanted: SourceSelection::default(),
+            corrections: &ComplianceCorrections::none(None),
+            naming: RecordingNames::Stem,
         };
         let once = read(std::slice::from_ref(&table), how).unwrap();
         assert_eq!((once.all[0].name.as_str(), once.all.len()), ("one", 1));
         let again = folder.path().join(".").join("one.csv");
         let twice = read(&[table, again], how).unwrap_err();
-        assert!(matches!(twice, SourcesError::Twice(_)), "{twice}");
+        assert!(matches!(twice, RecordingsError::Twice(_)), "{twice}");
     }
 }

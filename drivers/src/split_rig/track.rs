@@ -4,7 +4,7 @@
 //! the past up in it.
 
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Profile};
+use palpate_model::rig::{AxisStatus, MotionProfile};
 use palpate_model::units::Seconds;
 use std::collections::VecDeque;
 
@@ -17,14 +17,14 @@ struct TrackPiece {
     /// Pulses where it begins.
     pulses: f64,
     /// Its course, in pulses from there.
-    course: Option<(Profile, f64)>,
+    course: Option<(MotionProfile, f64)>,
     status: AxisStatus,
     /// Counts motions.
     motion: u64,
 }
 
 #[derive(Clone, Debug, Default)]
-pub struct Track {
+pub struct AxisTrack {
     pieces: VecDeque<TrackPiece>,
     inputs: VecDeque<(Nanos, AxisStatus)>,
     motion: u64,
@@ -40,7 +40,7 @@ pub struct AxisState {
     pub motion: u64,
 }
 
-impl Track {
+impl AxisTrack {
     #[must_use]
     pub fn at_rest(pulses: i64) -> Self {
         let mut track = Self::default();
@@ -48,7 +48,7 @@ impl Track {
         track
     }
 
-    fn motion_under_way(&self) -> Option<(TrackPiece, Profile, f64)> {
+    fn motion_under_way(&self) -> Option<(TrackPiece, MotionProfile, f64)> {
         let last = *self.pieces.back()?;
         let (profile, pulses_per_mm) = last.course?;
         Some((last, profile, pulses_per_mm))
@@ -68,7 +68,13 @@ impl Track {
     }
 
     /// Begins a motion with a profile in mm from zero and pulses per mm.
-    pub fn begin_motion(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
+    pub fn begin_motion(
+        &mut self,
+        from: Nanos,
+        pulses: f64,
+        profile: MotionProfile,
+        pulses_per_mm: f64,
+    ) {
         self.motion += 1;
         self.push(TrackPiece {
             from,
@@ -100,7 +106,7 @@ impl Track {
 
     /// The motion under way ends earlier than planned, at the end of this profile, such as when the way behind it was
     /// never given.
-    pub fn shorten_motion(&mut self, profile: Profile) {
+    pub fn shorten_motion(&mut self, profile: MotionProfile) {
         if let Some(TrackPiece { course: Some((course, _)), .. }) = self.pieces.back_mut() {
             *course = profile;
         }
@@ -154,9 +160,10 @@ mod tests {
 
     #[test]
     fn position_and_status_are_looked_up_at_any_past_time() {
-        let mut track = Track::at_rest(100);
+        let mut track = AxisTrack::at_rest(100);
         let ms = Nanos::from_millis;
-        let profile = Profile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
+        let profile =
+            MotionProfile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
         track.set_inputs(ms(500), AxisStatus::MOTOR_ON);
         track.begin_motion(ms(1_000), 100.0, profile, -400.0);
         track.begin_braking(ms(2_000));
@@ -177,10 +184,10 @@ mod tests {
 
     #[test]
     fn motion_that_is_no_longer_watched_ends() {
-        let mut track = Track::at_rest(100);
+        let mut track = AxisTrack::at_rest(100);
         let ms = Nanos::from_millis;
         let speed = (MmPerS(2.0), MmPerS2(20.0));
-        let profile = |to| Profile::to_rest(Position(0.0), Position(to), speed.0, speed.1);
+        let profile = |to| MotionProfile::to_rest(Position(0.0), Position(to), speed.0, speed.1);
         track.finish_motion();
         assert_eq!(track.at(ms(500)).pulses, 100.0);
         track.begin_motion(ms(1_000), 100.0, profile(10.0), -400.0);

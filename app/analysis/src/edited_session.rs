@@ -7,34 +7,36 @@ use crate::source::SourceError;
 use palpate_model::units::Depth;
 pub use palpate_sessions::contacts::{FoundContact, contacts};
 use palpate_sessions::contacts::{contact_position, is_record};
-use palpate_sessions::{Block, Edits, Entry, Outline, ReadError, Row, Session, Verdict};
+use palpate_sessions::{
+    DataQuality, Edits, LogEntry, ReadError, SampleBlock, SampleRow, Session, SessionOutline,
+};
 use std::ops::Range;
 use std::path::Path;
 
 /// A session with its edits applied.
 #[derive(Clone, Debug)]
-pub struct Edited {
+pub struct EditedSession {
     /// The session; its notes name corrections and doubts.
     pub session: Session,
     pub edits: Edits,
 }
 
-impl Edited {
+impl EditedSession {
     pub fn rejection(&self) -> Option<&str> {
         match self.edits.verdict() {
-            Some((Verdict::Rejected, edit)) => Some(&edit.reason),
+            Some((DataQuality::Rejected, edit)) => Some(&edit.reason),
             _ => None,
         }
     }
 }
 
 /// Opens a session folder, or one file of it, and makes its edits.
-pub fn open(path: &Path) -> Result<Edited, SourceError> {
+pub fn open(path: &Path) -> Result<EditedSession, SourceError> {
     let mut session = Session::open(path)?;
     let edits = Edits::read(path, &session.manifest.session_id)?;
     correct(&mut session, &edits);
     session.notes.extend(doubts(&edits));
-    Ok(Edited { session, edits })
+    Ok(EditedSession { session, edits })
 }
 
 /// What of the edits a user of the data must know, apart from corrections.
@@ -43,7 +45,8 @@ fn doubts(edits: &Edits) -> Vec<String> {
     if edits.is_torn {
         notes.push("the last edit was begun and never finished; it does not count, and the next one moves it to edits.jsonl.torn".into());
     }
-    if let Some((verdict @ (Verdict::Suspect | Verdict::Rejected), edit)) = edits.verdict() {
+    if let Some((verdict @ (DataQuality::Suspect | DataQuality::Rejected), edit)) = edits.verdict()
+    {
         notes.push(format!("{verdict}, says {}: {}", edit.by, edit.reason));
     }
     notes
@@ -51,38 +54,41 @@ fn doubts(edits: &Edits) -> Vec<String> {
 
 /// A session with its edits made, whose samples pass by and are never all in memory.
 #[derive(Clone, Debug)]
-pub struct Passing {
+pub struct StreamedSession {
     /// All but the samples, its notes telling what was corrected and doubted.
-    pub outline: Outline,
+    pub outline: SessionOutline,
     pub edits: Edits,
     shifts: Vec<Shift>,
 }
 
 /// Reads a session through, so that it is known to be whole, and keeps all but its samples.
-pub fn outline(path: &Path) -> Result<Passing, SourceError> {
+pub fn stream_edited(path: &Path) -> Result<StreamedSession, SourceError> {
     let outline = Session::scan(path, &mut |_block| {})?;
     of_outline(path, outline)
 }
 
-pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceError> {
+pub fn of_outline(
+    path: &Path,
+    mut outline: SessionOutline,
+) -> Result<StreamedSession, SourceError> {
     let edits = Edits::read(path, &outline.manifest.session_id)?;
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
     outline.notes.extend(notes);
     outline.notes.extend(doubts(&edits));
-    Ok(Passing { outline, edits, shifts })
+    Ok(StreamedSession { outline, edits, shifts })
 }
 
-impl Passing {
+impl StreamedSession {
     /// Whether depths are other than those recorded.
     pub fn is_changed(&self) -> bool {
         !self.shifts.is_empty()
     }
 
     /// Hands out every sample that was there when the session was first read, edits made, in order, some at a time.
-    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
+    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[SampleRow])) -> Result<(), ReadError> {
         let mut index = 0;
         let mut rows = Vec::new();
-        let mut each = |block: &Block| {
+        let mut each = |block: &SampleBlock| {
             rows.clear();
             rows.extend(block.rows());
             // One that is being recorded may have grown.
@@ -108,7 +114,7 @@ struct Shift {
 }
 
 impl Shift {
-    fn apply(&self, index: u64, row: &mut Row) {
+    fn apply(&self, index: u64, row: &mut SampleRow) {
         if let Some(depth) = row.depth.as_mut().filter(|_| self.samples.contains(&index)) {
             *depth += self.deeper.0;
         }
@@ -127,7 +133,7 @@ fn correct(session: &mut Session, edits: &Edits) {
 }
 
 /// Corrects contacts among the entries; what that does to the depths, and a sentence on each.
-fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<String>) {
+fn shifts(entries: &mut [LogEntry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<String>) {
     let contacts = contacts(entries);
     let (mut shifts, mut notes) = (Vec::new(), Vec::new());
     for (index, found) in contacts.iter().enumerate() {
@@ -169,14 +175,14 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
 mod tests {
     use super::*;
     use palpate_model::units::Position;
-    use palpate_sessions::edits::{Change, Edit};
+    use palpate_sessions::edits::{Edit, EditChange};
 
     fn edit(number: u32, position_mm: f64) -> Edit {
         Edit {
             at: std::time::UNIX_EPOCH.into(),
             by: "Ada".into(),
             reason: "by eye".into(),
-            change: Change::Contact {
+            change: EditChange::Contact {
                 number,
                 position_mm: Position(position_mm),
                 was_mm: Position(0.0),
@@ -190,7 +196,7 @@ mod tests {
         let mut session = Session::open(&sessions.join("ramp-hold-lab")).unwrap();
         let first = contacts(&session.entries);
         assert_eq!(first.len(), 1);
-        let known = |row: &palpate_sessions::record::Row| row.depth.is_some();
+        let known = |row: &palpate_sessions::record::SampleRow| row.depth.is_some();
         assert_eq!(session.rows.iter().position(known), Some(first[0].after_sample as usize));
         // A second one, found later, as a protocol that searches again leaves it.
         let second = (first[0].after_sample as usize + session.rows.len()) / 2;

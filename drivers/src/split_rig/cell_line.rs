@@ -1,12 +1,12 @@
 //! A load cell's dialogue on a link of its own: samples with their time on the host's clock.
 
 use super::cell_clock::CellClock;
-use super::track::Track;
+use super::track::AxisTrack;
 use crate::cell::CellDialogue;
 use crate::rig::RigEventBody;
 use crate::wire::{Dialogue, LinkStats, lock};
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, AxisStatus, Reading, RigCommand};
+use palpate_model::rig::{AxisStatus, Reading, RigCommand, SampleAge};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
 
@@ -21,7 +21,7 @@ const PAUSE: Nanos = Nanos::from_millis(20);
 
 pub struct CellLine {
     cell: Box<dyn CellDialogue>,
-    track: Arc<Mutex<Track>>,
+    track: Arc<Mutex<AxisTrack>>,
     clock: CellClock,
     start: Nanos,
     period: Nanos,
@@ -41,7 +41,7 @@ impl CellLine {
     pub fn new(
         cell: Box<dyn CellDialogue>,
         (rate, delay): (f64, Nanos),
-        track: Arc<Mutex<Track>>,
+        track: Arc<Mutex<AxisTrack>>,
         start: Nanos,
     ) -> Self {
         let period = Nanos((1e9 / rate.max(1e-3)) as u64);
@@ -109,7 +109,7 @@ impl CellLine {
                 volts: sample.volts,
                 pulses: 0,
                 status: AxisStatus(0),
-                age: Some(Age { by: now.since(taken), within }),
+                age: Some(SampleAge { by: now.since(taken), within }),
             };
             self.events.push_back((now, RigEventBody::Reading(reading)));
         }
@@ -121,12 +121,12 @@ impl CellLine {
 }
 
 impl Dialogue for CellLine {
-    fn attended(&mut self, _at: Nanos) {}
+    fn note_attendance(&mut self, _at: Nanos) {}
 
     fn command(&mut self, _now: Nanos, _command: RigCommand) {}
 
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        self.cell.received(now, bytes);
+    fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
+        self.cell.handle_bytes(now, bytes);
         self.take_samples(now);
     }
 
@@ -182,7 +182,7 @@ mod tests {
     struct Bytes(VecDeque<CellSample>);
 
     impl CellDialogue for Bytes {
-        fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
             self.0.extend(bytes.iter().map(|byte| CellSample {
                 at: now,
                 device_time: None,
@@ -211,9 +211,9 @@ mod tests {
     #[test]
     fn a_sample_is_as_old_as_the_filter_of_its_cell_makes_it() {
         let ms = Nanos::from_millis;
-        let track = Arc::new(Mutex::new(Track::at_rest(0)));
+        let track = Arc::new(Mutex::new(AxisTrack::at_rest(0)));
         let mut line = CellLine::new(Box::<Bytes>::default(), (80.0, ms(25)), track, ms(1_000));
-        line.received(ms(1_100), &[0]);
+        line.handle_bytes(ms(1_100), &[0]);
         let Some((_, RigEventBody::Reading(reading))) = line.take_event() else {
             panic!("no reading");
         };
@@ -224,12 +224,12 @@ mod tests {
     #[test]
     fn a_burst_is_laid_backwards_and_never_into_the_future() {
         let ms = Nanos::from_millis;
-        let track = Arc::new(Mutex::new(Track::at_rest(0)));
+        let track = Arc::new(Mutex::new(AxisTrack::at_rest(0)));
         let mut line = CellLine::new(Box::<Bytes>::default(), (250.0, ms(0)), track, ms(1_000));
         let mut ticks = Vec::new();
         // One, four that a converter has held back, then two that come closer than the rate.
         for (at, bytes) in [(1_010, &[0][..]), (1_026, &[0, 0, 0, 0]), (1_028, &[0, 0])] {
-            line.received(ms(at), bytes);
+            line.handle_bytes(ms(at), bytes);
             while let Some((now, RigEventBody::Reading(reading))) = line.take_event() {
                 let age = reading.age.expect("it is known");
                 assert_eq!(age.within, ms(3));

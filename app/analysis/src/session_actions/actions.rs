@@ -1,29 +1,32 @@
 //! Actions that add a record beside a session. Records are never overwritten.
 
-use super::super::edits::{SayFailure, Subject};
-use super::{Done, FitWanted};
-use crate::analysed::{self, ForceChange, record};
-use crate::edited;
+use super::super::edits::{EditFailure, EditTarget};
+use super::{ActionReport, SessionFitRequest};
+use crate::analysed_session::{self, ForceChange, record};
+use crate::edited_session;
 use crate::progress::Progress;
-use crate::report::dossier::Wanted;
-use crate::report::kept;
+use crate::report::dossier::SessionReading;
+use crate::report::stored_analysis;
 use crate::source::SourceError;
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
 use palpate_sessions::analyses::{
-    Analysed, Analyses, Analysis, AnalysisError, Input, add_analysis, inputs_of,
+    Analyses, Analysis, AnalysisContent, AnalysisError, AnalysisInput, add_analysis,
+    read_session_inputs,
 };
-use palpate_sessions::{Change, Edit, LibraryError, ReadError, Summary, Verdict, read_calibration};
+use palpate_sessions::{
+    DataQuality, Edit, EditChange, LibraryError, ReadError, SessionSummary, read_calibration,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 #[derive(Debug, Error)]
-pub enum DeedFailure {
+pub enum SessionActionError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(transparent)]
-    Say(#[from] SayFailure),
+    Say(#[from] EditFailure),
     #[error(transparent)]
     Calibration(#[from] LibraryError),
     #[error("the session has no force in these intervals, so the mask would leave out nothing")]
@@ -46,13 +49,13 @@ pub enum DeedFailure {
     Cancelled,
 }
 
-impl From<AnalysisError> for DeedFailure {
+impl From<AnalysisError> for SessionActionError {
     fn from(err: AnalysisError) -> Self {
         Self::Source(err.into())
     }
 }
 
-impl From<ReadError> for DeedFailure {
+impl From<ReadError> for SessionActionError {
     fn from(err: ReadError) -> Self {
         Self::Source(err.into())
     }
@@ -60,7 +63,7 @@ impl From<ReadError> for DeedFailure {
 
 /// Author of a record, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Who {
+pub struct Attribution {
     pub by: String,
     /// In a few words; some actions require it.
     pub reason: String,
@@ -68,10 +71,10 @@ pub struct Who {
 
 /// An action on a session that adds a record beside it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Deed {
+pub enum SessionAction {
     Fit {
         name: String,
-        how: FitWanted,
+        how: SessionFitRequest,
     },
     Recalibrate {
         name: String,
@@ -89,22 +92,22 @@ pub enum Deed {
     Withdraw {
         name: String,
     },
-    Judge(Verdict),
-    Correct {
+    SetDataQuality(DataQuality),
+    CorrectContact {
         /// Number of the contact, from 1.
         number: u32,
         position: Position,
     },
 }
 
-impl Deed {
+impl SessionAction {
     /// Adds the record of this action to a session.
     pub fn run(
         self,
         session: &Path,
-        who: &Who,
+        who: &Attribution,
         progress: &dyn Progress,
-    ) -> Result<Done, DeedFailure> {
+    ) -> Result<ActionReport, SessionActionError> {
         let (sentence, name, is_edit) = match self {
             Self::Fit { name, how } => {
                 (fit(session, &name, &how, who, progress)?, Some(name), false)
@@ -116,7 +119,7 @@ impl Deed {
             Self::Recalibrate { name, calibration } => {
                 step(progress, 0, 1, "recalculating the forces")?;
                 let found = recalibrate(session, &name, &calibration, who)?;
-                (kept::change(&found.change), Some(name), false)
+                (stored_analysis::describe_force_change(&found.change), Some(name), false)
             }
             Self::Mask { name, left_out_s } => {
                 let masked = mask(session, &name, left_out_s, who, progress)?;
@@ -127,12 +130,12 @@ impl Deed {
                 withdraw(session, &name, who)?;
                 (format!("analysis '{name}' is withdrawn"), None, false)
             }
-            Self::Judge(verdict) => {
-                judge(session, verdict, who)?;
+            Self::SetDataQuality(verdict) => {
+                set_data_quality(session, verdict, who)?;
                 (format!("the session is {verdict}"), None, true)
             }
-            Self::Correct { number, position } => {
-                (correct(session, Some(number), position, who)?.sentence(), None, true)
+            Self::CorrectContact { number, position } => {
+                (correct_contact(session, Some(number), position, who)?.sentence(), None, true)
             }
         };
         let made = name.map(|name| name.trim().to_owned());
@@ -140,16 +143,21 @@ impl Deed {
             Some(name) => format!("kept as '{name}': {sentence}"),
             None => sentence,
         };
-        Ok(Done { sentence, changed: Some(session.to_path_buf()), is_edit, made })
+        Ok(ActionReport {
+            sentence,
+            changed: Some(session.to_path_buf()),
+            is_edit,
+            created_analysis: made,
+        })
     }
 }
 
 fn id_of(session: &Path) -> Result<String, ReadError> {
-    Ok(Summary::read(session)?.manifest.session_id)
+    Ok(SessionSummary::read(session)?.manifest.session_id)
 }
 
 /// Refuses a taken name before hours of work.
-fn check_name(session: &Path, name: &str) -> Result<String, DeedFailure> {
+fn check_name(session: &Path, name: &str) -> Result<String, SessionActionError> {
     let (id, name) = (id_of(session)?, name.trim());
     if Analyses::read(session, &id)?.all.iter().any(|one| one.name == name) {
         let name = name.to_owned();
@@ -162,61 +170,68 @@ fn keep(
     session: &Path,
     id: &str,
     name: &str,
-    inputs: Vec<Input>,
-    what: Analysed,
-    who: &Who,
-) -> Result<Analysis, DeedFailure> {
+    inputs: Vec<AnalysisInput>,
+    what: AnalysisContent,
+    who: &Attribution,
+) -> Result<Analysis, SessionActionError> {
     let analysis = record(name, &who.by, &who.reason, inputs, what);
     add_analysis(session, id, &analysis)?;
     Ok(analysis)
 }
 
-fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(), DeedFailure> {
-    super::step(progress, done, of, what).map_err(|_| DeedFailure::Cancelled)
+fn step(
+    progress: &dyn Progress,
+    done: usize,
+    of: usize,
+    what: &str,
+) -> Result<(), SessionActionError> {
+    super::step(progress, done, of, what).map_err(|_| SessionActionError::Cancelled)
 }
 
 fn fit(
     session: &Path,
     name: &str,
-    how: &FitWanted,
-    who: &Who,
+    how: &SessionFitRequest,
+    who: &Attribution,
     progress: &dyn Progress,
-) -> Result<String, DeedFailure> {
+) -> Result<String, SessionActionError> {
     check_name(session, name)?;
-    let results = how.results(session, progress).map_err(DeedFailure::Fit)?;
-    let fit = KeptFit {
+    let results = how.results(session, progress).map_err(SessionActionError::Fit)?;
+    let fit = FitToStore {
         based_on: how.based_on.as_deref(),
         together_with: &how.together_with,
         settings: how.settings(),
         results,
     };
-    Ok(kept::deed(&keep_fit(session, name, fit, who)?.what))
+    Ok(stored_analysis::describe_analysis(&store_fit(session, name, fit, who)?.what))
 }
 
 #[derive(Clone, Debug)]
-pub struct KeptFit<'a> {
+pub struct FitToStore<'a> {
     /// Analysis through which the session was read.
     pub based_on: Option<&'a str>,
-    pub together_with: &'a [Wanted],
+    pub together_with: &'a [SessionReading],
     pub settings: Value,
     pub results: Value,
 }
 
 /// Stores a fit of a session as an analysis beside it.
-pub fn keep_fit(
+pub fn store_fit(
     session: &Path,
     name: &str,
-    fit: KeptFit<'_>,
-    who: &Who,
-) -> Result<Analysis, DeedFailure> {
-    let opened = analysed::open(session, fit.based_on)?;
+    fit: FitToStore<'_>,
+    who: &Attribution,
+) -> Result<Analysis, SessionActionError> {
+    let opened = analysed_session::open(session, fit.based_on)?;
     let mut inputs = opened.inputs(session, fit.based_on)?;
     for one in fit.together_with {
         let id = id_of(&one.session)?;
-        let theirs = inputs_of(&one.session)?.into_iter();
-        inputs.extend(theirs.map(|file| Input { what: format!("{id}/{}", file.what), ..file }));
+        let theirs = read_session_inputs(&one.session)?.into_iter();
+        inputs.extend(
+            theirs.map(|file| AnalysisInput { what: format!("{id}/{}", file.what), ..file }),
+        );
     }
-    let what = Analysed::Fit {
+    let what = AnalysisContent::Fit {
         based_on: fit.based_on.map(str::to_owned),
         settings: fit.settings,
         results: fit.results,
@@ -237,10 +252,10 @@ pub fn recalibrate(
     session: &Path,
     name: &str,
     calibration: &Calibration,
-    who: &Who,
-) -> Result<RecalibrationResult, DeedFailure> {
+    who: &Attribution,
+) -> Result<RecalibrationResult, SessionActionError> {
     let id = check_name(session, name)?;
-    let (opened, inputs, what, change) = analysed::recalibration(session, calibration)?;
+    let (opened, inputs, what, change) = analysed_session::recalibration(session, calibration)?;
     keep(session, &id, name, inputs, what, who)?;
     let rig = opened.edited.session.manifest.rig;
     Ok(RecalibrationResult { change, rig: rig.map_or_else(String::new, |rig| rig.name) })
@@ -259,14 +274,14 @@ pub fn mask(
     session: &Path,
     name: &str,
     left_out_s: Vec<[f64; 2]>,
-    who: &Who,
+    who: &Attribution,
     progress: &dyn Progress,
-) -> Result<MaskResult, DeedFailure> {
+) -> Result<MaskResult, SessionActionError> {
     let id = check_name(session, name)?;
     step(progress, 0, 1, "applying the mask")?;
-    let mut opened = analysed::open(session, None)?;
+    let mut opened = analysed_session::open(session, None)?;
     let inputs = opened.inputs(session, None)?;
-    let forces = |opened: &analysed::Opened| {
+    let forces = |opened: &analysed_session::AnalysedSession| {
         opened.edited.session.rows.iter().filter(|row| row.force.is_some()).count()
     };
     let of = forces(&opened);
@@ -274,28 +289,32 @@ pub fn mask(
     opened.blank();
     let left_out = of - forces(&opened);
     if left_out == 0 {
-        return Err(DeedFailure::NothingLeftOut);
+        return Err(SessionActionError::NothingLeftOut);
     }
     step(progress, 1, 1, "storing the analysis")?;
-    let what = Analysed::Mask { left_out_s };
+    let what = AnalysisContent::Mask { left_out_s };
     Ok(MaskResult { analysis: keep(session, &id, name, inputs, what, who)?, left_out, of })
 }
 
 /// Withdraws an analysis: its record stays and does not count.
-pub fn withdraw(session: &Path, name: &str, who: &Who) -> Result<Analysis, DeedFailure> {
+pub fn withdraw(
+    session: &Path,
+    name: &str,
+    who: &Attribution,
+) -> Result<Analysis, SessionActionError> {
     let id = id_of(session)?;
-    keep(session, &id, name, Vec::new(), Analysed::Withdrawal, who)
+    keep(session, &id, name, Vec::new(), AnalysisContent::Withdrawal, who)
 }
 
 /// Says what a session is worth; the verdict before, and the edit.
-pub fn judge(
+pub fn set_data_quality(
     session: &Path,
-    verdict: Verdict,
-    who: &Who,
-) -> Result<(Option<Verdict>, Edit), DeedFailure> {
-    let subject = Subject::read(session)?;
+    verdict: DataQuality,
+    who: &Attribution,
+) -> Result<(Option<DataQuality>, Edit), SessionActionError> {
+    let subject = EditTarget::read(session)?;
     let was = subject.edits.verdict().map(|(verdict, _)| verdict);
-    let edit = subject.say(&who.by, &who.reason, Change::Verdict { verdict })?;
+    let edit = subject.add_edit(&who.by, &who.reason, EditChange::Verdict { verdict })?;
     Ok((was, edit))
 }
 
@@ -329,33 +348,33 @@ impl ContactCorrection {
 }
 
 /// Says where contact really was; a session that found one only needs no number.
-pub fn correct(
+pub fn correct_contact(
     session: &Path,
     number: Option<u32>,
     position: Position,
-    who: &Who,
-) -> Result<ContactCorrection, DeedFailure> {
-    let passing = edited::outline(session)?;
+    who: &Attribution,
+) -> Result<ContactCorrection, SessionActionError> {
+    let passing = edited_session::stream_edited(session)?;
     let outline = &passing.outline;
-    let found = edited::contacts(&outline.entries);
+    let found = edited_session::contacts(&outline.entries);
     let number = match (number, found.len()) {
-        (_, 0) => return Err(DeedFailure::NoContact),
+        (_, 0) => return Err(SessionActionError::NoContact),
         (Some(number), _) => number,
         (None, 1) => 1,
-        (None, several) => return Err(DeedFailure::WhichContact(several)),
+        (None, several) => return Err(SessionActionError::WhichContact(several)),
     };
     let index = (number as usize).checked_sub(1);
     let Some(was) = index.and_then(|index| found.get(index)) else {
         let found = found.len();
-        return Err(DeedFailure::NoSuchContact { number, found });
+        return Err(SessionActionError::NoSuchContact { number, found });
     };
     // A session that found a contact has a rig.
     let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel).unwrap_or(Position(0.0));
     if !(0.0..=travel.0).contains(&position.0) {
-        return Err(DeedFailure::OutsideTravel { position, travel });
+        return Err(SessionActionError::OutsideTravel { position, travel });
     }
     let was = was.position;
-    let change = Change::Contact { number, position_mm: position, was_mm: was };
-    let edit = Subject::read(session)?.say(&who.by, &who.reason, change)?;
+    let change = EditChange::Contact { number, position_mm: position, was_mm: was };
+    let edit = EditTarget::read(session)?.add_edit(&who.by, &who.reason, change)?;
     Ok(ContactCorrection { number, position, was, edit })
 }

@@ -1,6 +1,6 @@
 //! What a record says about a session apart from its samples: specimen, probe, place in a series.
 //!
-//! [`KEYS`] is the one list of possible entries. The command line, protocol files that ask before a start
+//! [`METADATA_KEYS`] is the one list of possible entries. The command line, protocol files that ask before a start
 //! and the manifest all use it.
 
 use serde::{Deserialize, Serialize};
@@ -10,7 +10,7 @@ use thiserror::Error;
 
 /// Type and range of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum MetadataKind {
     Text,
     /// A number of the unit, above the limit or, if `is_limit_allowed`, at it.
     Number {
@@ -26,44 +26,48 @@ pub enum Kind {
 
 /// One possible entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Key {
+pub struct MetadataKey {
     /// Its name, the unit at its end.
     pub name: &'static str,
     /// Explanation for the person who is asked.
     pub meaning: &'static str,
     /// Type and range of a value.
-    pub kind: Kind,
+    pub kind: MetadataKind,
 }
 
-const fn text(name: &'static str, meaning: &'static str) -> Key {
-    Key { name, meaning, kind: Kind::Text }
+const fn text(name: &'static str, meaning: &'static str) -> MetadataKey {
+    MetadataKey { name, meaning, kind: MetadataKind::Text }
 }
 
-const fn count(name: &'static str, meaning: &'static str) -> Key {
-    Key { name, meaning, kind: Kind::Count }
+const fn count(name: &'static str, meaning: &'static str) -> MetadataKey {
+    MetadataKey { name, meaning, kind: MetadataKind::Count }
 }
 
-const fn length(name: &'static str, meaning: &'static str) -> Key {
-    Key { name, meaning, kind: Kind::Number { unit: "mm", above: 0.0, is_limit_allowed: false } }
+const fn length(name: &'static str, meaning: &'static str) -> MetadataKey {
+    MetadataKey {
+        name,
+        meaning,
+        kind: MetadataKind::Number { unit: "mm", above: 0.0, is_limit_allowed: false },
+    }
 }
 
 /// Every possible entry, in the order it is shown. The first three are fields of their own in the
 /// manifest.
-pub const KEYS: &[Key] = &[
+pub const METADATA_KEYS: &[MetadataKey] = &[
     text("operator", "who runs it"),
     text("specimen", "what is indented: the specimen's name"),
     text("indenter", "the probe, in words"),
     text("specimen.source", "animal or material, organ, and who supplied it"),
-    Key {
+    MetadataKey {
         name: "specimen.time_since_death_h",
         meaning: "hours from death to the test",
-        kind: Kind::Number { unit: "h", above: 0.0, is_limit_allowed: true },
+        kind: MetadataKind::Number { unit: "h", above: 0.0, is_limit_allowed: true },
     },
     text("specimen.storage", "how and how long it was stored"),
-    Key {
+    MetadataKey {
         name: "specimen.temperature_c",
         meaning: "its temperature in the test, degrees Celsius",
-        kind: Kind::Number {
+        kind: MetadataKind::Number {
             unit: "degrees Celsius",
             // Absolute zero: what is below was not measured.
             above: -273.15,
@@ -85,7 +89,7 @@ pub const KEYS: &[Key] = &[
 
 /// An entry is not possible.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum AboutError {
+pub enum MetadataError {
     #[error("there is no entry '{key}'; choose from {}", names())]
     UnknownKey { key: String },
     /// Not `KEY=VALUE`.
@@ -102,39 +106,40 @@ pub enum AboutError {
 }
 
 fn names() -> String {
-    let names: Vec<&str> = KEYS.iter().map(|key| key.name).collect();
+    let names: Vec<&str> = METADATA_KEYS.iter().map(|key| key.name).collect();
     names.join(", ")
 }
 
 /// The key of a name.
-pub fn key(name: &str) -> Result<&'static Key, AboutError> {
-    KEYS.iter()
+pub fn find_key(name: &str) -> Result<&'static MetadataKey, MetadataError> {
+    METADATA_KEYS
+        .iter()
         .find(|key| key.name == name)
-        .ok_or_else(|| AboutError::UnknownKey { key: name.to_owned() })
+        .ok_or_else(|| MetadataError::UnknownKey { key: name.to_owned() })
 }
 
 /// Key and value of a `KEY=VALUE`, not yet checked.
-pub fn pair_of(pair: &str) -> Result<(&str, &str), AboutError> {
-    pair.split_once('=').ok_or_else(|| AboutError::NotAPair { text: pair.to_owned() })
+pub fn split_pair(pair: &str) -> Result<(&str, &str), MetadataError> {
+    pair.split_once('=').ok_or_else(|| MetadataError::NotAPair { text: pair.to_owned() })
 }
 
-impl Key {
+impl MetadataKey {
     /// The value of a text, or what is wrong with it.
-    pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
+    pub fn parse(&self, value: &str) -> Result<Value, MetadataError> {
         let value = value.trim();
-        let refused = |expected: String| AboutError::Value {
+        let refused = |expected: String| MetadataError::Value {
             key: self.name,
             value: value.to_owned(),
             expected,
         };
         match self.kind {
-            Kind::Text if value.is_empty() => Err(refused("some words".into())),
-            Kind::Text => Ok(value.into()),
-            Kind::Count => match value.parse::<u64>() {
+            MetadataKind::Text if value.is_empty() => Err(refused("some words".into())),
+            MetadataKind::Text => Ok(value.into()),
+            MetadataKind::Count => match value.parse::<u64>() {
                 Ok(count) if count > 0 => Ok(count.into()),
                 _ => Err(refused("a whole number from 1".into())),
             },
-            Kind::Number { unit, above, is_limit_allowed } => match value.parse::<f64>() {
+            MetadataKind::Number { unit, above, is_limit_allowed } => match value.parse::<f64>() {
                 Ok(number)
                     if number.is_finite()
                         && (number > above || is_limit_allowed && number >= above) =>
@@ -153,11 +158,11 @@ impl Key {
 /// Entries by key. Keys of later versions are kept as they are read.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct About {
+pub struct SessionMetadata {
     values: BTreeMap<String, Value>,
 }
 
-impl About {
+impl SessionMetadata {
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -166,12 +171,12 @@ impl About {
         self.values.get(key)
     }
 
-    /// All entries in the order of [`KEYS`], then those that this version does not know. Text without quotes.
+    /// All entries in the order of [`METADATA_KEYS`], then those that this version does not know. Text without quotes.
     pub fn lines(&self) -> Vec<(&str, String)> {
-        let place = |name: &str| KEYS.iter().position(|key| key.name == name);
+        let place = |name: &str| METADATA_KEYS.iter().position(|key| key.name == name);
         let mut entries: Vec<(&str, &Value)> =
             self.values.iter().map(|(k, v)| (k.as_str(), v)).collect();
-        entries.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
+        entries.sort_by_key(|(name, _)| (place(name).unwrap_or(METADATA_KEYS.len()), *name));
         let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         entries.into_iter().map(|(name, value)| (name, plain(value))).collect()
     }
@@ -179,18 +184,18 @@ impl About {
 
 /// Operator, specimen and other labels of a session.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Labels {
+pub struct SessionLabels {
     pub operator: String,
     pub specimen: String,
     pub indenter: String,
-    #[serde(default, skip_serializing_if = "About::is_empty")]
-    pub about: About,
+    #[serde(default, skip_serializing_if = "SessionMetadata::is_empty")]
+    pub about: SessionMetadata,
 }
 
-impl Labels {
+impl SessionLabels {
     /// Sets one entry; an earlier value is replaced.
-    pub fn tell(&mut self, name: &str, value: &str) -> Result<(), AboutError> {
-        let key = key(name.trim())?;
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), MetadataError> {
+        let key = find_key(name.trim())?;
         let value = key.parse(value)?;
         let words = || value.as_str().unwrap_or_default().to_owned();
         match key.name {
@@ -205,13 +210,13 @@ impl Labels {
     }
 
     /// Sets the entry of a `KEY=VALUE`.
-    pub fn tell_pair(&mut self, pair: &str) -> Result<(), AboutError> {
-        let (name, value) = pair_of(pair)?;
-        self.tell(name, value)
+    pub fn set_pair(&mut self, pair: &str) -> Result<(), MetadataError> {
+        let (name, value) = split_pair(pair)?;
+        self.set(name, value)
     }
 
-    /// Whether an entry of [`KEYS`] has a value.
-    pub fn is_told(&self, name: &str) -> bool {
+    /// Whether an entry of [`METADATA_KEYS`] has a value.
+    pub fn is_set(&self, name: &str) -> bool {
         let is_there = |text: &str| !text.trim().is_empty();
         match name {
             "operator" => is_there(&self.operator),
@@ -222,11 +227,11 @@ impl Labels {
     }
 
     /// Refuses entries that contradict each other.
-    pub fn check(&self) -> Result<(), AboutError> {
+    pub fn check(&self) -> Result<(), MetadataError> {
         let count = |name| self.about.get(name).and_then(Value::as_u64);
         match (count("series.repeat"), count("series.repeats")) {
             (Some(repeat), Some(repeats)) if repeat > repeats => {
-                Err(AboutError::Repeat { repeat, repeats })
+                Err(MetadataError::Repeat { repeat, repeats })
             }
             _ => Ok(()),
         }
@@ -239,7 +244,7 @@ mod tests {
 
     #[test]
     fn entries_come_back_in_the_order_of_the_list() {
-        let mut labels = Labels::default();
+        let mut labels = SessionLabels::default();
         for pair in [
             "series.repeat=2",
             "indenter.diameter_mm=12",
@@ -248,10 +253,10 @@ mod tests {
             "specimen.temperature_c=-4.5",
             "specimen.time_since_death_h=0",
         ] {
-            labels.tell_pair(pair).unwrap();
+            labels.set_pair(pair).unwrap();
         }
         assert_eq!(labels.operator, "Ada");
-        assert!(labels.is_told("operator") && !labels.is_told("specimen"));
+        assert!(labels.is_set("operator") && !labels.is_set("specimen"));
         let lines = labels.about.lines();
         let expected = [
             ("specimen.source", "pig stomach = fundus"),
@@ -263,7 +268,7 @@ mod tests {
         let lines: Vec<(&str, &str)> = lines.iter().map(|(k, v)| (*k, v.as_str())).collect();
         assert_eq!(lines, expected);
         let text = serde_json::to_string(&labels).unwrap();
-        assert_eq!(serde_json::from_str::<Labels>(&text).unwrap(), labels);
+        assert_eq!(serde_json::from_str::<SessionLabels>(&text).unwrap(), labels);
     }
 
     #[test]
@@ -279,15 +284,15 @@ mod tests {
             ("series.repeat=1.5", "a whole number from 1"),
             ("operator= ", "some words"),
         ] {
-            let mut labels = Labels::default();
-            let refusal = labels.tell_pair(pair).unwrap_err().to_string();
+            let mut labels = SessionLabels::default();
+            let refusal = labels.set_pair(pair).unwrap_err().to_string();
             assert!(refusal.contains(expected), "{pair}: {refusal}");
-            assert_eq!(labels, Labels::default());
+            assert_eq!(labels, SessionLabels::default());
         }
-        let mut labels = Labels::default();
-        labels.tell_pair("series.repeat=4").unwrap();
+        let mut labels = SessionLabels::default();
+        labels.set_pair("series.repeat=4").unwrap();
         labels.check().unwrap();
-        labels.tell_pair("series.repeats=3").unwrap();
+        labels.set_pair("series.repeats=3").unwrap();
         let refusal = labels.check().unwrap_err().to_string();
         assert!(refusal.contains("repeat 4 of 3"), "{refusal}");
     }

@@ -10,17 +10,17 @@ thread_local! {
 
 /// Catches a panic of `work`. Whoever calls uses nothing any more that `work` may have left half changed.
 ///
-/// While it runs [`is_contained`] tells a panic hook that nothing has to be stopped.
-pub fn contained<T>(work: impl FnOnce() -> T) -> Result<T> {
+/// While it runs [`is_panic_caught`] tells a panic hook that nothing has to be stopped.
+pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T> {
     DEPTH.set(DEPTH.get() + 1);
     let outcome = catch_unwind(AssertUnwindSafe(work));
     DEPTH.set(DEPTH.get() - 1);
     outcome
 }
 
-/// Whether a panic of this thread would be caught by [`contained`].
+/// Whether a panic of this thread would be caught by [`catch_panic`].
 #[must_use]
-pub fn is_contained() -> bool {
+pub fn is_panic_caught() -> bool {
     DEPTH.get() > 0
 }
 
@@ -30,12 +30,12 @@ mod tests {
 
     #[test]
     fn a_contained_panic_is_known_as_one_and_the_next_is_not() {
-        assert!(!is_contained());
-        let (outer, inner) = contained(|| {
-            let inner = contained(|| panic!("on purpose"));
-            (is_contained(), inner.is_err())
+        assert!(!is_panic_caught());
+        let (outer, inner) = catch_panic(|| {
+            let inner = catch_panic(|| panic!("on purpose"));
+            (is_panic_caught(), inner.is_err())
         })
         .unwrap();
-        assert!(outer && inner && !is_contained());
+        assert!(outer && inner && !is_panic_caught());
     }
 }

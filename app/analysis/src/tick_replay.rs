@@ -1,14 +1,14 @@
 //! Replay of the recording of any loop.
 
-use palpate_sessions::ticks::{End, Recorded, Recording, Row};
+use palpate_sessions::ticks::{TickCounts, TickEnd, TickRecording, TickRow};
 use serde::Serialize;
 
 /// What became of a recording when its loop was ended, with a hash of what the loop left; nothing where there was none, or
 /// where the loop failed and cut it off.
-pub type Ended = Option<Result<(Recorded, u64), String>>;
+pub type FinishedRecording = Option<Result<(TickCounts, u64), String>>;
 
 #[must_use]
-pub fn ended_words((recorded, left): (Recorded, u64)) -> String {
+pub fn describe_finished((recorded, left): (TickCounts, u64)) -> String {
     let words = RecordedTicks::from(recorded).words();
     format!("{words}; hash at the end {left:016x}")
 }
@@ -20,8 +20,8 @@ pub struct RecordedTicks {
     pub lost: u64,
 }
 
-impl From<Recorded> for RecordedTicks {
-    fn from(Recorded { ticks, lost }: Recorded) -> Self {
+impl From<TickCounts> for RecordedTicks {
+    fn from(TickCounts { ticks, lost_ticks: lost }: TickCounts) -> Self {
         Self { ticks, lost }
     }
 }
@@ -40,7 +40,7 @@ impl RecordedTicks {
 
 /// Result of a replay.
 #[derive(Clone, Debug, Serialize)]
-pub struct Replayed {
+pub struct ReplayResult {
     pub name: String,
     pub ticks: u64,
     /// Whether every computed number has the recorded bits.
@@ -63,7 +63,7 @@ pub struct ReplayDifference {
     pub computed: String,
 }
 
-impl Replayed {
+impl ReplayResult {
     pub fn words(&self) -> String {
         let how = match (self.is_identical, self.is_whole) {
             (true, true) => "every number bit for bit as recorded",
@@ -104,7 +104,7 @@ impl Replayed {
 /// A loop that can be replayed.
 pub trait Replayable<const W: usize, const R: usize> {
     /// The tick of the recorded inputs of `row`.
-    fn tick(&mut self, row: &Row<W, R>) -> Row<W, R>;
+    fn tick(&mut self, row: &TickRow<W, R>) -> TickRow<W, R>;
 
     /// Hash of the state.
     fn state_hash(&self) -> u64;
@@ -113,18 +113,18 @@ pub trait Replayable<const W: usize, const R: usize> {
 /// Computes every tick of a recording again, to the first that differs. `is_going` hears the share done and ends it early.
 pub fn replay_ticks<const W: usize, const R: usize>(
     name: &str,
-    found: &Recording<W, R>,
+    found: &TickRecording<W, R>,
     (whole, real): ([&'static str; W], [&'static str; R]),
     replay: &mut impl Replayable<W, R>,
     is_going: &mut dyn FnMut(f64) -> bool,
-) -> Result<Replayed, String> {
+) -> Result<ReplayResult, String> {
     let mut first = None;
     let mut ticks = 0;
     for (index, row) in found.rows.iter().enumerate() {
         let computed = replay.tick(row);
         ticks = row.whole[0];
-        if let Some(column) = row.differs(&computed) {
-            let text = |row: &Row<W, R>| match column.checked_sub(W) {
+        if let Some(column) = row.first_difference(&computed) {
+            let text = |row: &TickRow<W, R>| match column.checked_sub(W) {
                 None => row.whole[column].to_string(),
                 Some(real) => format!("{:?}", row.real[real]),
             };
@@ -142,8 +142,8 @@ pub fn replay_ticks<const W: usize, const R: usize>(
     }
     let hash = replay.state_hash();
     let (is_whole, lost) = match found.end {
-        End::CutOff => (false, 0),
-        End::Whole { lost, left } => {
+        TickEnd::CutOff => (false, 0),
+        TickEnd::Whole { lost_ticks, state_hash: left } => {
             if first.is_none() && left != hash {
                 first = Some(ReplayDifference {
                     tick: ticks,
@@ -152,10 +152,10 @@ pub fn replay_ticks<const W: usize, const R: usize>(
                     computed: format!("{hash:016x}"),
                 });
             }
-            (true, lost)
+            (true, lost_ticks)
         }
     };
-    Ok(Replayed {
+    Ok(ReplayResult {
         name: name.to_owned(),
         ticks,
         is_identical: first.is_none(),

@@ -4,30 +4,30 @@ mod actions;
 mod fits;
 
 pub use actions::{
-    ContactCorrection, Deed, DeedFailure, KeptFit, MaskResult, RecalibrationResult, Who, correct,
-    judge, keep_fit, mask, recalibrate, withdraw,
+    Attribution, ContactCorrection, FitToStore, MaskResult, RecalibrationResult, SessionAction,
+    SessionActionError, correct_contact, mask, recalibrate, set_data_quality, store_fit, withdraw,
 };
-pub use fits::{FitSettings, FitWanted, own};
+pub use fits::{FitSettings, SessionFitRequest, fit_without_analysis};
 
-use crate::edited;
+use crate::edited_session;
 use crate::progress::Progress;
-use crate::report::dossier::{self, Ending, Figure, Wanted};
-use crate::report::figures::{Align, Window};
+use crate::report::dossier::{self, FigureFormat, SessionFigure, SessionReading};
+use crate::report::figures::{TimeAlignment, TimeWindow};
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
 use palpate_runner::wall_now;
-use palpate_sessions::{Analyses, Shelf, Verdict, contacts};
+use palpate_sessions::{Analyses, CalibrationStore, DataQuality, contacts};
 use std::path::{Path, PathBuf};
 
 /// State of a session before an action on it.
 #[derive(Clone, Debug)]
-pub struct Known {
+pub struct SessionActionContext {
     pub session: PathBuf,
     pub session_id: String,
     /// Analyses, including withdrawn ones.
     pub analyses: Analyses,
     /// Data quality, its author and reason.
-    pub verdict: Option<(Verdict, String, String)>,
+    pub verdict: Option<(DataQuality, String, String)>,
     /// The contacts it found, corrected ones as they are now, from home.
     pub contacts: Vec<Position>,
     /// Calibrations of the library by name, and ids of those of one name.
@@ -35,15 +35,15 @@ pub struct Known {
 }
 
 /// Reads what is known of a session, and which calibrations there are.
-pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
-    let passing = edited::outline(session).map_err(|err| err.to_string())?;
+pub fn read(session: &Path, library: Option<&Path>) -> Result<SessionActionContext, String> {
+    let passing = edited_session::stream_edited(session).map_err(|err| err.to_string())?;
     let id = passing.outline.manifest.session_id;
     let analyses = Analyses::read(session, &id).map_err(|err| err.to_string())?;
-    let shelf = library.map(Shelf::open);
-    let stored = shelf.iter().flat_map(|shelf| &shelf.kept);
+    let shelf = library.map(CalibrationStore::open);
+    let stored = shelf.iter().flat_map(|shelf| &shelf.documents);
     let found = contacts::contacts(&passing.outline.entries);
     let verdict = passing.edits.verdict();
-    Ok(Known {
+    Ok(SessionActionContext {
         session: session.to_path_buf(),
         session_id: id,
         analyses,
@@ -54,42 +54,46 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Done {
+pub struct ActionReport {
     pub sentence: String,
     /// Session that got a new record.
     pub changed: Option<PathBuf>,
     /// Whether that was an edit, so that all who show the session read it again.
     pub is_edit: bool,
-    pub made: Option<String>,
+    pub created_analysis: Option<String>,
 }
 
 /// Reports progress; an error if the work is cancelled.
 fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(), String> {
-    match progress.tell(done, of, what).is_break() {
+    match progress.report(done, of, what).is_break() {
         true => Err("cancelled; nothing was kept".to_owned()),
         false => Ok(()),
     }
 }
 
 #[derive(Clone, Debug, PartialEq)]
-pub enum Paper {
-    Page(Vec<Wanted>),
-    Figure(Wanted, Figure, Window),
+pub enum SessionDocument {
+    Page(Vec<SessionReading>),
+    Figure(SessionReading, SessionFigure, TimeWindow),
 }
 
 /// Writes a page or figure as a new file.
-pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, String> {
+pub fn write_document(
+    paper: &SessionDocument,
+    to: &Path,
+    progress: &dyn Progress,
+) -> Result<ActionReport, String> {
     if to.exists() {
         return Err(format!("{} exists already; choose another name", to.display()));
     }
     let bytes = match paper {
-        Paper::Page(wanted) => {
-            let made = dossier::made(wall_now().into());
-            let page = dossier::write(wanted, Align::default(), &made, progress);
+        SessionDocument::Page(wanted) => {
+            let made = dossier::creation_line(wall_now().into());
+            let page = dossier::write(wanted, TimeAlignment::default(), &made, progress);
             page.map_err(|err| err.to_string())?.into_bytes()
         }
-        Paper::Figure(wanted, figure, window) => {
-            let ending = Ending::of(to)?;
+        SessionDocument::Figure(wanted, figure, window) => {
+            let ending = FigureFormat::of(to)?;
             step(progress, 0, 1, "drawing")?;
             let drawing =
                 dossier::figure(wanted, *figure, *window).map_err(|err| err.to_string())?;
@@ -97,7 +101,7 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
         }
     };
     write_new(to, &bytes)?;
-    Ok(Done { sentence: format!("written: {}", to.display()), ..Done::default() })
+    Ok(ActionReport { sentence: format!("written: {}", to.display()), ..ActionReport::default() })
 }
 
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {

@@ -2,28 +2,30 @@
 
 use crate::progress::Progress;
 use palpate_runner::Stopwatch;
-use palpate_sessions::catalog::{Catalog, CatalogError, Changes, Choices, Entry, Event, Query};
+use palpate_sessions::catalog::{
+    Catalog, CatalogChanges, CatalogChoices, CatalogEntry, CatalogError, CatalogQuery, HistoryEvent,
+};
 use palpate_sessions::edits::{Edit, Edits};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 #[derive(Clone, Debug)]
-pub struct Search {
+pub struct CatalogSearch {
     pub library: PathBuf,
-    pub query: Query,
+    pub query: CatalogQuery,
     /// Number of sessions, from the first, whose entries are returned as well.
     pub page: usize,
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Found {
+pub struct CatalogSearchResult {
     /// Folders of all sessions found, below the library, in order.
     pub folders: Vec<String>,
     /// Entries of the first of them.
-    pub first: Vec<Entry>,
+    pub first: Vec<CatalogEntry>,
     /// Values by which sessions can be chosen.
-    pub choices: Choices,
+    pub choices: CatalogChoices,
     /// Conditions that can never be met, where nothing is found.
     pub doubts: Vec<String>,
     /// Remarks on the catalog's file.
@@ -49,40 +51,44 @@ fn with<T>(
 }
 
 /// Searches what the catalog knows already: see [`update`].
-pub fn search(search: &Search) -> Result<Found, String> {
+pub fn search(search: &CatalogSearch) -> Result<CatalogSearchResult, String> {
     let watch = Stopwatch::start();
     let mut remarks = Vec::new();
     let mut found = with(&search.library, &mut remarks, |catalog| {
         let folders = catalog.folders(&search.query)?;
         let first = &folders[..folders.len().min(search.page)];
         let is_empty = folders.is_empty();
-        Ok(Found {
+        Ok(CatalogSearchResult {
             first: catalog.entries(first)?,
             choices: catalog.choices()?,
-            doubts: if is_empty { catalog.doubts(&search.query.conditions)? } else { Vec::new() },
+            doubts: if is_empty {
+                catalog.condition_warnings(&search.query.conditions)?
+            } else {
+                Vec::new()
+            },
             folders,
-            ..Found::default()
+            ..CatalogSearchResult::default()
         })
     })?;
     (found.remarks, found.seconds) = (remarks, watch.seconds());
     Ok(found)
 }
 
-pub fn entries((library, folders): &(PathBuf, Vec<String>)) -> Result<Vec<Entry>, String> {
+pub fn entries((library, folders): &(PathBuf, Vec<String>)) -> Result<Vec<CatalogEntry>, String> {
     with(library, &mut Vec::new(), |catalog| catalog.entries(folders))
 }
 
 /// Reads the sessions that are new or have changed.
-pub fn update(library: &Path, progress: &dyn Progress) -> Result<Changes, String> {
+pub fn update(library: &Path, progress: &dyn Progress) -> Result<CatalogChanges, String> {
     let mut remarks = Vec::new();
     let done = Catalog::with(library, |catalog| {
         remarks.append(&mut catalog.remarks);
         if catalog.is_in_memory() {
             // No other process sees an index in memory: every search builds its own.
-            return Ok(Changes::default());
+            return Ok(CatalogChanges::default());
         }
         catalog.update_while(&mut |done, of| -> ControlFlow<()> {
-            progress.tell(done, of, "reading sessions")
+            progress.report(done, of, "reading sessions")
         })
     });
     let mut changes = done.map_err(|err| err.to_string())?;
@@ -102,20 +108,22 @@ pub fn session_folders(
 
 /// Edits and analyses of a session.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Told {
+pub struct SessionHistory {
     /// Notes, in the order made.
     pub notes: Vec<Edit>,
     /// Edits and analyses, oldest first.
-    pub events: Vec<Event>,
+    pub events: Vec<HistoryEvent>,
 }
 
-pub fn told((library, entry): &(PathBuf, Entry)) -> Result<Told, String> {
+pub fn read_session_history(
+    (library, entry): &(PathBuf, CatalogEntry),
+) -> Result<SessionHistory, String> {
     let folder = library.join(&entry.folder);
     let edits = Edits::read(&folder, &entry.session_id).map_err(|err| err.to_string())?;
-    let edited = edits.all.iter().map(|edit| Event::said("", edit));
-    let analysed = entry.analyses.iter().map(|one| Event::made("", one));
-    let mut events: Vec<Event> = edited.chain(analysed).collect();
+    let edited = edits.all.iter().map(|edit| HistoryEvent::from_edit("", edit));
+    let analysed = entry.analyses.iter().map(|one| HistoryEvent::from_analysis("", one));
+    let mut events: Vec<HistoryEvent> = edited.chain(analysed).collect();
     // Times of one form sort as they are written.
     events.sort_by(|a, b| a.at.cmp(&b.at));
-    Ok(Told { notes: edits.notes().cloned().collect(), events })
+    Ok(SessionHistory { notes: edits.notes().cloned().collect(), events })
 }

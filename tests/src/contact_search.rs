@@ -8,7 +8,8 @@ use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_protocols::engine::{
-    Config, Contact, Effect, Input, Operator, Outcome, Record, State, step,
+    ContactPosition, Effect, EngineConfig, EngineInput, EngineState, Operator, Record, RunOutcome,
+    step,
 };
 use palpate_protocols::plans::{FindContact, Plan};
 use std::sync::Arc;
@@ -17,9 +18,9 @@ use std::sync::Arc;
 const CRUISING: f64 = 1e-9;
 
 /// A search that has ended.
-pub struct Searched {
-    pub outcome: Outcome,
-    pub contact: Option<Contact>,
+pub struct ContactSearchResult {
+    pub outcome: RunOutcome,
+    pub contact: Option<ContactPosition>,
     /// True surface on the scale of the pulse counter, in mm.
     pub surface_mm: f64,
     pub body: ModifiedKelvin,
@@ -39,10 +40,14 @@ pub struct Searched {
 /// # Panics
 /// If it takes over an hour of session time.
 #[must_use]
-pub fn search(settings: SimSettings, plan: FindContact, by_hand: Option<HandAction>) -> Searched {
+pub fn search(
+    settings: SimSettings,
+    plan: FindContact,
+    by_hand: Option<HandAction>,
+) -> ContactSearchResult {
     let mut rig = SimRig::new(settings);
     if let Some(action) = by_hand {
-        rig.by_hand(action);
+        rig.apply_hand_action(action);
     }
     search_on(rig, plan, |_, _| {})
 }
@@ -55,23 +60,23 @@ pub fn search(settings: SimSettings, plan: FindContact, by_hand: Option<HandActi
 pub fn search_on(
     mut rig: SimRig,
     plan: FindContact,
-    mut happens: impl FnMut(&mut SimRig, &State),
-) -> Searched {
+    mut happens: impl FnMut(&mut SimRig, &EngineState),
+) -> ContactSearchResult {
     let steps = crate::lab::set_up(Seconds(4.0), plan);
-    let config = Config {
+    let config = EngineConfig {
         rig: rig.description().clone(),
         limits: Limits::for_travel(rig.description().travel),
         curve: rig.calibration().curve().expect("a sound calibration"),
         plan: Plan::of("search", 1, steps),
         is_homed: false,
     };
-    let mut state = State::new(Arc::new(config));
+    let mut state = EngineState::new(Arc::new(config));
     let mut records = Vec::new();
     let mut filter = MovingMean::new(50);
     let (mut force_true_max, mut force_filtered_max) = (0.0f64, 0.0f64);
     let (mut pass, mut begun) = ([f64::INFINITY, f64::NEG_INFINITY], None);
     let choice = Operator::Start;
-    let mut next = (Nanos::ZERO, Input::Operator { choice });
+    let mut next = (Nanos::ZERO, EngineInput::Operator { choice });
     let end = Nanos::from_seconds(Seconds(3600.0));
     while state.outcome().is_none() && state.holding().is_none() {
         let now = next.0;
@@ -80,7 +85,7 @@ pub fn search_on(
         for effect in effects {
             match effect {
                 Effect::Command(command) => rig.send(command),
-                Effect::ByHand(action) => rig.by_hand(action),
+                Effect::ByHand(action) => rig.apply_hand_action(action),
                 Effect::Record(record) => records.push(record),
                 Effect::Finished(_) => {}
             }
@@ -105,16 +110,16 @@ pub fn search_on(
                     let filtered = filter.push(force.0);
                     force_filtered_max = force_filtered_max.max(filtered);
                 }
-                Input::Reading(reading)
+                EngineInput::Reading(reading)
             }
-            RigEventBody::Ack(ack) => Input::Ack(ack),
-            RigEventBody::Fault(fault) => Input::Fault(fault),
+            RigEventBody::Ack(ack) => EngineInput::Ack(ack),
+            RigEventBody::Fault(fault) => EngineInput::Fault(fault),
         };
         next = (event.at, input);
     }
     let truth = rig.truth();
     let ended = state.outcome().or(state.holding());
-    Searched {
+    ContactSearchResult {
         outcome: ended.cloned().expect("the search has ended"),
         contact: state.contact(),
         surface_mm: truth.surface_counted().0,

@@ -1,12 +1,13 @@
 //! A ramp and hold through the runner, as a session read back from disk.
 
 use palpate_drivers::Rig;
-use palpate_model::about::Labels;
 use palpate_model::calibration::Calibration;
+use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::{Plan, RampHold};
 use palpate_runner::{
-    AfterStop, Answers, Leader, Request, RunRequest, Runner, StartError, TimeScale,
+    AfterStop, PromptResponder, RunRequest, Runner, RunnerRequest, SharedLeadSource, StartError,
+    TimeScale,
 };
 use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;
@@ -18,8 +19,8 @@ use std::sync::mpsc::{Receiver, sync_channel};
 /// # Panics
 /// If the run is not started or says nothing for minutes.
 #[must_use]
-pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
-    of_plan(rig, calibration, params.plan())
+pub fn record_ramp_hold(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
+    record_plan(rig, calibration, params.plan())
 }
 
 /// The same for any plan.
@@ -27,8 +28,8 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
 /// # Panics
 /// If the run is not started or says nothing for minutes.
 #[must_use]
-pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
-    of_any_plan(rig, calibration, plan).expect("a start")
+pub fn record_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
+    try_record_plan(rig, calibration, plan).expect("a start")
 }
 
 /// The same for a plan that may be refused.
@@ -38,7 +39,7 @@ pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Sessi
 ///
 /// # Panics
 /// If the run says nothing for minutes.
-pub fn of_any_plan(
+pub fn try_record_plan(
     rig: Box<dyn Rig>,
     calibration: Calibration,
     plan: Plan,
@@ -46,7 +47,7 @@ pub fn of_any_plan(
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
     let started = ask(rig, calibration, plan, TimeScale::Max, &out, None)?;
-    to_its_end(started);
+    wait_for_end(started);
     Ok(Session::open(&out).expect("the session"))
 }
 
@@ -54,7 +55,7 @@ pub fn of_any_plan(
 ///
 /// # Panics
 /// If the run says nothing for minutes.
-pub fn to_its_end((runner, woken): (Runner, Receiver<()>)) {
+pub fn wait_for_end((runner, woken): (Runner, Receiver<()>)) {
     let has_ended = || {
         let snapshot = runner.snapshot();
         let run = snapshot.run.as_ref();
@@ -85,17 +86,17 @@ pub fn start(
 /// # Panics
 /// If the run is not started or says nothing for minutes.
 #[must_use]
-pub fn of_led_plan(
+pub fn record_led_plan(
     rig: Box<dyn Rig>,
     calibration: Calibration,
     plan: Plan,
     scale: TimeScale,
-    leader: Leader,
+    leader: SharedLeadSource,
 ) -> Session {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
     let started = ask(rig, calibration, plan, scale, &out, Some(leader)).expect("a start");
-    to_its_end(started);
+    wait_for_end(started);
     Session::open(&out).expect("the session")
 }
 
@@ -105,23 +106,23 @@ fn ask(
     plan: Plan,
     scale: TimeScale,
     out: &Path,
-    leader: Option<Leader>,
+    leader: Option<SharedLeadSource>,
 ) -> Result<(Runner, Receiver<()>), StartError> {
     let request = RunRequest {
         plan,
         calibration,
         limits: Limits::for_travel(rig.description().travel),
         out: Some(out.to_owned()),
-        labels: Labels::default(),
+        labels: SessionLabels::default(),
         is_acknowledged: false,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
-        answers: Answers::Confirm,
+        answers: PromptResponder::Confirm,
         leader,
     };
     let (reply, answer) = sync_channel(1);
     let (wake, woken) = sync_channel(1);
-    let first = Request::Run(Box::new(request), reply);
+    let first = RunnerRequest::Run(Box::new(request), reply);
     let runner = Runner::start(rig, scale, Some(first), move || {
         let _ = wake.try_send(());
     })
