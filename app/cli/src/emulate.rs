@@ -12,7 +12,7 @@ use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
 use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
-use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
+use palpate_emulators::serve::{EmulatorAddress, ServeError, ServeEvent, ServeOptions, serve};
 use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
 use std::net::SocketAddr;
@@ -276,5 +276,8 @@ fn emulate(
         }
         ServeEvent::Refused(sentence) => output.note(&sentence),
     };
-    serve(device, &options, &orders, &stop, &mut notify).map_err(Failure::failed)
+    serve(device, &options, &orders, &stop, &mut notify).map_err(|err| match err {
+        ServeError::Open { .. } => Failure::failed(format!("{err} with --pty or --tcp")),
+        err => Failure::failed(err),
+    })
 }

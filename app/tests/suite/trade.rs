@@ -80,7 +80,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     }
     let check = palpate(at, &["trade", "--check"]);
     succeeded(&check);
-    assert!(stderr(&check).contains("found again"));
+    assert!(stderr(&check).contains("every stored error was reproduced"));
 
     // A curve that was perturbed together with its checksum is found by computing it again.
     let file = stored(at);

@@ -186,7 +186,7 @@ fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Re
     })?;
     if let Err((file, err)) = remember(report, source) {
         output.note(&format!(
-            "this fit cannot be stored for 'palpate plan': {err}, {}",
+            "this fit will not be remembered for 'palpate plan': {err}, {}",
             file.display()
         ));
     }
