@@ -109,7 +109,7 @@ fn a_library_that_may_not_be_written_is_searched() {
         PALPATE_HOME=$PWD/mounted/library exec "$0" find --json"#;
     let output = in_own_namespace(at, script);
     assert_eq!(answer(&output)["count"], 1);
-    assert_says(&output, "written");
+    assert_says(&output, "not writable");
 }
 
 #[test]

@@ -96,7 +96,7 @@ fn several_sessions_are_recovered_one_after_the_other() {
     let all = palpate(at, &["recover", "first", "whole", "nowhere", "last"]);
     assert_eq!(all.status.code(), Some(2), "{}", stderr(&all));
     let text = stdout(&all);
-    for part in ["first.recovered", "last.recovered", "whole is whole", "nowhere"] {
+    for part in ["first.recovered", "last.recovered", "whole is complete", "nowhere"] {
         assert!(text.contains(part), "{part} in {text}");
     }
     assert_says(&all, "2 of 4");

@@ -98,7 +98,7 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     };
     check(&["import", "good.csv", "bad.csv", "--into", "in"], "decimal sign");
     check(&["import", "good.csv", "good.csv", "--into", "in"], "made twice");
-    check(&["import", "good.csv", "--unit", "force=stone"], "known are N, mN");
+    check(&["import", "good.csv", "--unit", "force=stone"], "give one of N, mN");
     check(&["import", "good.csv", "--column", "colour=x"], "time, depth, force, signal");
     check(&["import", "."], "not a file");
     succeeded(&palpate(at, &["import", "good.csv", "--into", "in"]));
