@@ -22,7 +22,7 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
     of_plan(rig, calibration, params.plan())
 }
 
-/// The same for any plan.
+/// Runs any plan.
 ///
 /// # Panics
 /// If the run is not started or says nothing for minutes.
@@ -31,7 +31,7 @@ pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Sessi
     of_any_plan(rig, calibration, plan).expect("a start")
 }
 
-/// The same for a plan that may be refused.
+/// Runs a plan that may be refused.
 ///
 /// # Errors
 /// Why it is refused.

@@ -59,7 +59,7 @@ pub fn read(
     let shelf = Shelf::open(library);
     let entry = Entry::built_in(&own);
     let mut shown = vec![Shown {
-        // What comes with the rig needs no date.
+        // The calibration that comes with the rig needs no date.
         doubts: Vec::new(),
         ..Shown::of(entry, own, &rig)
     }];

@@ -142,7 +142,7 @@ impl Corrections {
         Self { choice: CorrectionChoice::Raw, shelf: library.map(Shelf::open).unwrap_or_default() }
     }
 
-    /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
+    /// By name: [`LAST`] for the one in force for each record's rig, a file, or an identifier of the library.
     pub fn named(name: &str, library: Option<&Path>) -> Result<Self, CorrectionError> {
         let shelf = library.map(Shelf::open).unwrap_or_default();
         let path = Path::new(name);

@@ -125,7 +125,7 @@ impl Replayable<3, 10> for LedScene {
     }
 }
 
-/// What became of the recording of a scene that was ended, if it has one.
+/// The finished recording of a scene, if it has one.
 #[must_use]
 pub fn recorded(end: SceneEnd) -> Ended {
     let hash = end.scene.hash();

@@ -31,7 +31,7 @@ pub struct Together {
     pub overlays: Vec<Overlay>,
     /// Intervals of each recording, as far as they were asked for.
     pub intervals: Vec<Intervals>,
-    /// What calibrations and compliances add, for each recording.
+    /// Systematic uncertainty of each recording.
     pub systematic: Option<Vec<Systematic>>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,

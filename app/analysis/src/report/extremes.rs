@@ -102,7 +102,7 @@ Written by `palpate extremes --page docs/guide/extremes.md`; do not edit.
 
 const INTRODUCTION: &str = include_str!("extremes.md");
 
-/// What became of several rows in one short cell: the worst error, or the worst verdict.
+/// Several rows in one short cell: the worst error, or the worst verdict.
 fn cell(rows: &[&Row]) -> String {
     let worst = rows.iter().max_by(|a, b| {
         let error = |row: &Row| row.relative_error.unwrap_or_default();
@@ -173,7 +173,7 @@ fn by_case(rows: &[&Row]) -> String {
     table
 }
 
-/// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
+/// Subjects by verdict: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&Row]) -> String {
     let mut named: [(Verdict, Vec<&str>); 4] = Verdict::ALL.map(|verdict| {
         let own = rows.iter().filter(|row| row.verdict == verdict);

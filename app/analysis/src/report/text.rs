@@ -84,7 +84,7 @@ pub fn energy(overlay: &Overlay) -> String {
     )
 }
 
-/// What the family of a report is, as an equation; none of an unknown one.
+/// Equation of the model family; `None` of an unknown one.
 pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
     Some(by_key(&report.body.family).ok()?.equation())
 }
