@@ -52,7 +52,7 @@ pub fn search(
     search_on(rig, plan, |_, _| {})
 }
 
-/// The same on a rig that something may happen to at any sample: `happens` sees the engine's state.
+/// A search on a rig that `happens` may change at any sample; it sees the engine's state.
 ///
 /// # Panics
 /// If it takes over an hour of session time.

@@ -34,7 +34,7 @@ pub fn screen_of<T: Screen>(window: &TestWindow) -> &T {
     window.state().screen().unwrap()
 }
 
-/// Where the exact fit of the run on the screen stands.
+/// State of the exact fit of the run on the screen.
 #[must_use]
 pub fn refit(window: &TestWindow) -> Refit<'_> {
     let run = window.state().snapshot().run.as_ref();
@@ -47,7 +47,7 @@ pub const FRAME: Duration = Duration::from_millis(5);
 /// A window on a simulated rig, driven by accessible name.
 pub struct WindowFlow {
     pub window: TestWindow,
-    /// Where its sessions go.
+    /// Folder of its sessions.
     pub folder: TempDir,
 }
 
@@ -58,7 +58,7 @@ impl WindowFlow {
         Self::open_in(tempfile::tempdir().unwrap(), scale)
     }
 
-    /// The same with a folder for sessions that may hold some.
+    /// With a folder that may hold sessions.
     #[must_use]
     pub fn open_in(folder: TempDir, scale: TimeScale) -> Self {
         let settings = SimSettings { seed: 7, ..SimSettings::default() };
@@ -96,7 +96,7 @@ impl WindowFlow {
         self.window.run_steps(2);
     }
 
-    /// What happened so far, for a failure's message.
+    /// Events so far, for a failure's message.
     fn story(&self) -> String {
         let lines = self.run().map_or(Vec::new(), |run| {
             let text = |line: &LogLine| format!("{} {}", line.at, line.text);

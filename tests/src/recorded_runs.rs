@@ -23,7 +23,7 @@ pub fn record_ramp_hold(rig: Box<dyn Rig>, calibration: Calibration, params: Ram
     record_plan(rig, calibration, params.plan())
 }
 
-/// The same for any plan.
+/// Runs any plan.
 ///
 /// # Panics
 /// If the run is not started or says nothing for minutes.
@@ -32,7 +32,7 @@ pub fn record_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> S
     try_record_plan(rig, calibration, plan).expect("a start")
 }
 
-/// The same for a plan that may be refused.
+/// Runs a plan that may be refused.
 ///
 /// # Errors
 /// Why it is refused.

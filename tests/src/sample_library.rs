@@ -14,7 +14,7 @@ use std::time::Duration;
 /// Samples of each session.
 pub const SAMPLES: usize = 2000;
 
-/// Who measured them, in turn.
+/// Operators, in turn.
 pub const OPERATORS: [&str; 4] = ["Ada", "Grace", "Mary", "Emmy"];
 
 /// A log in memory: nothing is synchronised, for nothing here is worth it.

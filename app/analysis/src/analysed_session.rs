@@ -119,7 +119,7 @@ impl AnalysedSession {
         }
     }
 
-    /// What an analysis made now goes by: the session's files, its calibration, and what it is based on.
+    /// Inputs of an analysis made now: the session's files, its calibration, and the analysis it is based on.
     pub fn inputs(
         &self,
         path: &Path,
@@ -148,7 +148,7 @@ pub(super) fn time_between(session: &Session, first: &SampleRow, row: &SampleRow
     session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
 
-/// What recalculates forces: a curve, and the tares found, each after so many samples.
+/// Recalculates forces: a curve, and the tares, each with the number of samples before it.
 #[derive(Clone, Debug)]
 struct Recalibration {
     curve: CalibrationCurve,
@@ -259,7 +259,7 @@ impl StreamedAnalysis {
     }
 }
 
-/// What a new recalibration of a session is: its record, and what it does to the forces.
+/// A new recalibration of a session: its record and its effect on the forces.
 pub fn recalibration(
     path: &Path,
     calibration: &Calibration,
@@ -268,7 +268,7 @@ pub fn recalibration(
     if let Some(imported) = &opened.edited.session.manifest.imported {
         return Err(SourceError::NoSignal { file: imported.file.clone() });
     }
-    // That the session's own can be read tells that its forces came from one.
+    // A readable calibration of its own shows that the session's forces came from one.
     calibration_of(&opened.edited.session)?;
     let change = recalibrate(&mut opened.edited.session, calibration)?;
     // The calibration that went in is the new one.

@@ -59,7 +59,7 @@ pub fn read(
     let shelf = CalibrationStore::open(library);
     let entry = CalibrationEntry::built_in(&own);
     let mut shown = vec![CalibrationView {
-        // What comes with the rig needs no date.
+        // The calibration that comes with the rig needs no date.
         doubts: Vec::new(),
         ..CalibrationView::of(entry, own, &rig)
     }];

@@ -145,7 +145,7 @@ impl ComplianceCorrections {
         }
     }
 
-    /// What a user names: [`LATEST_COMPLIANCE`] for the one in force for each record's rig, a file, or an id of the library.
+    /// By name: [`LATEST_COMPLIANCE`] for the one in force for each record's rig, a file, or an identifier of the library.
     pub fn named(name: &str, library: Option<&Path>) -> Result<Self, ComplianceCorrectionError> {
         let shelf = library.map(ComplianceStore::open).unwrap_or_default();
         let path = Path::new(name);

@@ -20,7 +20,7 @@ use std::path::Path;
 pub struct CycleSource {
     /// Every sample with known force and depth, in order of time. Depths count from the first contact found.
     pub samples: Vec<CycleSample>,
-    /// How far, for each sample, the contact its cycle began from is from the first one; empty for a table.
+    /// For each sample, the distance of its cycle's contact point from the first one; empty for a table.
     pub contact_offsets: Vec<Depth>,
     /// The least step of the depth; `None` where the source does not name it.
     pub pulse: Option<Depth>,
@@ -59,7 +59,7 @@ fn of_table(table: &MeasurementTable, mut notes: Vec<String>) -> CycleSource {
     }
 }
 
-/// What an analysis takes of a session. Forces at an end of the converter's range, and all after an interlock, are left out.
+/// Samples of a session for a cycle analysis. Forces at an end of the converter's range, and all after an interlock, are left out.
 pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     if session.manifest.imported.is_some() {
         let table = table_of_imported(session);
@@ -78,7 +78,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
         ..CycleSource::default()
     };
     let mut left_out = 0usize;
-    // Where each row went, to find the rows of a sine again.
+    // The sample index of each row, to find the rows of a sine.
     let mut places = Vec::with_capacity(session.rows.len());
     for (index, row) in session.rows.iter().enumerate() {
         places.push(source.samples.len());
@@ -133,7 +133,7 @@ fn contacts(decisions: &[(u64, Effect)]) -> Vec<(u64, Position)> {
     found.collect()
 }
 
-/// How far the contact that held at a sample was from the first one.
+/// Distance of the contact point in force at a sample from the first one.
 fn offset_at(contacts: &[(u64, Position)], index: usize) -> Depth {
     let before = contacts.partition_point(|(after, _)| *after <= index as u64);
     match (contacts.first(), before.checked_sub(1)) {

@@ -62,7 +62,7 @@ pub fn past_checks(
     Ok(past)
 }
 
-/// What a session measured of zero and weight, as far as it can be read.
+/// Deviations of zero and weight in a session, as far as it can be read.
 fn deviations(session: &Path) -> [Option<DailyCheckDeviation>; 2] {
     let read = || -> Option<_> {
         let session = Session::open(session).ok()?;
@@ -107,7 +107,7 @@ fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
     readings.all().iter().map(pair).collect()
 }
 
-/// How far a force is from what it should be, and how far it may be, both in N.
+/// Deviation of a force and its limit, both in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DailyCheckDeviation {
     /// Measured less expected.
@@ -206,7 +206,7 @@ pub fn needs_daily_check(plan: &Plan) -> bool {
 }
 
 impl DailyCheckGate {
-    /// What to tell before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
+    /// The gate before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
     pub fn of(
         plan: &Plan,

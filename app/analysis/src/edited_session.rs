@@ -39,7 +39,7 @@ pub fn open(path: &Path) -> Result<EditedSession, SourceError> {
     Ok(EditedSession { session, edits })
 }
 
-/// What of the edits a user of the data must know, apart from corrections.
+/// Notes on the edits for users of the data, apart from corrections.
 fn doubts(edits: &Edits) -> Vec<String> {
     let mut notes = Vec::new();
     if edits.is_torn {

@@ -158,7 +158,7 @@ pub enum ExportDestination {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExportSummary {
     pub sentence: String,
-    /// What was not, and why, a sentence each; and what a user of the data must know.
+    /// A sentence for each session that was not written, and notes on the data.
     pub remarks: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What a device makes of a body: the margin before play, what the loop does without its guards and with them, and
+//! A body on a haptic device: the margin before play, what the loop does without its guards and with them, and
 //! how the loop keeps its time on this computer.
 
 use super::fit::SourceFit;
@@ -62,7 +62,7 @@ pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
 }
 
 impl HapticBody {
-    /// That a stroke goes beyond what was measured, if it does by more than a pulse of the source's slider.
+    /// A warning if a stroke exceeds the measured depth by more than a pulse of the source's slider.
     pub fn extrapolation_warning(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
@@ -134,10 +134,10 @@ impl HapticSettings {
     }
 }
 
-/// How long the hand holds at the end of the stroke in s: a buzz of a few hertz shows within one.
+/// Duration of the hold at the end of the stroke in s: a buzz of a few hertz shows within one.
 const HOLD: f64 = 3.0;
 
-/// How long before the hand arrives a trace begins, in s.
+/// Start of a trace before the hand arrives, in s.
 const BEFORE: f64 = 0.5;
 
 /// Columns that a trace is thinned for: more than half a screen is wide.
@@ -149,7 +149,7 @@ pub struct SimulatedTrial {
     pub is_guarded: bool,
     /// Share of the ticks of the hold in which it buzzed.
     pub buzz_share: f64,
-    /// How long after the hand arrived it buzzed last, in s; none if it did not while it held.
+    /// Time of the last buzz after the hand arrived, in s; `None` without a buzz in the hold.
     pub buzz_until_s: Option<f64>,
     /// The strongest buzz: its frequency in Hz and its amplitude in mm.
     pub buzz: Option<(f64, f64)>,
@@ -332,7 +332,7 @@ const PART: Duration = Duration::from_millis(100);
 pub struct FeedbackCheck {
     #[serde(skip)]
     pub settings: FeedbackCheckSettings,
-    /// What was measured; in a table of its own.
+    /// Samples, which have a table of their own.
     #[serde(skip)]
     pub samples: Vec<FeedbackCheckSample>,
     pub body: ModifiedKelvin,

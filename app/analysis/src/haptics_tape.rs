@@ -43,7 +43,7 @@ pub fn finish_recording(
     Some(recorder?.finish(hash).map(|counts| (counts, hash)))
 }
 
-/// What a run was made of, as a text that reads back to the same bits.
+/// The settings of a run as a text that reads back to the same bits.
 fn text(body: ModifiedKelvin, setting: &HapticSettings, is_guarded: bool) -> String {
     let is_current = matches!(setting.drive, DriveKind::Current { .. });
     let drive = DRIVES.iter().find(|(_, current)| *current == is_current);

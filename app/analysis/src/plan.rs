@@ -71,7 +71,7 @@ pub struct PlanAssumptions {
     pub notes: Vec<String>,
 }
 
-/// What a plan assumes: a recording or a fit; without one the last fit, and without that the source thesis.
+/// The assumptions of a plan: a recording or a fit; without one the last fit, else the source thesis.
 pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFitError> {
     let (known, source, notes) = if let Some(like) = like {
         let (known, notes) = KnownFit::of(like, None)?;

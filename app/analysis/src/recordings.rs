@@ -1,4 +1,4 @@
-//! Which recordings are meant by the paths that a user names, and those recordings read to be looked at together.
+//! Finds the recordings that a user's paths mean, and reads them for joint analysis.
 //!
 //! Decided here, once for every front end: a folder with a segment of a log is a session and any other folder a
 //! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
@@ -47,7 +47,7 @@ pub struct FoundRecordings {
     pub recovered_originals: Vec<PathBuf>,
 }
 
-/// That sessions are left out for their recovered copies; nothing without any.
+/// A note on sessions that their recovered copies replace; `None` without any.
 #[must_use]
 pub fn recovered_originals_note(names: impl IntoIterator<Item = String>) -> Option<String> {
     let names: Vec<String> = names.into_iter().collect();
@@ -177,7 +177,7 @@ pub struct Recording {
     pub samples: Vec<FitSample>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
-    /// What the rig's compliance does to its depths, or would.
+    /// Effect of the machine compliance on its depths, applied or not.
     pub compliance: Option<ComplianceCorrection>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
@@ -258,7 +258,7 @@ impl Recordings {
         self.all.iter().map(Recording::borrowed).collect()
     }
 
-    /// What calibrations and compliances add, as `find` tells it; `None` where neither is known of any record.
+    /// Systematic uncertainty by `find`; `None` where no record has a calibration or compliance.
     pub fn systematic<T>(
         &self,
         find: impl FnOnce(&[TracedRecord<'_>]) -> Result<T, FitError>,

@@ -127,7 +127,7 @@ impl Replayable<3, 10> for HandLedScene {
     }
 }
 
-/// What became of the recording of a scene that was ended, if it has one.
+/// The finished recording of a scene, if it has one.
 #[must_use]
 pub fn finish_scene_recording(end: SceneEnd) -> FinishedRecording {
     let hash = end.scene.hash();

@@ -41,7 +41,7 @@ pub struct SceneBench {
     /// The closed form beside the chain as it was published, in this run.
     pub methods: Vec<MethodSpeed>,
     pub plan: Option<ScenePlan>,
-    /// Why there is no plan that holds everything.
+    /// The reason there is no plan that meets all tolerances.
     pub no_plan: Option<ScenePlanError>,
 }
 

@@ -3,7 +3,7 @@
 use palpate_sessions::ticks::{TickCounts, TickEnd, TickRecording, TickRow};
 use serde::Serialize;
 
-/// What became of a recording when its loop was ended, with a hash of what the loop left; nothing where there was none, or
+/// A finished recording with the hash of the loop's last state; `None` without a recording, or
 /// where the loop failed and cut it off.
 pub type FinishedRecording = Option<Result<(TickCounts, u64), String>>;
 

@@ -15,7 +15,7 @@ pub struct WorkbenchRequest {
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
     pub limits: Limits,
-    /// What must be acknowledged before any run, such as a daily check that failed.
+    /// Sentences that must be acknowledged before any run, such as a failed daily check.
     pub to_acknowledge: Vec<String>,
     /// Pace of a simulated rig.
     pub scale: TimeScale,
@@ -31,7 +31,7 @@ pub struct PlaybackRequest {
     pub scale: TimeScale,
 }
 
-/// What opens windows. Each call returns when its window has closed.
+/// Opens windows. Each call returns when its window has closed.
 pub trait WindowOpener {
     fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
 

@@ -51,9 +51,11 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(found(at, &["--verdict", "valid"]).len(), 2);
     assert_eq!(found(at, &["--until", "2001-01-01"]).len(), 0);
     // A condition that can never hold differs from one that matches no session.
-    for (condition, word) in
-        [("ramp.dept>=1mm", "ramp.dept"), ("depth>=1kg", "have it in mm"), ("ramp.depth>=100mm", "")]
-    {
+    for (condition, word) in [
+        ("ramp.dept>=1mm", "ramp.dept"),
+        ("depth>=1kg", "have it in mm"),
+        ("ramp.depth>=100mm", ""),
+    ] {
         let none = palpate(at, &["find", "--where", condition]);
         succeeded(&none);
         assert_eq!(stderr(&none).is_empty(), word.is_empty(), "{}", stderr(&none));

@@ -1,4 +1,4 @@
-//! What the test programs of all crates share, and examples and benchmarks with them.
+//! Shared by the test programs of all crates, and by examples and benchmarks.
 //!
 //! It is a dependency of tests only and needs the model alone, so that no test program waits for another crate.
 

@@ -1,4 +1,4 @@
-//! How messages are worded, in one place: tests elsewhere compare what a message is about, not its words.
+//! Rules for the wording of messages: tests elsewhere compare the subject of a message, not its words.
 
 use std::fmt::Display;
 

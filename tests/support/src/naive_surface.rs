@@ -2,7 +2,7 @@
 //! and limits can be chosen, wrong ones too.
 use std::collections::{HashSet, VecDeque};
 
-/// Which of the waiting nodes comes next.
+/// Order of the waiting nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PassOrder {
     /// The one that moved first.

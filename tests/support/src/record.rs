@@ -61,7 +61,7 @@ pub fn respond(body: &ModifiedKelvin, path: &[(f64, f64)]) -> Vec<FitSample> {
         .collect()
 }
 
-/// The same samples with noise of each sample's own sigma.
+/// The samples with white noise of each sample's own sigma.
 #[must_use]
 pub fn with_white_noise(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
     let mut noise = Noise::seeded(seed);
@@ -74,7 +74,7 @@ pub fn with_white_noise(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
         .collect()
 }
 
-/// The same samples with slow noise (standard deviation `slow`, exponential memory of `memory` s) and
+/// The samples with slow noise (standard deviation `slow`, exponential memory of `memory` s) and
 /// white noise (standard deviation `white`), in N.
 #[must_use]
 pub fn with_correlated_noise(

@@ -6,7 +6,7 @@
 
 use std::time::{Duration, Instant};
 
-/// How long a test waits for what must come, on a computer with much else to do.
+/// Longest wait of a test for an event that must come, on a busy computer.
 pub const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The end of a wait that begins now.
@@ -30,7 +30,7 @@ impl Deadline {
 /// Runs of a test that may end otherwise on a busy computer before it fails.
 const ATTEMPTS: usize = 20;
 
-/// What the first attempt gives that succeeds; each says why it did not.
+/// The result of the first attempt that succeeds; a failed one returns its reason.
 ///
 /// # Panics
 /// If none of twenty does, with what each said.

@@ -54,7 +54,7 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
     })
     .unwrap();
     // Every reading is there as it was sent, at its time.
-    let readings: Vec<(Nanos, String)> = session
+    let reported: Vec<(Nanos, String)> = session
         .rows
         .iter()
         .map(|row| {
@@ -62,7 +62,7 @@ fn bytes_of_a_rig_on_wires_are_in_its_session() {
             (row.host, format!("{} {counts} {pulses}\r\n", row.tick))
         })
         .collect();
-    assert!(cell == readings, "{} readings, {} sent", readings.len(), cell.len());
+    assert!(cell == reported, "{} readings, {} on the wire", reported.len(), cell.len());
     assert!(sent.starts_with("EnableMotor\r"), "{sent}");
     assert_eq!(session.auxiliary.raw_bytes, bytes);
     assert_eq!(end.raw_bytes, bytes);

@@ -84,7 +84,7 @@ pub struct LakeTally {
     pub rejected: usize,
 }
 
-/// What is kept of a fit: nothing that depends on when or where it was made.
+/// The stored form of a fit: nothing in it depends on the time or place of the fit.
 #[derive(Serialize)]
 struct StoredFit<'a> {
     #[serde(flatten)]

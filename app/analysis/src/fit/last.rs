@@ -35,7 +35,7 @@ pub enum KnownFitError {
     Fit { path: PathBuf, reason: FitError },
 }
 
-/// What is needed of a fit that was written as JSON, remembered or as the answer of a command.
+/// The required part of a fit in JSON, remembered or printed by a command.
 #[derive(Debug, Deserialize)]
 pub struct KnownFit {
     pub source: Option<String>,

@@ -113,7 +113,7 @@ pub struct SourceFit {
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
     pub systematic: Option<SystematicUncertainty>,
-    /// What the rig's compliance does to the depths, or would, once asked for.
+    /// Effect of the machine compliance on the depths, applied or not.
     pub compliance: Option<ComplianceCorrection>,
 }
 

@@ -37,7 +37,7 @@ fn line(entry: &CatalogEntry) -> Vec<String> {
     if !entry.tags.is_empty() {
         folder += &format!("  [{}]", entry.tags.join(", "));
     }
-    // What is known of it may then be old, or less than there is.
+    // The entry may then be outdated or incomplete.
     if let Some(trouble) = &entry.trouble {
         folder += &format!("  ({})", one_line(trouble));
     }

@@ -102,7 +102,7 @@ Written by `palpate extremes --page docs/explanation/extremes.md`; do not edit.
 
 const INTRODUCTION: &str = include_str!("extremes.md");
 
-/// What became of several rows in one short cell: the worst error, or the worst verdict.
+/// Several rows in one short cell: the worst error, or the worst verdict.
 fn cell(rows: &[&ExtremesRow]) -> String {
     let worst = rows.iter().max_by(|a, b| {
         let error = |row: &ExtremesRow| row.relative_error.unwrap_or_default();
@@ -173,7 +173,7 @@ fn by_case(rows: &[&ExtremesRow]) -> String {
     table
 }
 
-/// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
+/// Subjects by verdict: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&ExtremesRow]) -> String {
     let mut named: [(ExtremesVerdict, Vec<&str>); 4] = ExtremesVerdict::ALL.map(|verdict| {
         let own = rows.iter().filter(|row| row.verdict == verdict);

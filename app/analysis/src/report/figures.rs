@@ -56,7 +56,7 @@ impl TimeAlignment {
     }
 }
 
-/// What of a session is drawn: a few thousand points, whatever its length.
+/// Curves of a session: a few thousand points, whatever its length.
 #[derive(Clone, Debug)]
 pub struct Traces {
     pub name: String,
@@ -150,7 +150,7 @@ impl Traces {
         )
     }
 
-    /// Where the interlock's limit is, if it is too far above the force to be drawn; else empty.
+    /// A sentence on the interlock's limit if it is too far above the force to be drawn; else empty.
     pub fn limit_above(&self) -> String {
         match (self.limit, limit_in_reach(self)) {
             (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),

@@ -18,7 +18,7 @@ pub struct FitOverlay {
     pub worst_n: f64,
     /// Energy in N*mm put into the tissue along the path, as measured; over a closed loop what was lost.
     pub work_measured_n_mm: f64,
-    /// The same of the modelled force.
+    /// Energy of the modelled force in N*mm.
     pub work_fitted_n_mm: f64,
 }
 
@@ -70,10 +70,10 @@ pub struct FitDetails<'a> {
     pub overlay: &'a FitOverlay,
     #[serde(flatten)]
     pub intervals: &'a FitIntervals,
-    /// What calibration and compliance add; absent for tables and where it was not asked for.
+    /// Systematic uncertainty; absent for tables and where it was not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub systematic: Option<&'a SystematicUncertainty>,
-    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    /// Effect of the machine compliance on the depths; absent where none is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compliance: Option<&'a ComplianceCorrection>,
 }
@@ -100,9 +100,9 @@ pub struct JointObject<'a> {
     free: usize,
     rmse_n: f64,
     effective_samples: f64,
-    /// What the rig's compliance did to the depths of each record, or would; null where none is known.
+    /// Effect of the machine compliance on the depths of each record; null where none is known.
     compliances: Vec<Option<&'a ComplianceCorrection>>,
-    /// What calibrations and compliances add, for each record; absent for tables and where it was not asked for.
+    /// Systematic uncertainty of each record; absent for tables and where it was not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     systematic: Option<&'a [SystematicUncertainty]>,
     seconds: f64,

@@ -56,7 +56,7 @@ pub fn tried_text(tried: &SimulatedTrial) -> String {
     )
 }
 
-/// Why less force is felt than the model has, one sentence for each cause, the loop's own lateness last; empty if
+/// Reasons why the rendered force is below that of the model, a sentence for each, the loop's own lateness last; empty if
 /// nothing takes any away. `missed` counts ticks that were lately due while the loop was away.
 #[must_use]
 pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
@@ -205,7 +205,7 @@ pub fn follow_text(followed: &FeedbackCheck) -> String {
     lines.join("\n")
 }
 
-/// Why the fit of the measured force is not that of the commanded.
+/// The cause of the difference between the fits of measured and commanded force.
 fn difference(followed: &FeedbackCheck) -> &'static str {
     if followed.settings.friction_share > 0.0 {
         "the drive compensates friction only while the rack moves: the measured force steps as the hold begins, and its fit interprets the step as relaxation"
@@ -214,7 +214,7 @@ fn difference(followed: &FeedbackCheck) -> &'static str {
     }
 }
 
-/// What fits of both forces find, beside the body that was rendered.
+/// Parameters of the fits of both forces, beside those of the rendered body.
 fn fits_beside_the_body(followed: &FeedbackCheck) -> String {
     let body = &followed.body;
     let [mu1, mu2, mu3] = body.mu;

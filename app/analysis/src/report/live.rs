@@ -34,7 +34,7 @@ pub struct LiveCycle {
     pub peak: Option<TracePoint>,
 }
 
-/// What a trace shows, without what changes while it stays the same.
+/// Plots of a trace, without marks that change while the trace stays the same.
 #[derive(Debug, Default)]
 pub struct RunPlots {
     /// Force over session time.
@@ -43,7 +43,7 @@ pub struct RunPlots {
     pub force_depth: Plot,
     /// The repeats so far, oldest first; empty where nothing is repeated.
     pub cycles: Vec<LiveCycle>,
-    /// What a reader must know: that lines are thinned or cut. `None` if they are whole.
+    /// A remark if lines are thinned or cut.
     pub remark: Option<String>,
 }
 

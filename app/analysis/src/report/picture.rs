@@ -80,7 +80,7 @@ pub fn of_report(
     svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
 }
 
-/// The same without depth, parameters and sentences, for pages that tell them in words.
+/// The picture without depth, parameters and sentences, for pages that have them as text.
 #[must_use]
 pub fn of_fit(
     source: &str,

@@ -114,7 +114,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
         svg.text([BARS_LEFT - 10.0, above + 0.7 * ROW], name, phase.name());
         for (_, [from, to]) in bars.iter().filter(|(one, _)| one == phase) {
             let [left, right] = [from, to].map(|t| panel.at([t / unit, 0.0])[0]);
-            // What takes no time is seen all the same.
+            // A step without duration stays visible.
             let right = right.max(left + 1.5);
             let (above, below) = (above + ROW_EDGE, above + ROW - ROW_EDGE);
             svg.rectangle([left, above], [right, below], LIGHT.series);

@@ -52,7 +52,7 @@ pub fn plot(selection: &ModelSelection) -> Plot {
     Plot { title: title.to_owned(), ..scatter.plot() }
 }
 
-/// The same as SVG, under the verdict.
+/// The plot as SVG, under the verdict.
 #[must_use]
 pub fn of_selection(selection: &ModelSelection) -> String {
     let mut svg = Svg::new(WIDTH);

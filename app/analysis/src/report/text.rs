@@ -84,7 +84,7 @@ pub fn energy(overlay: &FitOverlay) -> String {
     )
 }
 
-/// What the family of a report is, as an equation; none of an unknown one.
+/// Equation of the model family; `None` of an unknown one.
 pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
     Some(find_family(&report.body.family).ok()?.equation())
 }

@@ -27,7 +27,7 @@ pub struct SessionFitRequest {
     pub together_with: Vec<SessionReading>,
 }
 
-/// What is kept of how a fit was asked for, so that it can be asked for again.
+/// The stored request of a fit, so that it can be repeated.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FitSettings {
     /// Key of a model family; `None` is the modified Kelvin model.

@@ -1,4 +1,4 @@
-//! What is made of a session afterwards, away from the window's thread: analyses, verdicts, corrections.
+//! Actions on a recorded session, away from the window's thread: analyses, data quality, corrections.
 
 mod actions;
 mod fits;

@@ -131,7 +131,7 @@ pub fn read_analysed(
     of_session(edited.session, stretch, &left_out_s)
 }
 
-/// What a fit takes of a session that was read, without the forces in these stretches of time, in s since the
+/// Samples of an open session for a fit, without the forces in these intervals, in s since the
 /// first sample.
 pub fn of_session(
     session: Session,
@@ -188,7 +188,7 @@ pub(super) fn curve_of(session: &Session) -> Result<CalibrationCurve, SourceErro
     curve.map_err(|err| SourceError::Calibration { detail: err.to_string() })
 }
 
-/// What a fit takes of a session, each force weighted by what the signal's noise and the
+/// Samples of a session for a fit, each force weighted by what the signal's noise and the
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
 /// one at an end of the converter's range, every one after an interlock, and every one after the probe
 /// has left the tissue on the way back.
@@ -237,7 +237,7 @@ pub(super) fn is_saturated(session: &Session, row: &SampleRow) -> bool {
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
 
-/// How many samples came before an interlock tripped; all of them if none did.
+/// Number of samples before an interlock tripped; all if none did.
 pub(super) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
     let is_trip = |record: &Record| matches!(record, Record::InterlockTripped { .. });
     let tripped = records(decisions).find(|(_, record)| is_trip(record));

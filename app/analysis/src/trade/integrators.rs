@@ -69,7 +69,7 @@ pub(super) fn jobs<'a>() -> Vec<Job<'a>> {
     Scheme::ALL.into_iter().flat_map(of).collect()
 }
 
-/// Which of the jobs times a row.
+/// Index of the job that times a row.
 pub(super) fn job_of(row: &IntegratorRow) -> usize {
     let scheme = Scheme::ALL.iter().position(|one| *one == row.scheme);
     let precision = Precision::ALL.iter().position(|one| *one == row.precision);

@@ -43,7 +43,7 @@ impl TradeExtent {
 
 /// Tables whose errors [`errors`] computes.
 const TABLES: usize = 4;
-/// What stands for a time that is not measured yet.
+/// Placeholder for a time that is not measured yet.
 const UNMEASURED: MeasuredCost = MeasuredCost { ns: 0.0, spread: 0.0, halves: 0.0 };
 
 /// All rows, computed, timed and marked; none if `progress` ended it.
@@ -125,7 +125,7 @@ pub fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
 }
 
-/// What is known of the machine this program runs on.
+/// Description of the machine this program runs on.
 #[must_use]
 pub fn this_machine() -> Machine {
     let described = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();

@@ -124,7 +124,7 @@ pub fn measure_scene(
     let body = ModifiedKelvin::THESIS.into();
     for scheme in Scheme::ALL {
         for step_s in STEPS {
-            // Where a scheme is unstable it has no place in the picture.
+            // An unstable scheme has no point in the picture.
             if let Ok([error_n, _]) = POKE.force_error::<3>(&body, scheme, step_s) {
                 curves.steps.push(StepPoint { scheme, step_s, error_n, cost_us: 0.0 });
             }

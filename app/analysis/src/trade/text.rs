@@ -174,7 +174,7 @@ pub fn terms(recommendation: &Recommendation) -> String {
     )
 }
 
-/// What each setting is for, and the setting or why there is none.
+/// The purpose of each setting, and the setting or the reason there is none.
 pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
     let words = |advice: &Advice| match advice {
         Advice::Use(choice) => {

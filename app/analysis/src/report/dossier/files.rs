@@ -8,9 +8,9 @@ use palpate_sessions::text::{sha256, sha256_of_file};
 use std::path::Path;
 
 const ROW: &str = "<tr data-session=\"";
-/// How the line of the date begins: all else is the same whenever the page is made.
+/// Start of the line with the date, the only one that depends on when the page is made.
 pub(super) const MADE: &str = "<p class=\"made\">";
-/// How the line of the page's own hash begins and ends.
+/// Start and end of the line with the page's own hash.
 const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
 const SEAL_END: &str = " -->\n";
 
@@ -46,7 +46,7 @@ fn own_hash(page: &str) -> String {
     sha256(hashed.collect::<String>().as_bytes())
 }
 
-/// What a page says it describes, and whether the page itself is as it was made.
+/// Files that a page lists, and whether the page itself is unchanged.
 pub fn claims(page: &str) -> Result<(Vec<FileClaim>, bool), String> {
     let no_page = "the file is not the page of a report; name a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;

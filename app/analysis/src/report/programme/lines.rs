@@ -45,7 +45,7 @@ impl SessionLoss {
         if matches!(self, Self::Missing) { "missing" } else { "damaged" }
     }
 
-    /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
+    /// The loss of a session and its reason. A run that broke off or was refused is not expected to have one.
     pub(super) fn of(
         opened: &Result<EditedSession, SourceError>,
         path: &Path,

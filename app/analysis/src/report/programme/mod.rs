@@ -57,7 +57,7 @@ pub struct PredictionLine {
     pub fitted: String,
     /// Root mean square in N.
     pub rms_n: f64,
-    /// The same in percent of the measured peak.
+    /// Root mean square in percent of the measured peak.
     pub rms_percent: f64,
     /// At the turning point, in N and percent of the peak.
     pub at_peak_n: f64,
@@ -117,7 +117,7 @@ impl ProgrammePage {
         let path = folder.join(session);
         let opened = edited_session::open(&path);
         let loss = SessionLoss::of(&opened, &path, ending.as_deref());
-        // What was said of a session holds for it as it was.
+        // Edits of a session hold for its recorded state only.
         let whole = opened.as_ref().ok().filter(|_| loss.is_none());
         let verdict = whole.and_then(|one| one.edits.verdict());
         let is_rejected = opened.as_ref().ok().and_then(|one| one.rejection()).is_some();
@@ -190,7 +190,7 @@ impl ProgrammePage {
         table(head, self.runs.iter().map(row))
     }
 
-    /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
+    /// A sentence that names missing and damaged finished sessions; `None` without any.
     pub fn loss_sentence(&self) -> Option<String> {
         let finished = self.runs.iter().filter(|run| run.ending.as_deref() == Some(FINISHED));
         let loss: Vec<String> = finished
@@ -236,7 +236,7 @@ impl TaskPart {
         self.text += "\n";
     }
 
-    /// What one session adds: a calibration, cycles, a fit or the error of a prediction.
+    /// Adds the result of one session: a calibration, cycles, a fit or the error of a prediction.
     fn read(
         &mut self,
         task: &ProgrammeTask,
