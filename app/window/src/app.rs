@@ -259,7 +259,8 @@ impl eframe::App for WorkbenchApp {
         self.settings.now.zoom = ctx.zoom_factor();
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
-        self.pace.next(ctx, !self.workbench.is_quiet(), is_watched);
+        let frame_s = frame.info().cpu_usage;
+        self.pace.next(ctx, frame_s, !self.workbench.is_quiet(), is_watched);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {

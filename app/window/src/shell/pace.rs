@@ -11,6 +11,11 @@ const MOVING: Duration = Duration::from_millis(33);
 const RESTING: Duration = Duration::from_millis(250);
 /// The same with no key or pointer used for [`UNUSED_S`]: what goes wrong by itself is still seen soon.
 const UNUSED: Duration = Duration::from_millis(1500);
+/// Frames begin at least so many times as long apart as the last one took: a key that stops the rig is read at once between
+/// frames and otherwise at the end of one, so a slow renderer may have a third of the time.
+const FRAMES_APART: f64 = 3.0;
+/// The longest of that: however slow a renderer is, a chart that moves is seen to move.
+const MOVING_SLOWLY: Duration = Duration::from_millis(200);
 /// Seconds after the last key or move of the pointer until the window counts as unused.
 const UNUSED_S: f64 = 5.0;
 
@@ -24,8 +29,8 @@ pub struct FramePace {
 }
 
 impl FramePace {
-    /// Requests the next frame.
-    pub fn next(&mut self, ctx: &Context, is_moving: bool, is_watched: bool) {
+    /// Requests the next frame; `frame_s` is how long the last one took to make and paint, in s.
+    pub fn next(&mut self, ctx: &Context, frame_s: Option<f32>, is_moving: bool, is_watched: bool) {
         let (now, is_used) = ctx.input(|input| (input.time, !input.events.is_empty()));
         if is_used || is_moving || is_watched {
             self.used_at = now;
@@ -33,7 +38,7 @@ impl FramePace {
         let is_unused = now > self.used_at + UNUSED_S;
         self.is_unused.store(is_unused, Ordering::Relaxed);
         self.is_asked.store(false, Ordering::Relaxed);
-        ctx.request_repaint_after(if is_moving { MOVING } else { resting(is_unused) });
+        ctx.request_repaint_after(if is_moving { moving(frame_s) } else { resting(is_unused) });
     }
 
     /// Requests a frame from another thread.
@@ -46,6 +51,11 @@ impl FramePace {
             }
         }
     }
+}
+
+fn moving(frame_s: Option<f32>) -> Duration {
+    let apart_s = FRAMES_APART * f64::from(frame_s.unwrap_or(0.0));
+    Duration::try_from_secs_f64(apart_s).unwrap_or(MOVING).clamp(MOVING, MOVING_SLOWLY)
 }
 
 const fn resting(is_unused: bool) -> Duration {
@@ -67,7 +77,7 @@ mod tests {
     ) -> Duration {
         let input = RawInput { time: Some(time), events, ..RawInput::default() };
         let [is_moving, is_watched] = ways;
-        let mut output = ctx.run_ui(input, |ui| pace.next(ui.ctx(), is_moving, is_watched));
+        let mut output = ctx.run_ui(input, |ui| pace.next(ui.ctx(), None, is_moving, is_watched));
         output.textures_delta.clear();
         output.viewport_output[&ViewportId::ROOT].repaint_delay
     }
@@ -94,5 +104,14 @@ mod tests {
         next(&mut pace, &ctx, 40.0, Vec::new(), [false; 2]);
         assert!(next(&mut pace, &ctx, 41.0, vec![key], [false; 2]) <= RESTING);
         assert!(next(&mut pace, &ctx, 45.0, Vec::new(), [false; 2]) <= RESTING);
+    }
+
+    #[test]
+    fn slow_renderer_leaves_two_thirds_of_the_time_to_keys() {
+        assert_eq!(moving(None), MOVING);
+        assert_eq!(moving(Some(0.005)), MOVING);
+        assert_eq!(moving(Some(0.025)).as_millis(), 75);
+        assert_eq!(moving(Some(4.0)), MOVING_SLOWLY);
+        assert_eq!(moving(Some(f32::NAN)), MOVING);
     }
 }
