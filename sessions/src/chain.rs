@@ -29,7 +29,7 @@ pub enum ChainError {
         path: PathBuf,
         source: io::Error,
     },
-    #[error("line {line} of {} was changed; restore the file from a backup, or move it away to return to the recording without it", path.display())]
+    #[error("line {line} of {} was changed; restore the file from a backup, or move it elsewhere to use the recording without it", path.display())]
     Changed {
         path: PathBuf,
         /// Which line, from 1.

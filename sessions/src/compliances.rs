@@ -66,7 +66,7 @@ mod tests {
         let wrong =
             read_document::<palpate_model::calibration::Calibration>(&first.path).unwrap_err();
         assert!(matches!(wrong, LibraryError::NotOne { .. }), "{wrong}");
-        assert!(ComplianceStore::open(home.path()).documents.is_empty());
+        assert!(crate::CalibrationStore::open(home.path()).documents.is_empty());
         let nothing = save_document(home.path(), &taken("2026-03-05", 0.0)).unwrap_err();
         assert!(matches!(nothing, LibraryError::Unsound { .. }), "{nothing}");
     }

@@ -46,7 +46,7 @@ pub enum LibraryError {
     },
     #[error("{} holds no {kind} ({reason}); name another file", path.display())]
     NotOne { kind: &'static str, path: PathBuf, reason: String },
-    #[error("{} was changed after it was stored; a {kind} is never edited, so {renew} to supersede it", path.display())]
+    #[error("{} was changed after it was stored, but a stored {kind} is never edited; {renew} to supersede it", path.display())]
     Changed { kind: &'static str, renew: &'static str, path: PathBuf },
     #[error("{what}: {reason}")]
     Unsound { what: String, reason: String },

@@ -30,7 +30,7 @@ pub enum JournalError {
         path: PathBuf,
     },
     #[error(
-        "the journal {} is incomplete: it has {found} entries, and {written} were written; restore it from a backup, or move {} away to continue after the last entry",
+        "the journal {} is incomplete: it has {found} entries, but {written} were written; restore it from a backup or, to continue after its last entry, move {} elsewhere",
         path.display(), ChainHead::file_of(path).display()
     )]
     Shortened { found: u64, written: u64, path: PathBuf },

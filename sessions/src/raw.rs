@@ -155,7 +155,9 @@ impl<'a> RawBlock<'a> {
         let total: u64 = self.length.iter().map(|length| u64::from(*length)).sum();
         if total != self.data.len() as u64 {
             let held = self.data.len();
-            return Err(format!("a block of raw bytes holds {held} bytes, its pieces {total}"));
+            return Err(format!(
+                "a block of raw data holds {held} bytes, but its pieces add up to {total} bytes"
+            ));
         }
         let mut sum = 0i64;
         for at in &mut self.at_ns {

@@ -312,7 +312,7 @@ pub fn pace(
         // It only spins.
         let _ = thread.join();
     }
-    let taped = taped.ok_or("the loop failed; this is a mistake in palpate")?;
+    let taped = taped.ok_or("a loop of palpate failed; this is a bug in palpate")?;
     let hash = taped.device.last().snapshot.sum();
     let recorded = taped.recorder.map(|recorder| recorder.finish(hash));
     Ok(LoopMeasurement {

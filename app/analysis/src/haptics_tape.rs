@@ -69,7 +69,7 @@ fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, HapticSettings, bool
     match (found, fields.finish()) {
         (Some(found), mistakes) if mistakes.is_empty() => Ok(found),
         (None, mistakes) if mistakes.is_empty() => Err(format!(
-            "{file}: the body, the period or the delay is missing; take a whole recording"
+            "{file}: the model, the period or the delay is missing; use a complete recording"
         )),
         (_, mistakes) => Err(format_mistakes(file, &mistakes)),
     }

@@ -28,7 +28,7 @@ pub enum RecordingsError {
     Missing(ReadError),
     #[error("cannot look into {} ({reason}); check its permissions", path.display())]
     Folder { path: PathBuf, reason: String },
-    #[error("{} holds no session and no table (.csv or .tsv); name the folder that does", .0.display())]
+    #[error("{} contains neither a session nor a table (.csv or .tsv); name a folder that contains one", .0.display())]
     Nothing(PathBuf),
     #[error("{} is a table and no session", .0.display())]
     Table(PathBuf),

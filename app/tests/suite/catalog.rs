@@ -81,7 +81,7 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     let info = stdout(&palpate(at, &["info", &two]));
     assert!(info.contains("Ada: note: the gel was warm"), "{info}");
     let empty = palpate(at, &["note", &one, "--text", " ", "--json"]);
-    assert_refused(&empty, 2, "a note its words");
+    assert_refused(&empty, 2, "a note needs a text");
 
     let why = ["--reason", "curve and video agree", "--by", "Mary"];
     let mut review = vec!["review", one.as_str(), "--accept"];

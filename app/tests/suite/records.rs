@@ -261,7 +261,7 @@ fn a_jog_is_motion_and_has_no_cycles() {
     let nothing = palpate(at, &["analyse", "jog"]);
     assert_eq!(nothing.status.code(), Some(1));
     let printed = stderr(&nothing);
-    assert!(printed.contains("no cycles") && !printed.contains("fit"), "{printed}");
+    assert!(printed.contains("no loading and no sine") && !printed.contains("fit"), "{printed}");
 }
 
 #[test]

@@ -252,7 +252,7 @@ fn figures_are_drawn_and_wrong_use_is_told() {
         (&["report"][..], "name a session"),
         (&["report", "press", "press"], "one session"),
         (&["report", "--html", "p.html"], "name the sessions"),
-        (&["report", "press", "--figure", "a.gif"], "end in"),
+        (&["report", "press", "--figure", "a.gif"], "has no known file type"),
         (&["report", "press", "--figure", "a.svg", "--from", "2", "--until", "1"], "not before"),
         (
             &["report", "press", "--figure", "a.svg", "--of", "residual", "--from", "2"],

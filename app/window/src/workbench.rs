@@ -83,7 +83,7 @@ impl Workbench {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let runner = Runner::start(options.rig, options.scale, None, wake)
-            .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
+            .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
         let mut form = ProtocolForm::default();
         let library = match options.sessions {
             Some(folder) => {
@@ -183,7 +183,7 @@ impl Workbench {
         let has_run = run_in_progress(&self.snapshot).is_some();
         require(!has_run, "a run is in progress and would disturb the times")?;
         let is_busy = self.occupation.is_busy;
-        require(!is_busy, "other work is in progress and would disturb the times")
+        require(!is_busy, "other work is in progress and would disturb the timing measurement")
     }
 
     /// Whether the loop of a screen may run now, or why not: its priority would disturb a run, or another loop.

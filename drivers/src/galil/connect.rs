@@ -287,7 +287,7 @@ fn describe(
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{board}, axis {}, input {} (filter before it: {filter}), {words}",
+            "{board}, axis {}, input {} (filter ahead of the input: {filter}), {words}",
             settings.axis, settings.input
         ),
         settings: BTreeMap::new(),

@@ -145,8 +145,8 @@ impl GalilOrder {
                 let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
                     return OrderStep::Refused(format!(
-                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts after \
-                         {speed_asked} and {ac_asked} were set"
+                        "the controller reads back speed {speed}, acceleration {ac} and deceleration {dc} where \
+                         {speed_asked} and {ac_asked} were set, in counts"
                     ));
                 }
                 let made = MoveTo {

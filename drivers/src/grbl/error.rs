@@ -110,7 +110,7 @@ impl GrblCode {
             (false, Some(12)) => "the board makes fewer steps a second; lower the speed",
             (false, Some(13)) => "the safety door is open; close it",
             (false, Some(15)) => {
-                "the target is outside the travel of the board ($130 to $132); home it or correct the travel"
+                "the target is outside the axis travel set in the board ($130 to $132); home the axis or correct these settings"
             }
             (false, _) => "",
         }

@@ -76,7 +76,7 @@ fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
         DeviceError::unfit(DEVICE, NO_CHIP)
     } else {
         console.no_answer(
-            "check port, cable and that palpate's sketch is on the board, with 115200 baud",
+            "check port and cable, and that the board runs palpate's sketch at 115200 baud",
         )
     })
 }

@@ -63,7 +63,7 @@ pub enum BiasError {
     TooFew { found: usize },
     /// The force does not follow.
     #[error(
-        "the force does not rise with the bias voltage ({slope:.3} N/V, standard error {error:.3}); check drive, cell and sign"
+        "the force does not rise with the bias voltage ({slope:.3} N/V, standard error {error:.3}); check the drive, the load cell and the sign"
     )]
     Flat {
         /// Slope in N/V.

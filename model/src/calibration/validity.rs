@@ -191,7 +191,7 @@ impl Calibration {
             .min_by(|a, b| share(a).total_cmp(&share(b)));
         let advice = best.map_or_else(
             || {
-                "no weight up to the heaviest can be checked with it, so take a new calibration"
+                "this calibration cannot be checked with any weight up to its heaviest; make a new one"
                     .to_owned()
             },
             |best| format!("take a weight where the cell is more sensitive, such as {best} g"),

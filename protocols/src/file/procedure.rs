@@ -256,7 +256,7 @@ impl Writer<'_> {
         if !self.is_too_long {
             self.is_too_long = true;
             let message = format!(
-                "written out the protocol has more than {STEPS_MAX} steps; repeat less or split it"
+                "with its repeats written out, the protocol has more than {STEPS_MAX} steps; use fewer repeats or split it"
             );
             self.problems.error(line, message);
         }

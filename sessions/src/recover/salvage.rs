@@ -209,7 +209,7 @@ impl Search<'_, '_> {
             if self.content.manifest.is_none() {
                 return Err(refused(file, refusal));
             }
-            self.add_damage(file, 0, "this segment is of another recording");
+            self.add_damage(file, 0, "this segment belongs to another recording");
         }
         Ok(next)
     }

@@ -297,7 +297,7 @@ fn what_a_crash_left_is_recovered_and_reported_when_the_window_opens() {
     let kept = flow.folder.path().join("sessions/crashed.recovered");
     let session = palpate_sessions::Session::open(&kept).unwrap();
     assert!(session.rows.len() > 10_000, "{}", session.rows.len());
-    let expected = format!("{} samples kept in", session.rows.len());
+    let expected = format!("{} samples recovered into", session.rows.len());
     assert!(flow.window.query_by_label_contains(&expected).is_some(), "{expected}");
     // The original is as it was.
     assert_eq!(std::fs::read(crashed.join("000.mcap")).unwrap(), bytes[..bytes.len() / 2]);

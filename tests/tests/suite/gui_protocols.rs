@@ -53,11 +53,11 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
     wait_for(&mut flow, "the first cycle", |run| run.cycle == 1);
     assert!(flow.says("cycle 1 of 2"));
     flow.window.check_accessibility();
-    assert!(!flow.is_enabled("Resume  F9") && flow.says("need a pause first"));
+    assert!(!flow.is_enabled("Resume  F9") && flow.says("Pause before Resume"));
     flow.click("Pause after cycle 1  F4");
     flow.window.run_steps(2);
     wait_for(&mut flow, "the pause", is_paused);
-    assert!(flow.says("State: PAUSED") && flow.says("Resume goes on"));
+    assert!(flow.says("State: PAUSED") && flow.says("Resume continues"));
     assert!(!flow.is_enabled("Pause  F7"));
     assert!(flow.is_enabled("Stop motion  F12") && flow.is_enabled("Halt  F11"));
     flow.click("Resume  F9");

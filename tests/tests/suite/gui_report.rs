@@ -167,7 +167,7 @@ fn a_fit_is_made_compared_and_taken_back() {
 fn another_model_another_calibration_and_a_stretch_left_out() {
     let mut panel = Panel::open();
     panel.click("Leave out");
-    assert!(!panel.is_enabled("Between the cursors") && panel.says("set cursors A and B"));
+    assert!(!panel.is_enabled("Between the cursors") && panel.says("set the cursors A and B"));
     panel.cursors(Some([22.0, 20.00001]));
     panel.click("Between the cursors");
     panel.type_into("name", "knock");
@@ -242,7 +242,7 @@ fn a_verdict_and_a_contact_are_corrected_with_a_reason() {
     panel.click("verdict");
     panel.click("suspect");
     panel.click("Set verdict");
-    panel.wait_for("suspect, says");
+    panel.wait_for("suspect, by");
     panel.type_into("reason", "by eye");
     panel.type_into("correct to", "4000");
     panel.click("Correct contact");

@@ -170,11 +170,11 @@ fn steps_are_read_as_they_are_written() {
     let read = |text: &str| deeds(&steps(text).concat());
     assert_eq!(
         read(
-            "1. Press `Ctrl+K`: by name. Type `x y` into\n   **what to do**. Wait for *it: is*. See *A*.\n\nPress **No**.\n"
+            "1. Press `Ctrl+K`: by name. Type `x y` into\n   **command**. Wait for *it: is*. See *A*.\n\nPress **No**.\n"
         ),
         [
             Deed::Key(Key::K, Modifiers::COMMAND),
-            Deed::Type("x y".into(), "what to do".into()),
+            Deed::Type("x y".into(), "command".into()),
             Deed::Wait("it: is".into()),
             Deed::See("A".into()),
         ]

@@ -20,7 +20,7 @@ use palpate_window::window::WindowOptions;
 fn by_name(flow: &mut WindowFlow, words: &str) {
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
     flow.window.run_steps(3);
-    flow.type_into("what to do", words);
+    flow.type_into("command", words);
     flow.window.key_press(Key::Enter);
     flow.window.run_steps(3);
 }
@@ -37,28 +37,26 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     for screen in SCREENS {
         assert!(flow.says(&format!("Screen {}", screen.name)));
     }
-    flow.type_into("what to do", "nothing is called like this");
+    flow.type_into("command", "nothing is called like this");
     assert!(flow.says("nothing is called so"));
     // Its keys choose, and Enter takes.
-    flow.type_into("what to do", "screen");
+    flow.type_into("command", "screen");
     for _ in 0..3 {
         flow.window.key_press(Key::ArrowDown);
         flow.window.run_steps(2);
     }
     flow.window.key_press(Key::Enter);
     flow.window.run_steps(3);
-    assert!(
-        !flow.says("a few letters of it") && flow.window.query_by_label("what to do").is_none()
-    );
+    assert!(!flow.says("a few letters of it") && flow.window.query_by_label("command").is_none());
     let button = flow.window.get_by_label(SCREENS[3].name);
     assert!(button.accesskit_node().toggled().is_some());
     // What cannot be asked for now stays where it is.
     by_name(&mut flow, "retract after");
-    assert!(flow.window.query_by_label("what to do").is_some());
+    assert!(flow.window.query_by_label("command").is_some());
     // Escape stops and closes it.
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(3);
-    assert!(flow.window.query_by_label("what to do").is_none());
+    assert!(flow.window.query_by_label("command").is_none());
 }
 
 #[test]

@@ -124,7 +124,7 @@ fn a_sine_that_loses_the_tissue_is_noted_before_and_after() {
     ] {
         let plan = built_in_plan(name, &values);
         let found = notes(&plan);
-        assert!(found.len() == 1 && found[0].contains("lose the tissue"), "{found:?}");
+        assert!(found.len() == 1 && found[0].contains("lose contact"), "{found:?}");
         let session = ran(SimProfile::Lab, &plan);
         let (verdict, reason) = verdict(&session);
         assert_eq!(verdict, DataQuality::Suspect, "{reason}");
@@ -145,7 +145,7 @@ fn a_force_too_small_to_tell_is_not_called_met() {
     let brief = ("duration", "3 s");
     let plan = built_in_plan("creep", &[("force", "0.001 N"), brief]);
     let found = notes(&plan);
-    assert!(found.len() == 1 && found[0].contains("whether it was met"), "{found:?}");
+    assert!(found.len() == 1 && found[0].contains("whether it was reached"), "{found:?}");
     let (of_little, reason) = verdict(&ran(SimProfile::Lab, &plan));
     assert_eq!(of_little, DataQuality::Suspect, "{reason}");
     assert!(reason.contains("0.0010 N"), "{reason}");

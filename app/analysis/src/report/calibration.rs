@@ -64,7 +64,7 @@ impl CalibrationEntry {
             (Some(by), _, _) => format!("superseded by {by}"),
             (None, true, _) => "expired".to_owned(),
             (None, false, true) => "in force".to_owned(),
-            (None, false, false) => "older than the one in force".to_owned(),
+            (None, false, false) => "older than the one in use".to_owned(),
         }
     }
 }

@@ -87,7 +87,7 @@ pub fn page(rows: &[ExtremesRow]) -> String {
         page += &format!("\n## {}\n\n", capital(group));
         page += &match group {
             "relaxation time and step" => by_time_and_step(&rows),
-            "integrators, relaxation time and step" => by_ratio(&rows),
+            "integrators, relaxation time and time step" => by_ratio(&rows),
             _ => by_case(&rows),
         };
     }

@@ -27,7 +27,8 @@ pub fn check_text(checked: &HapticCheck) -> String {
     lines.extend(checked.sentences.iter().cloned());
     lines.push(String::new());
     lines.push(
-        "Simulated: a firm hand of little damping presses to the end of the stroke and holds there.".to_owned(),
+        "Simulated: a firm, lightly damped hand presses to the end of the stroke and holds there."
+            .to_owned(),
     );
     for tried in &checked.trials {
         lines.push(tried_text(tried));
@@ -107,7 +108,7 @@ pub fn slave_text(slaved: &SlaveReport) -> String {
             slaved.handle_max_n, slaved.model_max_n, slaved.cell_max_n
         ),
         format!(
-            "the model where the slave is less the cell: {} (the body is not the specimen)",
+            "model force at the slave's position minus load-cell force: {} (the model is not that of the specimen)",
             less(&slaved.model_less_cell)
         ),
         format!(

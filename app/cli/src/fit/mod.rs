@@ -152,7 +152,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.profile || args.bootstrap.is_some() {
         return Err(Failure::usage(
-            "--profile and --bootstrap are for one fit; name a single session or table, or share parameters",
+            "--profile and --bootstrap work on one fit; name a single session or table, or fit several together with --share",
         ));
     }
     let found = recordings::find(&args.sources).map_err(sources_failure)?;

@@ -145,7 +145,7 @@ fn memory(text: &str) -> Result<CorrelatedNoise, Failure> {
         .and_then(|(sd, time)| Some((sd.trim().parse().ok()?, time.trim().parse().ok()?)));
     let Some((sd_mn, secs)) = parsed else {
         return Err(Failure::usage(format!(
-            "--memory {text} is not SD_MN,SECONDS, as in --memory 10,0.5"
+            "--memory {text} is not a standard deviation in mN and a time in seconds with a comma between them, as in --memory 10,0.5"
         )));
     };
     let sd_mn: f64 = sd_mn;

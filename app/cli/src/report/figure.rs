@@ -42,7 +42,7 @@ fn window(args: &ReportArgs) -> Result<TimeWindow, Failure> {
     let is_over_samples = matches!(args.of, SessionFigure::ForceTime | SessionFigure::ForceDepth);
     if window != TimeWindow::WHOLE && !is_over_samples {
         return Err(Failure::usage(
-            "--from and --until are for force-time and force-depth; leave them out",
+            "--from and --until apply only to force-time and force-depth; leave these two options out",
         ));
     }
     Ok(window)

@@ -88,7 +88,7 @@ impl PlaybackApp {
                 let words = match run.and_then(|run| run.prompt.as_ref()) {
                     Some(prompt) => format!("prompt: {}", prompt.message),
                     None if !self.is_same_engine => {
-                        "decisions computed again: another version of palpate recorded it"
+                        "decisions recomputed, because another version of palpate made the recording"
                             .to_owned()
                     }
                     None => "as recorded; nothing here moves a rig".to_owned(),

@@ -137,7 +137,7 @@ fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
         false => format!("{} not yet", missing.join(", ")),
     };
     let why = match phase {
-        Phase::Ramp => "more of the ramp is needed",
+        Phase::Ramp => "a longer part of the ramp is needed",
         Phase::Hold => "more of the hold is needed",
         Phase::Creep | Phase::Sine | Phase::Follow => "the live fit follows ramps and holds",
         Phase::Unload

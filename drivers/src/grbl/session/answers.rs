@@ -154,7 +154,7 @@ impl GrblSession {
             // Whichever end it is.
             Some(false) if is_closing => self.end(
                 now,
-                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; check the switch",
+                "a limit switch closed during homing where none was expected, so the axis is stopped; check the switch",
             ),
             _ => {}
         }

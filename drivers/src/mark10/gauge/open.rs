@@ -103,7 +103,7 @@ fn silence_gauge(console: &mut TextConsole<'_>) -> Result<(), DeviceError> {
         )
     } else if lines.iter().any(|line| matches!(line, GaugeLine::Reading(_))) {
         unfit(
-            "it sends readings and hears nothing; check its cable and whether its menu listens to USB or RS-232",
+            "the gauge sends readings but does not receive commands; check its cable and whether its menu listens to USB or RS-232",
         )
     } else {
         console.no_answer(

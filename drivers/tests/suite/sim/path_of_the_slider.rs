@@ -297,8 +297,8 @@ fn refusals_give_a_reason() {
         (oscillate(0, 1000, 1), "zero"),
         (oscillate(50, 0, 1), "zero"),
         (oscillate(50, 1000, 0), "zero"),
-        (oscillate(1000, 1000, 1), "mm/s where"),
-        (oscillate(20, 100, 1), "mm/s2 where"),
+        (oscillate(1000, 1000, 1), "mm/s, but the axis"),
+        (oscillate(20, 100, 1), "mm/s2, but the axis"),
         (oscillate(i64::MIN, 1000, 1), "out of range"),
         (oscillate(-(1 << 30) - 1, u32::MAX, 1), "out of range"),
     ] {

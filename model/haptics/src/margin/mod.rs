@@ -207,7 +207,7 @@ impl MarginReport {
         }
         let Margin { depth, friction_needed, friction, .. } = self.loudest;
         all.push(if self.loudest.is_quiet() {
-            format!("Friction of {friction:.3} keeps single encoder counts quiet.")
+            format!("Friction of {friction:.3} suppresses the vibration of single encoder counts.")
         } else {
             format!(
                 "A buzz of an encoder count or two is possible: at {depth:.1} single counts stay quiet from {friction_needed:.3} of friction on, the device has {friction:.3}. A finer encoder needs less."

@@ -22,7 +22,7 @@ palpate_model::named! {
         /// The model has no force.
         NoModel = "the model has no force for this move",
         /// The tissue follows more slowly than the stylus leaves.
-        Leaving = "the stylus leaves faster than the tissue follows; tissue does not pull",
+        Leaving = "the stylus withdraws faster than the tissue follows, and tissue cannot pull on it",
         /// The force rises after start, stall or contact.
         RampingIn = "the force rises slowly after start, stall or contact",
         /// The device gives all it has.

@@ -43,7 +43,7 @@ pub enum ExpectedError {
     #[error("{name} is zero in this model, so an interval in percent of it means nothing")]
     ZeroParameter { name: &'static str },
     #[error(
-        "pressing to {depth_mm} mm takes {force_n:.2} N even at {speed_mm_per_s} mm/s, and {allowed_n} N are allowed; press less deep or allow more force"
+        "pressing to {depth_mm} mm takes {force_n:.2} N even at {speed_mm_per_s} mm/s, but only {allowed_n} N are allowed; press less deep or allow more force"
     )]
     TooForceful { depth_mm: f64, force_n: f64, speed_mm_per_s: f64, allowed_n: f64 },
     #[error(

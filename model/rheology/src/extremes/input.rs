@@ -44,7 +44,7 @@ pub(super) fn rows(
         for index in 0..usual().outer.len() {
             let mut model = usual();
             model.outer[index] = value;
-            let name = format!("{name} relaxation time or other outer parameter");
+            let name = format!("{name} relaxation time or other non-linear parameter");
             rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }

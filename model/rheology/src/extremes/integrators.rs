@@ -8,7 +8,7 @@ use crate::integrators::{Precision, Scheme, SeriesBody};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
 /// Name of the group of relaxation times against steps.
-const GROUP: &str = "integrators, relaxation time and step";
+const GROUP: &str = "integrators, relaxation time and time step";
 /// Name of the group of all else.
 const OTHER: &str = "integrators, depth and force";
 const SAMPLES: u32 = 20;

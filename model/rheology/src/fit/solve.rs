@@ -123,7 +123,7 @@ pub fn fit_coefficients(
 /// A finished fit that still has its records, for intervals that need more than one pass.
 ///
 /// ```
-/// use palpate_rheology::fit::{Bootstrap, FitOptions, Fitted};
+/// use palpate_rheology::fit::{Bootstrap, FitOptions, FitSolution};
 /// # use palpate_rheology::fit::FitSample;
 /// # use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 /// # use palpate_model::{Depth, Newtons, Seconds};
@@ -139,7 +139,7 @@ pub fn fit_coefficients(
 /// #     })
 /// #     .collect();
 /// // `samples` as in the example of `fit`, with some noise.
-/// let fitted = Fitted::of(&samples, &FitOptions::default())?;
+/// let fitted = FitSolution::of(&samples, &FitOptions::default())?;
 /// let report = fitted.report();
 /// let tau = report.parameter("tau_eps").and_then(|tau| tau.ci95);
 /// let profile = fitted.profile(0)?;

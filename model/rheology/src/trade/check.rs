@@ -8,14 +8,14 @@ use thiserror::Error;
 pub enum CurveError {
     #[error("these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again")]
     Format(u32),
-    #[error("the curves state {what} of {value}, which is not possible; measure again")]
+    #[error("the curves give {what} of {value}, which is not possible; measure again")]
     Number { what: String, value: f64 },
     #[error(
         "the curves contradict themselves at {0}: they were changed after they were measured; measure again"
     )]
     Contradiction(String),
     #[error(
-        "{what}: the curves state an error of {stored:e} and this palpate finds {found:e}; measure again"
+        "{what}: the curves give an error of {stored:e}, but this version of palpate finds {found:e}; measure again"
     )]
     Error { what: String, stored: f64, found: f64 },
     #[error("the curves have no row {0}; measure again")]

@@ -5,7 +5,7 @@
 
 use crate::{LiveFeed, to_json};
 use palpate_model::Nanos;
-use palpate_model::estimate::LiveEstimate;
+use palpate_model::estimate::{Identifiability, LiveEstimate};
 use palpate_protocols::engine::{self, ENGINE_VERSION, Effect, EngineInput, EngineState};
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{EntryKind, LogEntry, SampleRow};
@@ -316,7 +316,7 @@ fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
     let mut pairs = a.parameters.iter().zip(&b.parameters);
     a.samples == b.samples
         && is_same_rmse
-        && (!has_verdicts || a.verdicts == b.verdicts)
+        && (!has_verdicts || is_same_identifiability(&a.verdicts, &b.verdicts))
         && pairs.all(|(a, b)| match (a.std_error, b.std_error) {
             (Some(error), Some(again)) => {
                 a.name == b.name
@@ -325,6 +325,13 @@ fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
             }
             _ => a.name == b.name,
         })
+}
+
+/// Which parameters are identified, and for which a reason is given. Its words may improve: they decide nothing.
+fn is_same_identifiability(a: &[Identifiability], b: &[Identifiability]) -> bool {
+    let facts =
+        |one: &Identifiability| (one.parameter.clone(), one.is_identified, one.reason.is_some());
+    a.iter().map(facts).eq(b.iter().map(facts))
 }
 
 /// Whether two JSON values are equal, numbers within a relative (above 1) or absolute tolerance.

@@ -95,7 +95,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Measurem
         }
         (false, Some(ColumnNames(names))) => {
             return Err(format!(
-                "the table has {} columns, and {} are named; name every one",
+                "the table has {} columns, but {} are named; name every one",
                 cells.len(),
                 names.len()
             ));

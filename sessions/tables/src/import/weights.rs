@@ -46,7 +46,7 @@ pub enum WeightsError {
         cell: String,
     },
     #[error(
-        "line {line} has {mass_g} g after {before_g} g; add a column direction that says loading or unloading"
+        "line {line} has {mass_g} g after {before_g} g; add a column named 'direction' that says loading or unloading"
     )]
     Falling {
         /// Line, counted from 1.

@@ -138,8 +138,7 @@ impl HapticsScreen {
                 }
             }
         });
-        let words =
-            "The hand moves there at its speed; arrow keys move the slider while it has the focus.";
+        let words = "The simulated hand moves to this depth at its own speed; arrow keys move the slider while the slider has the focus.";
         quiet_ui(ui, words);
     }
 }

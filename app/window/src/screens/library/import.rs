@@ -68,7 +68,7 @@ impl ImportPanel {
     /// Draws the form; sessions go to this library.
     pub fn ui(&mut self, ui: &mut Ui, library: &Path) {
         let ctx = ui.ctx().clone();
-        section_ui(ui, "Import");
+        section_ui(ui, "Files of other programs");
         text_row(ui, "files", "paths, ; between them", &mut self.files);
         self.dialog.button_ui(ui, "Choose files...", |dialog| {
             dialog.set_title("Files to import").pick_files()

@@ -168,7 +168,7 @@ impl SceneForm {
         tick_box(ui, &mut self.is_guarded, "guards and controller");
         let device = &self.read.device;
         let words = format!(
-            "simulated device: {:.0} g, workspace {:.0} x {:.0} x {:.0} mm, peak force {} N, continuous {} N, stiffness {} N/mm, resolution {} mm, friction {} N",
+            "simulated device: mass {:.0} g, workspace {:.0} x {:.0} x {:.0} mm, peak force {} N, continuous force {} N, stiffness {} N/mm, resolution {} mm, friction {} N",
             1e3 * device.mass_kg,
             device.workspace_mm[0],
             device.workspace_mm[1],

@@ -102,7 +102,9 @@ impl SessionFacts {
         let words = match (is_well, missed) {
             (true, _) => format!("nothing missing, at most {late:.1} ms late"),
             (false, 0) => format!("the wall clock was set {} times", self.health.clock_jumps),
-            (false, missed) => format!("{missed} readings missing, at most {late:.1} ms late"),
+            (false, missed) => {
+                format!("{missed} readings missing; the others at most {late:.1} ms late")
+            }
         };
         (words, is_well)
     }

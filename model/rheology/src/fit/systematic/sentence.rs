@@ -65,7 +65,7 @@ impl SystematicUncertainty {
             false => "",
         };
         format!(
-            "{names} {} the systematic error, one standard uncertainty that repeats do not take away ({parts}){beyond}",
+            "{names} {} the systematic error as one standard uncertainty, which repeats do not reduce ({parts}){beyond}",
             if is_one { "adds" } else { "add" },
         )
     }

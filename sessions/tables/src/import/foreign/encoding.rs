@@ -41,7 +41,7 @@ pub(super) fn decode(
         c.is_control() && !matches!(c, '\t' | '\n' | '\r' | '\u{c}' | '\u{80}'..='\u{9f}')
     };
     if text.contains(is_binary) {
-        return Err("it holds binary data; export it as text or as a spreadsheet".into());
+        return Err("the file holds binary data; export it as text or as a spreadsheet".into());
     }
     Ok((text.into_owned(), format!("{}{reason}", encoding.name())))
 }

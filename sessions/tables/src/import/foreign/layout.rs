@@ -123,7 +123,7 @@ pub(super) fn find(
         let found = width_of(&rows.words(first));
         if found != named {
             return Err(format!(
-                "{word} {} has {found} columns, and {named} are named; name every one",
+                "{word} {} has {found} columns, but {named} are named; name every one",
                 rows.number(first)
             ));
         }

@@ -124,7 +124,7 @@ impl Specimen {
             self.name = key.to_owned();
         } else if key.is_empty() || texts.len() < 2 && !begins(texts, RAW_DATA) {
             return Err(format!(
-                "line {number}: '{}' is neither a fact, nor column names, nor numbers; correct or remove the line, or read the file as a table",
+                "line {number}: '{}' is neither a metadata entry, nor column names, nor numbers; correct or remove the line, or read the file as a table",
                 short(line)
             ));
         }

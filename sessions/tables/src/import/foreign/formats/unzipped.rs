@@ -54,7 +54,7 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
             }
             (most, remaining) = (most - read, remaining - read);
             if is_list && claims_too_many(&content) {
-                return Err(damaged(&"it claims more texts than it has bytes"));
+                return Err(damaged(&"the file declares more text entries than it has bytes"));
             }
             content.clear();
             if read == 0 || is_list {

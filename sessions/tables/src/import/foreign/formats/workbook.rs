@@ -46,7 +46,7 @@ fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
         palpate_model::panics::catch_panic(|| read_xls(bytes))
             .unwrap_or_else(|_| Err(damaged("its records contradict each other")))
     } else {
-        Err("it is not a workbook: it begins neither like an .xlsx nor like an .xls".into())
+        Err("the file is not a workbook: it begins neither like an .xlsx nor like an .xls".into())
     }
 }
 
