@@ -256,7 +256,7 @@ fn figures_are_drawn_and_wrong_use_is_told() {
         (&["report", "press", "--figure", "a.svg", "--from", "2", "--until", "1"], "not before"),
         (
             &["report", "press", "--figure", "a.svg", "--of", "residual", "--from", "2"],
-            "are for force-time",
+            "apply only to force-time",
         ),
         (&["report", "press", "--html", "p.html", "--analysis", "none"], "has no analysis"),
         (&["report", "press", "--analysis", "none"], "--analysis is for"),

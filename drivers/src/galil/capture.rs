@@ -67,7 +67,7 @@ pub fn measure(
     let (mut apart, mut bytes) = (Nanos(u64::MAX), 0);
     for _ in 0..ROWS {
         let start = console.now();
-        console.write(&format!("{question}\r").repeat(ROW))?;
+        console.write(format!("{question}\r").repeat(ROW))?;
         let replies = console.replies(ROW, Nanos(ROW as u64 * ANSWER_MAX.0))?;
         if replies.len() < ROW {
             return Err(GalilOpenError::Silent);

@@ -88,6 +88,10 @@ pub struct ForceLaw {
 
 /// A scheme with its state, in double precision.
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a tick may not allocate, and there is one in each law"
+)]
 enum Stepper {
     ExplicitEuler(RuleIntegrator<f64, N, ExplicitEuler>),
     ImplicitEuler(RuleIntegrator<f64, N, ImplicitEuler>),

@@ -58,7 +58,7 @@ fn an_archive_that_unpacks_to_too_much_is_refused() {
         file.write_all(b"<sst uniqueCount=\"9999999999999\"></sst>").unwrap();
     });
     let reason = reason_of(liar);
-    assert!(reason.contains("more texts"), "{reason}");
+    assert!(reason.contains("more text entries"), "{reason}");
 }
 
 /// Found by damaging the workbook at random: 5632 bytes made the reader ask for 180 MB.

@@ -129,7 +129,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     panel.type_into("reason", "whole hold");
     panel.click("profile intervals too");
     panel.click("Make analysis");
-    panel.wait_for("kept as 'all of it'");
+    panel.wait_for("saved as 'all of it'");
     panel.wait_for("Found by 'all of it'");
     assert_eq!(panel.chosen().as_deref(), Some("all of it"));
     assert!(panel.says("95 % from the profile likelihood"));
@@ -186,7 +186,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.click("kelvin");
     panel.type_into("name", "simpler");
     panel.click("Make analysis");
-    panel.wait_for("kept as 'simpler'");
+    panel.wait_for("saved as 'simpler'");
     panel.wait_for("Found by 'simpler'");
     let kept = panel.analyses();
     let AnalysisContent::Fit { based_on, settings, .. } = &kept.all[1].what else {
@@ -205,7 +205,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.wait_for("nowhere.json");
     panel.type_into("or file", &document.display().to_string());
     panel.click("Make analysis");
-    panel.wait_for("kept as 'repeat'");
+    panel.wait_for("saved as 'repeat'");
     panel.wait_for("Found by 'repeat'");
     panel.wait_for("N rms and at most");
     assert_eq!(panel.analyses().active().count(), 3);
@@ -223,7 +223,7 @@ fn sessions_shown_together_are_fitted_as_one_body() {
     panel.click("one material for this and the other session shown");
     panel.type_into("name", "together");
     panel.click("Make analysis");
-    panel.wait_for("kept as 'together'");
+    panel.wait_for("saved as 'together'");
     let kept = panel.analyses();
     let AnalysisContent::Fit { settings, results, .. } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);

@@ -38,7 +38,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
         assert!(flow.says(&format!("Screen {}", screen.name)));
     }
     flow.type_into("command", "nothing is called like this");
-    assert!(flow.says("nothing is called so"));
+    assert!(flow.says("no command has this name"));
     // Its keys choose, and Enter takes.
     flow.type_into("command", "screen");
     for _ in 0..3 {
@@ -47,7 +47,9 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     }
     flow.window.key_press(Key::Enter);
     flow.window.run_steps(3);
-    assert!(!flow.says("a few letters of it") && flow.window.query_by_label("command").is_none());
+    assert!(
+        !flow.says("a few letters of its name") && flow.window.query_by_label("command").is_none()
+    );
     let button = flow.window.get_by_label(SCREENS[3].name);
     assert!(button.accesskit_node().toggled().is_some());
     // What cannot be asked for now stays where it is.
@@ -255,7 +257,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     assert_eq!(stops, 6);
     flow.click("Done with the tour");
     flow.type_into("operator", "Grace");
-    by_name(&mut flow, "light or dark");
+    by_name(&mut flow, "light and dark");
     by_name(&mut flow, "larger text");
     // The view's tabs stand right of the left panel: they move with its edge, by name and by the pointer.
     let edge = |flow: &WindowFlow| flow.window.get_by_label("Protocols").rect().left();

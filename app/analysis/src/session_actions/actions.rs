@@ -140,7 +140,7 @@ impl SessionAction {
         };
         let made = name.map(|name| name.trim().to_owned());
         let sentence = match &made {
-            Some(name) => format!("kept as '{name}': {sentence}"),
+            Some(name) => format!("saved as '{name}': {sentence}"),
             None => sentence,
         };
         Ok(ActionReport {

@@ -1,7 +1,8 @@
 //! The force model's parameters as they become known, each with its uncertainty.
 
 use crate::widgets::{quiet_ui, tokens_of};
-use eframe::egui::{Align, Layout, Response, RichText, Ui, vec2};
+use eframe::egui::text::LayoutJob;
+use eframe::egui::{Align, FontSelection, Layout, Response, RichText, Role, Ui, WidgetInfo, vec2};
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{FittedParameter, LiveEstimate};
 use palpate_model::rig::Phase;
@@ -93,12 +94,43 @@ fn row_ui(
 pub(super) fn value_ui(ui: &mut Ui, name: &str, value: RichText, unit: &str) -> Response {
     let quiet = tokens_of(ui).text_quiet;
     let row = |ui: &mut Ui| {
-        cell(ui, 60.0, |ui| ui.label(RichText::new(name).color(quiet)));
+        cell(ui, 60.0, |ui| symbol_ui(ui, name));
         let value = cell(ui, 166.0, |ui| ui.label(value.monospace()));
         ui.label(RichText::new(unit).color(quiet).small());
         value
     };
     ui.horizontal(row).inner
+}
+
+/// Draws a parameter's symbol as in print; its key is the tooltip and what a screen reader says.
+fn symbol_ui(ui: &mut Ui, name: &str) {
+    let quiet = tokens_of(ui).text_quiet;
+    let (letter, index) = symbol(name);
+    let mut job = LayoutJob::default();
+    for text in [RichText::new(letter), RichText::new(index).small()] {
+        let style = FontSelection::Default;
+        text.color(quiet).append_to(&mut job, ui.style(), style, Align::BOTTOM);
+    }
+    let label = ui.label(job).on_hover_text(name);
+    label.widget_info(|| WidgetInfo::labeled(Role::Label, true, name));
+}
+
+/// Letter and index of a parameter's key: `tau_eps` is τ with the index ε, `mu1` is μ with the index 1.
+fn symbol(name: &str) -> (String, String) {
+    let greek = |word: &str| match word {
+        "tau" => "τ".to_owned(),
+        "mu" => "μ".to_owned(),
+        "eta" => "η".to_owned(),
+        "alpha" => "α".to_owned(),
+        "beta" => "β".to_owned(),
+        "eps" => "ε".to_owned(),
+        "sig" => "σ".to_owned(),
+        "f" => "F".to_owned(),
+        other => other.to_owned(),
+    };
+    let end = name.find(|one: char| one == '_' || one.is_ascii_digit()).unwrap_or(name.len());
+    let (letter, index) = name.split_at(end);
+    (greek(letter), greek(index.trim_start_matches('_')))
 }
 
 pub(super) fn cell<R>(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui) -> R) -> R {
@@ -154,6 +186,20 @@ fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn symbols_are_those_of_print() {
+        for (key, letter, index) in [
+            ("tau_eps", "τ", "ε"),
+            ("tau_sig", "τ", "σ"),
+            ("mu3", "μ", "3"),
+            ("f0", "F", "0"),
+            ("x_contact", "x", "contact"),
+            ("alpha", "α", ""),
+        ] {
+            assert_eq!(symbol(key), (letter.to_owned(), index.to_owned()), "{key}");
+        }
+    }
 
     fn parameter(name: &str, std_error: Option<f64>) -> FittedParameter {
         FittedParameter {

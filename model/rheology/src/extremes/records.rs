@@ -15,6 +15,9 @@ pub(super) const GROUP: &str = "records";
 /// the worst design.
 const TOLERANCE: f64 = 1e-6;
 
+/// Changes a sample into an extreme one.
+type Spoiler = fn(&mut FitSample);
+
 /// A record without noise of any size.
 struct RecordCase {
     case: &'static str,
@@ -27,7 +30,7 @@ struct RecordCase {
     offset: f64,
     tolerance: f64,
     /// A change of every sample, after which no body is the true one.
-    spoil: Option<fn(&mut FitSample)>,
+    spoil: Option<Spoiler>,
 }
 
 impl RecordCase {
@@ -126,7 +129,7 @@ fn cases(extent: ExtremesExtent) -> Vec<RecordCase> {
             ..RecordCase::new("an offset of 1e6 times the signal", Number, full())
         },
     ];
-    let subnormal: [(&str, fn(&mut FitSample)); 4] = [
+    let subnormal: [(&str, Spoiler); 4] = [
         ("subnormal depths", |one| one.depth.0 *= 1e-310),
         ("subnormal forces", |one| one.force.0 *= 1e-310),
         ("subnormal uncertainties", |one| one.sigma.0 *= 1e-310),

@@ -173,7 +173,7 @@ fn who_does_not_fit_is_told_in_words() {
         ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
         ("?", "Galil"),
         ("*10\r\n", "Series 4"),
-        ("4.285 N\r\n", "hears nothing"),
+        ("4.285 N\r\n", "does not receive commands"),
         ("D,48332680,-152034*4E04\r\n", "HX711"),
     ] {
         let err = refused(&CellBench::new(Stranger(says, Vec::new())), &GaugeSettings::default());
