@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     fn at(now: u64, content: HealthContent) -> HealthMessage {
-        HealthMessage { now: Nanos(now), content: content }
+        HealthMessage { now: Nanos(now), content }
     }
 
     #[test]

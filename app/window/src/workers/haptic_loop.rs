@@ -38,7 +38,7 @@ impl HapticLoop {
         let (lead, first) = (device.hand_target(), device.view().clone());
         let last = first.last;
         let period = settings.system.law.period;
-        let device = RecordedGuidedDevice { device: device, recorder };
+        let device = RecordedGuidedDevice { device, recorder };
         let beat = RealTimeLoop::start(device, period, first)
             .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
         Ok(Self {

@@ -131,7 +131,7 @@ impl LibraryScreen {
             return;
         };
         let old = self.details.take().filter(|old| old.folder == entry.folder);
-        if !old.as_ref().is_some_and(|old| old.generation == generation) {
+        if old.as_ref().is_none_or(|old| old.generation != generation) {
             self.histories.ask((library.clone(), entry.clone()), ctx);
         }
         // The old history stays until the new one is read.
@@ -227,10 +227,10 @@ impl Screen for LibraryScreen {
             }
         });
         match (self.update.state(), self.update.answer()) {
-            (Some(state), _) if state.seconds > SHORT_S => {
-                if progress_ui(ui, &state, "Stop reading") {
-                    self.update.cancel();
-                }
+            (Some(state), _)
+                if state.seconds > SHORT_S && progress_ui(ui, &state, "Stop reading") =>
+            {
+                self.update.cancel();
             }
             (None, Some(Err(err))) => small_alarm_ui(ui, err),
             _ => {}

@@ -125,7 +125,7 @@ impl ReviewScreen {
 
     /// Whether samples of any session have arrived.
     pub fn has_samples(&self) -> bool {
-        self.subjects.iter().any(|one| one.recording.track.len() > 0)
+        self.subjects.iter().any(|one| !one.recording.track.is_empty())
     }
 
     /// Whether nothing is being read, fitted or searched for.

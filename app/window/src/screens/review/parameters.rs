@@ -62,7 +62,7 @@ impl ReviewScreen {
 fn refusals_ui(ui: &mut Ui, subjects: &[ReviewSubject]) {
     for subject in subjects {
         if let Some(Err(reason)) = &subject.fit {
-            alarm_ui(ui, &format!("{}: no fit: {reason}", subject.name));
+            alarm_ui(ui, format!("{}: no fit: {reason}", subject.name));
         }
     }
 }

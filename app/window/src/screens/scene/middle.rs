@@ -99,7 +99,7 @@ impl SceneScreen {
         quiet_ui(ui, title);
         let now = match instant.now() {
             Ok(now) => now,
-            Err(reason) => return alarm_ui(ui, &reason.to_string()),
+            Err(reason) => return alarm_ui(ui, reason.to_string()),
         };
         let tick = &instant.tick;
         let picture = ScenePicture {
