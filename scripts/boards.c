@@ -222,7 +222,7 @@ static double normal(void) {
 // A millisecond of slide and tissue.
 static void axis_tick(void) {
   static int reported = -1;
-  static int64_t told_steps;
+  static int64_t reported_steps;
   if (!axis.avr->data[OCR1AL] && !axis.avr->data[OCR1AL + 1]) {
     const int number = AVR_DATA_TO_IO(OCR1AL);
     axis.avr->io[number].w.c(axis.avr, OCR1AL, 100, axis.avr->io[number].w.param);
@@ -233,8 +233,8 @@ static void axis_tick(void) {
     drive(&axis, 'C', PROBE_PIN, !is_home);
     drive(&axis, 'B', LIMIT_PIN, !is_end);
   }
-  if (steps != told_steps) {
-    told_steps = steps;
+  if (steps != reported_steps) {
+    reported_steps = steps;
     // When the others see them, which is later than when they were due if the computer is.
     note("steps", now_ns(), steps);
   }

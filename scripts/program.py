@@ -12,5 +12,5 @@ def palpate():
     if "PALPATE" in os.environ:
         return pathlib.Path(os.environ["PALPATE"]).resolve()
     subprocess.run(["cargo", "build", "--quiet"], cwd=ROOT, check=True)
-    told = subprocess.run(["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True)
-    return pathlib.Path(json.loads(told.stdout)["target_directory"]) / "debug" / "palpate"
+    listed = subprocess.run(["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True)
+    return pathlib.Path(json.loads(listed.stdout)["target_directory"]) / "debug" / "palpate"

@@ -45,7 +45,7 @@ pub struct ReplayResult {
     pub ticks: u64,
     /// Whether every computed number has the recorded bits.
     pub is_identical: bool,
-    pub first: Option<ReplayDifference>,
+    pub first: Option<TickDifference>,
     /// Whether the recording has its end; without, it was cut off after the last tick compared.
     pub is_whole: bool,
     /// Ticks dropped while recording.
@@ -56,7 +56,7 @@ pub struct ReplayResult {
 
 /// A number that has other bits than the recorded one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ReplayDifference {
+pub struct TickDifference {
     pub tick: u64,
     pub column: &'static str,
     pub recorded: String,
@@ -128,7 +128,7 @@ pub fn replay_ticks<const W: usize, const R: usize>(
                 None => row.whole[column].to_string(),
                 Some(real) => format!("{:?}", row.real[real]),
             };
-            first = Some(ReplayDifference {
+            first = Some(TickDifference {
                 tick: ticks,
                 column: whole.iter().chain(&real).copied().nth(column).unwrap_or(""),
                 recorded: text(row),
@@ -145,7 +145,7 @@ pub fn replay_ticks<const W: usize, const R: usize>(
         TickEnd::CutOff => (false, 0),
         TickEnd::Whole { lost_ticks, state_hash: left } => {
             if first.is_none() && left != hash {
-                first = Some(ReplayDifference {
+                first = Some(TickDifference {
                     tick: ticks,
                     column: "hash at the end",
                     recorded: format!("{left:016x}"),

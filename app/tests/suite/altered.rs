@@ -45,7 +45,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
 }
 
 #[test]
-fn a_review_that_was_cut_off_is_told_by_every_command() {
+fn a_review_that_was_cut_off_is_reported_by_every_command() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeded(&short_run(at, "library/sessions/one", &["--specimen", "gel"]));

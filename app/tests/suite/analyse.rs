@@ -30,7 +30,7 @@ fn table(at: &Path, name: &str, cycles: u32, speed: f64) {
 }
 
 #[test]
-fn cycles_of_a_table_are_told_and_drawn() {
+fn cycles_of_a_table_are_reported_and_drawn() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(at, "ten.csv", 10, 1.5);

@@ -33,7 +33,7 @@ fn found(at: &Path, args: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
+fn a_library_is_searched_tagged_reviewed_and_reported_over_time() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let nothing = palpate(at, &["find"]);

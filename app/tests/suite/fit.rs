@@ -138,7 +138,7 @@ fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
 }
 
 #[test]
-fn tables_without_header_or_unit_are_read_when_told_how() {
+fn tables_without_header_or_unit_are_read_when_reported_how() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let rows = rows(900, 0.1, 1.0);

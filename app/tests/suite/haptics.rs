@@ -5,7 +5,7 @@ use crate::support::{
 };
 
 #[test]
-fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
+fn the_thesis_body_is_reported_where_it_returns_energy_and_what_a_device_needs() {
     let at = tempfile::tempdir().unwrap();
     let with = palpate(at.path(), &["haptics", "check", "thesis", "--json"]);
     let with = json(&with);

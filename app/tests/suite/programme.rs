@@ -103,7 +103,7 @@ set = { depth = "DEPTH" }
 "#;
 
 #[test]
-fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_session() {
+fn what_its_protocols_ask_for_is_reported_before_anything_moves_and_stands_in_every_session() {
     let folder = with_mine();
     let at = folder.path();
     let write = |name: &str, text: String| fs::write(at.join(name), text).unwrap();

@@ -67,7 +67,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
 }
 
 #[test]
-fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
+fn what_is_asked_and_not_reported_or_wrongly_set_starts_nothing() {
     let folder = with_mine();
     let at = folder.path();
     for (more, words) in [
@@ -192,7 +192,7 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
 }
 
 #[test]
-fn a_limit_that_changes_nothing_is_told_where_it_stands() {
+fn a_limit_that_changes_nothing_is_reported_where_it_stands() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (limit, is_reported) in [

@@ -33,7 +33,7 @@ fn a_fast_session_is_run_read_fitted_replayed_and_exported() {
 }
 
 #[test]
-fn lateness_is_told_of_a_run_that_keeps_pace() {
+fn lateness_is_reported_of_a_run_that_keeps_pace() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let args = "run ramp-hold --speed 3 --depth 6 --hold 1 --time-scale 100 --out paced --json";

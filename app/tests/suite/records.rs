@@ -8,7 +8,7 @@ use palpate_sessions::log::Session;
 use std::fs;
 
 #[test]
-fn what_is_told_stands_in_the_session_and_the_table() {
+fn what_is_reported_stands_in_the_session_and_the_table() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let printed = [
@@ -285,7 +285,7 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
 }
 
 #[test]
-fn a_thickness_is_told_by_the_run_and_by_its_session() {
+fn a_thickness_is_reported_by_the_run_and_by_its_session() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let run =

@@ -231,7 +231,7 @@ fn a_page_proves_what_it_describes() {
 }
 
 #[test]
-fn figures_are_drawn_and_wrong_use_is_told() {
+fn figures_are_drawn_and_wrong_use_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeded(&short_run(at, "press", &["--seed", "3"]));

@@ -178,7 +178,7 @@ fn a_sensor_offset_is_no_part_of_the_peak() {
 }
 
 #[test]
-fn wrong_use_is_told_in_one_sentence() {
+fn wrong_use_is_reported_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(at, "slow.csv", &kelvin(), [1.0, 10.0]);

@@ -189,7 +189,7 @@ fn an_acknowledged_force_band_is_recorded() {
 }
 
 #[test]
-fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
+fn a_newer_a_truncated_and_a_damaged_session_are_reported_apart() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeded(&short_run(at, "whole", &[]));

@@ -47,7 +47,7 @@ fn a_rig_is_found_checked_and_watched() {
 }
 
 #[test]
-fn what_is_not_as_the_file_says_is_told() {
+fn what_is_not_as_the_file_says_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let (_emulator, at) = emulate_galil(&["--serial-number", "77"]);
     let file = rig_file(folder.path(), &at, "serial_number = 78\n");

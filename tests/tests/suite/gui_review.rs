@@ -110,7 +110,7 @@ fn one_session_is_looked_at_closely() {
 }
 
 #[test]
-fn sessions_are_fitted_compared_and_foretold() {
+fn sessions_are_fitted_compared_and_predicted() {
     let mut flow = review();
     let path = show(&mut flow, "ramp-hold-lab");
     flow.click("Parameters");

@@ -9,7 +9,7 @@ use palpate_tests::workspace;
 
 /// One thing that the text asks for.
 #[derive(Debug, PartialEq)]
-enum Deed {
+enum TutorialStep {
     /// A key, with Ctrl or without.
     Key(Key, Modifiers),
     /// A key whenever a question stands there, until the window says so.
@@ -43,7 +43,7 @@ fn said(sentence: &str) -> String {
 }
 
 /// The deeds of a step. A sentence ends with a full stop before a verb that is a deed.
-fn deeds(step: &str) -> Vec<Deed> {
+fn deeds(step: &str) -> Vec<TutorialStep> {
     let mut deeds = Vec::new();
     let text = step
         .replace(". Press ", ".\u{1}Press ")
@@ -55,22 +55,22 @@ fn deeds(step: &str) -> Vec<Deed> {
             if let (true, Some(name)) = (rest.starts_with('`'), between(rest, "`").first()) {
                 let (key, modifiers) = key(name);
                 match rest.contains("until") {
-                    true => deeds.push(Deed::KeyUntil(key, said(rest))),
-                    false => deeds.push(Deed::Key(key, modifiers)),
+                    true => deeds.push(TutorialStep::KeyUntil(key, said(rest))),
+                    false => deeds.push(TutorialStep::Key(key, modifiers)),
                 }
             } else {
                 // "Press A, then B" is two.
                 let names = between(rest, "**");
                 let count = if rest.contains(", then ") { 2 } else { 1 };
-                deeds.extend(names.iter().take(count).map(|name| Deed::Press((*name).into())));
+                deeds.extend(names.iter().take(count).map(|name| TutorialStep::Press((*name).into())));
             }
         } else if let Some(rest) = sentence.strip_prefix("Type ") {
             let text = between(rest, "`")[0].to_owned();
-            deeds.push(Deed::Type(text, between(rest, "**")[0].to_owned()));
+            deeds.push(TutorialStep::Type(text, between(rest, "**")[0].to_owned()));
         } else if let Some(rest) = sentence.strip_prefix("Wait for ") {
-            deeds.push(Deed::Wait(said(rest)));
+            deeds.push(TutorialStep::Wait(said(rest)));
         } else if let Some(rest) = sentence.strip_prefix("See ") {
-            deeds.push(Deed::See(said(rest)));
+            deeds.push(TutorialStep::See(said(rest)));
         }
     }
     deeds
@@ -99,13 +99,13 @@ fn says(window: &TestWindow, words: &str) -> bool {
     window.query_all_by_label_contains(words).next().is_some()
 }
 
-fn carry_out(flow: &mut WindowFlow, deed: &Deed) {
+fn carry_out(flow: &mut WindowFlow, deed: &TutorialStep) {
     match deed {
-        Deed::Key(key, modifiers) => {
+        TutorialStep::Key(key, modifiers) => {
             flow.window.key_press_modifiers(*modifiers, *key);
             flow.window.run_steps(4);
         }
-        Deed::KeyUntil(key, words) => {
+        TutorialStep::KeyUntil(key, words) => {
             for _ in 0..20 {
                 flow.wait("a question or the end", |window| {
                     let run = window.state().snapshot().run.as_ref();
@@ -125,7 +125,7 @@ fn carry_out(flow: &mut WindowFlow, deed: &Deed) {
             flow.window.run_steps(3);
             assert!(flow.says(words), "{words}");
         }
-        Deed::Press(name) => {
+        TutorialStep::Press(name) => {
             // What is closed for the moment says why; a reader would wait too.
             flow.wait(name, |window| {
                 let found = window.query_by_label(name);
@@ -133,7 +133,7 @@ fn carry_out(flow: &mut WindowFlow, deed: &Deed) {
             });
             flow.click(name);
         }
-        Deed::Type(text, name) => {
+        TutorialStep::Type(text, name) => {
             // Files go where the test's files go.
             let text = match text.as_str() {
                 "report.html" | "tables" => flow.folder.path().join("out").join(text),
@@ -141,8 +141,8 @@ fn carry_out(flow: &mut WindowFlow, deed: &Deed) {
             };
             flow.type_into(name, &text.display().to_string());
         }
-        Deed::Wait(words) => flow.wait(words, |window| says(window, words)),
-        Deed::See(words) => assert!(flow.says(words), "'{words}' is not there"),
+        TutorialStep::Wait(words) => flow.wait(words, |window| says(window, words)),
+        TutorialStep::See(words) => assert!(flow.says(words), "'{words}' is not there"),
     }
     flow.window.run_steps(3);
 }
@@ -173,18 +173,18 @@ fn steps_are_read_as_they_are_written() {
             "1. Press `Ctrl+K`: by name. Type `x y` into\n   **command**. Wait for *it: is*. See *A*.\n\nPress **No**.\n"
         ),
         [
-            Deed::Key(Key::K, Modifiers::COMMAND),
-            Deed::Type("x y".into(), "command".into()),
-            Deed::Wait("it: is".into()),
-            Deed::See("A".into()),
+            TutorialStep::Key(Key::K, Modifiers::COMMAND),
+            TutorialStep::Type("x y".into(), "command".into()),
+            TutorialStep::Wait("it: is".into()),
+            TutorialStep::See("A".into()),
         ]
     );
     assert_eq!(
         read("1. Press **A  F5**, then **B**: fine. Press `F2` and so on, until it is *finish*.\n"),
         [
-            Deed::Press("A  F5".into()),
-            Deed::Press("B".into()),
-            Deed::KeyUntil(Key::F2, "finish".into()),
+            TutorialStep::Press("A  F5".into()),
+            TutorialStep::Press("B".into()),
+            TutorialStep::KeyUntil(Key::F2, "finish".into()),
         ]
     );
 }

@@ -14,12 +14,12 @@ const STEP: [f64; 2] = [1.0, 0.5];
 
 /// Where the tool is wanted, in mm; the surface at rest is at 0, tissue below.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HandTarget {
+pub struct ToolTarget {
     at: Vec3,
     extent: [f64; 2],
 }
 
-impl HandTarget {
+impl ToolTarget {
     /// Above the middle of a surface of these lengths in mm.
     #[must_use]
     pub fn above(extent: [f64; 2]) -> Self {
@@ -103,8 +103,8 @@ mod tests {
         camera.orbit(0.7, 0.0);
         let picture = eframe::egui::Rect::from_min_max([0.0, 0.0].into(), [400.0, 400.0].into());
         let lens = camera.lens(picture);
-        let seen = |hand: &HandTarget| lens.see(hand.at()).unwrap().at;
-        let hand = HandTarget::above([60.0, 60.0]);
+        let seen = |hand: &ToolTarget| lens.see(hand.at()).unwrap().at;
+        let hand = ToolTarget::above([60.0, 60.0]);
         let moved = |key| {
             let mut one = hand;
             assert!(one.key(key, &camera));
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_tool_stays_over_the_surface_and_within_its_stroke() {
         let camera = Camera::of([60.0, 40.0]);
-        let mut hand = HandTarget::above([60.0, 40.0]);
+        let mut hand = ToolTarget::above([60.0, 40.0]);
         for key in [Key::ArrowRight, Key::ArrowUp, Key::PageDown] {
             for _ in 0..200 {
                 hand.key(key, &camera);

@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, Lens, Vec3, along};
 use super::facets::{SurfaceStyle, colour_depth, facets};
-use super::hand::{HandTarget, stylus};
+use super::hand::{ToolTarget, stylus};
 use crate::theme::Tokens;
 use crate::widgets::{NamedControl, tokens_of};
 use eframe::egui::epaint::Mesh;
@@ -53,7 +53,7 @@ pub struct ScenePicture<'a> {
 pub struct SceneView {
     camera: Camera,
     extent: [f64; 2],
-    hand: HandTarget,
+    hand: ToolTarget,
     /// Whether the lines of the mesh are drawn.
     pub has_lines: bool,
     /// The deepest depth since the scene began: colours do not change their meaning while one looks.
@@ -67,14 +67,14 @@ impl SceneView {
         Self {
             camera: Camera::of(extent),
             extent,
-            hand: HandTarget::above(extent),
+            hand: ToolTarget::above(extent),
             has_lines: false,
             deepest: 0.0,
         }
     }
 
     /// Where the pointer and the keys want the tool.
-    pub fn hand(&self) -> &HandTarget {
+    pub fn hand(&self) -> &ToolTarget {
         &self.hand
     }
 

@@ -164,7 +164,7 @@ fn a_stuck_a_restarted_and_an_unplugged_gauge() {
 }
 
 #[test]
-fn who_does_not_fit_is_told_in_words() {
+fn who_does_not_fit_is_reported_in_words() {
     let other = GaugeSettings { serial_number: Some("1".into()), ..GaugeSettings::default() };
     let err = refused(&bench(), &other);
     assert!(err.contains("3519042") && err.contains("says 1"), "{err}");

@@ -101,7 +101,7 @@ fn the_boards_clock_may_wrap() {
 }
 
 #[test]
-fn a_restart_is_told_and_values_come_again() {
+fn a_restart_is_reported_and_values_come_again() {
     let (mut bench, mut cell) = usual();
     bench.run(cell.dialogue.as_mut(), 100);
     bench.apply_fault(DeviceFault::Reset, true);
@@ -142,7 +142,7 @@ fn a_saturated_a_stuck_and_a_missing_chip() {
 }
 
 #[test]
-fn who_does_not_fit_is_told_in_words() {
+fn who_does_not_fit_is_reported_in_words() {
     let other = bench(EmulatedHx711Settings::default());
     let settings = Hx711Settings { board: Some("bench-2".into()), ..Hx711Settings::default() };
     let err = opened(&other, &settings).err().expect("another board").to_string();

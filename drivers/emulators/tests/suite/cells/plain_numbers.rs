@@ -165,7 +165,7 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
 }
 
 #[test]
-fn what_is_not_as_the_rig_file_says_is_told() {
+fn what_is_not_as_the_rig_file_says_is_reported() {
     let mut lines = vec!["1.5\n"; 20];
     lines.push("1.25\n");
     let mixed = refused(Script::new(&lines, 20), "unit = \"N\"\nfull_scale = 25\n");

@@ -100,10 +100,10 @@ fn board() -> Hx711Dialogue {
     Hx711Dialogue::new(header, 1e-6, Nanos::ZERO)
 }
 
-type Told = (Vec<CellSample>, Vec<String>, u64, Option<String>);
+type StreamOutcome = (Vec<CellSample>, Vec<String>, u64, Option<String>);
 
 /// All that a dialogue makes of a stream in pieces of a length, all of it arriving at one time.
-fn printed(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> Told {
+fn printed(mut dialogue: impl CellDialogue, bytes: &[u8], piece: usize) -> StreamOutcome {
     let at = Nanos::from_millis(20);
     for part in bytes.chunks(piece) {
         dialogue.handle_bytes(at, part);
@@ -182,7 +182,7 @@ fn opening_comes_to_an_end_whoever_answers() {
     }
 }
 
-/// Half a minute is the limit; what was opened is sensible, what was not is told.
+/// Half a minute is the limit; what was opened is sensible, what was not is reported.
 fn check(bench: &CellBench<Babbler>, opened: Result<OpenedCell, DeviceError>, seed: u128) {
     let passed = bench.clock()().since(Nanos::from_millis(1_000));
     assert!(passed < Nanos::from_millis(30_000), "seed {seed}: {passed:?}");

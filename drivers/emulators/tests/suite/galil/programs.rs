@@ -85,7 +85,7 @@ fn a_limit_runs_its_subroutine_and_returns() {
 }
 
 #[test]
-fn errors_run_cmderr_or_are_told_with_their_line() {
+fn errors_run_cmderr_or_are_reported_with_their_line() {
     let mut bench = with("#A\ni=var\nEN\n");
     bench.tell("XQ #A,2");
     bench.sample();

@@ -277,7 +277,7 @@ fn an_axis_that_nobody_looks_after_is_stopped_without_a_watchdog_too() {
 }
 
 #[test]
-fn a_reset_while_recording_is_told_as_one() {
+fn a_reset_while_recording_is_reported_as_one() {
     let mut host = Host::new(&GalilSettings { sampling: Sampling::Record, ..thesis() });
     host.pass(0.5);
     {

@@ -113,7 +113,7 @@ fn echo_half_a_line_and_half_a_download_are_got_rid_of() {
 }
 
 #[test]
-fn nobody_on_the_wire_is_told() {
+fn nobody_on_the_wire_is_reported() {
     let (mut here, _there) = memory_link_pair();
     // A clock of its own: each look is a tenth of a second later.
     let now = std::sync::atomic::AtomicU64::new(0);

@@ -163,7 +163,7 @@ fn a_computer_that_is_late_loses_only_what_was_written_over() {
 }
 
 #[test]
-fn a_recording_that_ends_is_told() {
+fn a_recording_that_ends_is_reported() {
     let mut host = enabled(&recorded());
     {
         let mut wire = host.wire.lock();
@@ -199,7 +199,7 @@ fn board(model: GalilModel) -> Shared {
 }
 
 #[test]
-fn all_models_record_and_a_full_memory_is_told() {
+fn all_models_record_and_a_full_memory_is_reported() {
     for model in
         [GalilModel::Dmc4143, GalilModel::Dmc4183, GalilModel::Dmc4040, GalilModel::Dmc2143]
     {

@@ -80,7 +80,7 @@ fn headers_of_post_processors_are_taken() {
 }
 
 #[test]
-fn a_new_zero_is_told_with_the_next_report() {
+fn a_new_zero_is_reported_with_the_next_report() {
     let mut board = Board::new();
     assert_eq!(board.say("$J=X2F1200\n"), "ok\r\n");
     board.pass(1_000);
@@ -192,7 +192,7 @@ fn startup_lines_are_tried_kept_and_done() {
 }
 
 #[test]
-fn overrides_are_told_at_once() {
+fn overrides_are_reported_at_once() {
     let mut board = Board::new();
     board.say("?");
     for (byte, printed) in

@@ -105,7 +105,7 @@ fn a_halt_without_a_welcome_is_a_lost_link() {
 }
 
 #[test]
-fn a_stop_is_told_when_the_axis_stands() {
+fn a_stop_is_reported_when_the_axis_stands() {
     let mut host = Host::new(&slide());
     host.tell(to(40_000, 20.0));
     host.pass(1.0);
@@ -240,7 +240,7 @@ fn silence_counts_as_death() {
 }
 
 #[test]
-fn a_limit_switch_that_locks_the_board_is_told() {
+fn a_limit_switch_that_locks_the_board_is_reported() {
     let mut eeprom = grbl::Eeprom::slide();
     eeprom.set(21, 1.0).expect("it takes it");
     let wire = wired(grbl::EmulatedGrblSettings {

@@ -23,7 +23,7 @@ fn refused(values: &[(u16, f64)], settings: &GrblSettings) -> String {
 }
 
 #[test]
-fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
+fn settings_that_are_otherwise_are_reported_with_the_line_that_mends_them() {
     for (number, value, words) in [
         (100, 250.0, "$100=400.000"),
         (110, 600.0, "$110=1200.000"),
@@ -109,7 +109,7 @@ fn a_board_that_a_limit_has_locked_is_reset_and_opened() {
 }
 
 #[test]
-fn a_board_that_is_held_is_told() {
+fn a_board_that_is_held_is_reported() {
     let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().board.receive(Nanos::ZERO, b"!");
     let err = try_connect(&wire, &slide()).expect_err("refused");
@@ -184,7 +184,7 @@ fn another_board_is_noticed() {
 }
 
 #[test]
-fn nobody_and_somebody_else_are_told() {
+fn nobody_and_somebody_else_are_reported() {
     let wire = wired(grbl::EmulatedGrblSettings::default());
     wire.lock().spoil = Box::new(|_| Vec::new());
     assert_eq!(try_connect(&wire, &slide()).unwrap_err(), GrblOpenError::Silent);

@@ -201,7 +201,7 @@ fn samples_follow_the_path_with_every_cell() {
 }
 
 #[test]
-fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
+fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_reported() {
     let Some(served) = start("hx711", Vec::new()) else {
         return;
     };

@@ -75,7 +75,7 @@ fn somebody_moves_it_at_its_panel() {
 }
 
 #[test]
-fn a_stand_that_does_not_begin_is_told() {
+fn a_stand_that_does_not_begin_is_reported() {
     let mut host = Host::new();
     host.pass(0.1);
     host.send(to(600, 2.0));
@@ -133,7 +133,7 @@ fn an_overload_reads_the_end_of_the_range() {
 }
 
 #[test]
-fn an_overload_in_mid_move_stops_it_and_is_told_once() {
+fn an_overload_in_mid_move_stops_it_and_is_reported_once() {
     let mut host = Host::new();
     host.tell(to(6_000, 2.0));
     host.pass(1.0);
@@ -181,7 +181,7 @@ fn a_cut_wire_leaves_it_at_its_target() {
 }
 
 #[test]
-fn a_crosshead_that_falls_behind_is_told_where_it_is() {
+fn a_crosshead_that_falls_behind_is_reported_where_it_is() {
     let mut host = Host::new();
     host.tell(to(6_000, 2.0));
     host.pass(1.0);

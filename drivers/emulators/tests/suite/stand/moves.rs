@@ -29,7 +29,7 @@ fn a_move_down_is_a_limit_and_a_letter() {
 }
 
 #[test]
-fn what_is_told_is_near_where_it_is() {
+fn what_is_reported_is_near_where_it_is() {
     let mut host = Host::new();
     for (target, speed) in [(50, 0.1), (2_000, 10.0), (1_990, 0.01), (1_991, 1.0), (1_000, 2.0)] {
         host.tell(to(target, speed));
@@ -156,7 +156,7 @@ fn home_is_the_stands_own_zero_and_positions_are_defined_here() {
 }
 
 #[test]
-fn the_limit_switch_ends_a_move_and_is_told() {
+fn the_limit_switch_ends_a_move_and_is_reported() {
     let mut host = Host::new();
     // Up, beyond the machine's end: it was switched on 5 to 15 mm below it.
     host.tell(to(-4_000, 10.0));

@@ -67,7 +67,7 @@ fn opening_stops_sets_and_reads_back() {
 }
 
 #[test]
-fn who_does_not_fit_is_told_in_words() {
+fn who_does_not_fit_is_reported_in_words() {
     let refused = |wire: &Shared, settings: &palpate_drivers::mark10::StandSettings| {
         wire.connect(settings).expect_err("a refusal").to_string()
     };
