@@ -220,7 +220,7 @@ pub fn export_all(
             folder.display()
         ),
         ExportDestination::Lake(lake) => format!(
-            "{} of {of} sessions added to {}, {were_there} were there",
+            "{} of {of} sessions added to {}; {were_there} were already there",
             written - were_there,
             lake.display()
         ),

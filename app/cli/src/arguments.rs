@@ -14,7 +14,7 @@ pub(super) fn choice<T: Clone + Send + Sync + 'static>(
     let words = table.iter().map(|(word, _, help)| PossibleValue::new(*word).help(*help));
     PossibleValuesParser::new(words).try_map(|text| {
         let row = table.iter().find(|(word, ..)| *word == text);
-        row.map(|(_, value, _)| value.clone()).ok_or("this is not one of the words")
+        row.map(|(_, value, _)| value.clone()).ok_or("this is not one of the allowed words")
     })
 }
 

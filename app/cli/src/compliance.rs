@@ -116,7 +116,7 @@ fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
     }));
     lines.push(match saved {
         Some(saved) => format!("saved as {}, {}", saved.id, saved.path.display()),
-        None => "not saved; --save saves it for 'palpate fit --compliance last'".into(),
+        None => "not saved; add --save to store it for 'palpate fit --compliance last'".into(),
     });
     lines.join("\n")
 }

@@ -7,6 +7,7 @@ use clap::Args;
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{PAGE_HEAD, page, text};
 use palpate_rheology::extremes::{ExtremesExtent, ExtremesVerdict};
+use palpate_sessions::atomic::replace;
 use std::path::{Path, PathBuf};
 
 /// Test numerical stability at the extremes, every family, integrator and fit
@@ -32,7 +33,8 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         (false, true) => (ExtremesExtent::Soak, "soak"),
         (false, false) => (ExtremesExtent::Whole, "whole"),
     };
-    if !args.page.as_deref().is_some_and(is_own_page) {
+    let own_page = args.page.as_deref().filter(|file| is_own_page(file));
+    if own_page.is_none() {
         new_file::check("page", args.page.as_deref())?;
     }
     let rows = survey(extent, args.family.as_deref(), &output.share_bar());
@@ -45,7 +47,12 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         "flagged": count(ExtremesVerdict::Flagged), "wrong": wrong, "rows": rows,
     });
     output.answer("extremes", &object, || text(&rows));
-    new_file::write("page", args.page.as_deref(), || page(&rows))?;
+    match own_page {
+        Some(file) => replace(file, page(&rows).as_bytes()).map_err(|err| {
+            Failure::failed(format!("cannot replace the page {} ({err})", file.display()))
+        })?,
+        None => new_file::write("page", args.page.as_deref(), || page(&rows))?,
+    }
     if wrong > 0 {
         return Err(Failure::failed(format!(
             "{wrong} of {} rows are wrong; they are marked WRONG above, please report them",

@@ -137,7 +137,7 @@ fn text(replayed: &Replayed) -> String {
         }
     };
     format!(
-        "{name}: {} samples, {decisions}; force within {:.1e} N, depth within {:.1e} mm",
+        "{name}: {} samples, {decisions}; force agrees within {:.1e} N, depth within {:.1e} mm",
         report.samples, report.force_difference_n, report.depth_difference_mm
     )
 }

@@ -10,6 +10,9 @@ fn the_extremes_agree_with_the_page_of_the_guide() {
     std::fs::write(at.join("notes.md"), "mine").unwrap();
     let refused = palpate(at, &["extremes", "--quick", "--page", "notes.md"]);
     assert_refused(&refused, 2, "exists already");
+    // An older page of this command is replaced.
+    let older = ["extremes", "--quick", "--family", "voigt", "--page", "page.md"];
+    succeeded(&palpate(at, &older));
     let run = answer(&palpate(at, &["extremes", "--quick", "--json", "--page", "page.md"]));
     assert_eq!(run["command"], "extremes");
     assert_eq!((&run["extent"], &run["wrong"]), (&"quick".into(), &0.into()));

@@ -14,7 +14,7 @@ pub enum EmulatorOrder {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum OrderError {
     /// Neither a fault nor an action.
-    #[error("{0}; or load GRAMS, mount NUMBER, unmount")]
+    #[error("{0}; or one of: load GRAMS, mount NUMBER, unmount")]
     Unknown(FaultError),
     #[error("'{order}' is not a valid order; give {right}")]
     Number { order: String, right: &'static str },

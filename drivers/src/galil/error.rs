@@ -32,7 +32,7 @@ impl GalilError {
             }
             ErrorCode(14 | 15) => "the controller's memory has failed; have it serviced",
             E::PROGRAM_RUNNING | E::STRAND_BUSY => {
-                "a program runs on the controller; halt it with HX"
+                "a program is running on the controller; stop it with HX"
             }
             E::CONTOURING => "end the contour mode with ST",
             E::MOTOR_OFF => "the motor is off; energise it and check the amplifier",

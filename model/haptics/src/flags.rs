@@ -32,7 +32,7 @@ facts! {
     ABOVE_SURFACE 11 "the probe is above the surface; the force is zero";
     PASSIVITY 12 "the control loop generated energy; damping is added to dissipate it";
     DAMPING_LIMIT 13 "the damping that would take all energy back at once is more than the device's mass allows; the rest waits";
-    BUZZ 14 "the device buzzes: the loop swings by itself";
+    BUZZ 14 "the control loop of the device oscillates by itself";
     PULSE_RATE 15 "the slave cannot follow: it would need more pulses than its drive may output";
     COUNT_RATE 16 "the encoder turns faster than it can be counted; counts may be lost";
     SATURATED 17 "the drive gives all it has; the torque is less than commanded";

@@ -70,7 +70,7 @@ impl CompanionFiles {
         let analyses = match Analyses::read(path, &salvage.manifest.session_id) {
             Ok(analyses) => analyses,
             Err(err) => {
-                self.left_out.push(format!("no analysis is taken over: {err}"));
+                self.left_out.push(format!("no analysis is copied: {err}"));
                 return;
             }
         };

@@ -62,7 +62,9 @@ fn deeds(step: &str) -> Vec<TutorialStep> {
                 // "Press A, then B" is two.
                 let names = between(rest, "**");
                 let count = if rest.contains(", then ") { 2 } else { 1 };
-                deeds.extend(names.iter().take(count).map(|name| TutorialStep::Press((*name).into())));
+                deeds.extend(
+                    names.iter().take(count).map(|name| TutorialStep::Press((*name).into())),
+                );
             }
         } else if let Some(rest) = sentence.strip_prefix("Type ") {
             let text = between(rest, "`")[0].to_owned();

@@ -234,7 +234,7 @@ fn curves(calibration: &Calibration, details: &CalibrationDetails) -> String {
 fn spread(quality: &CalibrationQuality) -> String {
     let hysteresis = match &quality.hysteresis {
         Some(one) => format!(
-            "hysteresis: at most {:.2} mV or {:.3} N, rms {:.2} mV or {:.3} N",
+            "hysteresis: at most {:.2} mV ({:.3} N), rms {:.2} mV ({:.3} N)",
             one.max_v * 1e3,
             one.max_n,
             one.rms_v * 1e3,

@@ -80,7 +80,9 @@ pub fn margin_text(margin: &Margin) -> String {
     match margin.ratio() {
         None => format!("At {depth:.2} the body brings all the damping it needs."),
         Some(ratio) if margin.is_enough() => {
-            format!("At {depth:.2} the device has {ratio:.1} times the damping needed.")
+            format!(
+                "At a depth of {depth:.2} the device has {ratio:.1} times the damping that it needs."
+            )
         }
         Some(ratio) => format!(
             "At {depth:.2} the device has {ratio:.2} of the damping needed; the guard adds the rest."

@@ -46,7 +46,7 @@ pub fn plot(selection: &ModelSelection) -> Plot {
         level: selection.tolerance_n.map(|tolerance| 1e3 * tolerance),
     };
     let title = match selection.is_predicted {
-        true => "Error of prediction over cost",
+        true => "Prediction error over cost",
         false => "Error of the fit over cost",
     };
     Plot { title: title.to_owned(), ..scatter.plot() }

@@ -30,7 +30,7 @@ pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(),
         "failed": failed,
     });
     output.answer("export", &object, || {
-        format!("{added} sessions added to {}, {was_there} were there", lake.display())
+        format!("{added} sessions added to {}; {was_there} were already there", lake.display())
     });
     match failed.len() {
         0 => Ok(()),

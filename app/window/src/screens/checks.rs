@@ -83,7 +83,7 @@ impl Screen for ChecksScreen {
         if checks.is_empty() {
             heading_ui(ui, "No daily check of this rig yet");
             ui.label(format!(
-                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows the drift of zero and weight."
+                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows how zero and weight drift."
             ));
             return;
         }

@@ -153,9 +153,9 @@ fn pause_words(run: &RunView) -> String {
             _ => format!("Will pause after step {}; resume cancels that.", step_index + 1),
         },
         PauseView::None if run.next_checkpoint.is_none() => {
-            "Running. No checkpoints remain. Pause before Resume or Finish early.".into()
+            "Running. No checkpoints remain. Pause first to resume or finish early.".into()
         }
-        PauseView::None => "Running. Pause before Resume or Finish early.".into(),
+        PauseView::None => "Running. Pause first to resume or finish early.".into(),
     }
 }
 

@@ -30,7 +30,7 @@ impl PlayerThread {
     /// Starts it at the beginning of the session. `wake` is called with every new picture.
     pub fn start(mut player: Player, wake: impl Fn() + Send + 'static) -> Result<Self, String> {
         let Some(first) = player.snapshot(0) else {
-            return Err("the session has no beginning".into());
+            return Err("the beginning of the session is missing".into());
         };
         let desk = Arc::new(Desk { wanted: Mutex::new(None), shown: Mutex::new(Arc::new(first)) });
         let (bell, rung) = sync_channel(1);

@@ -10,12 +10,12 @@
 //! Start at [`intervals`] for one protocol and at [`find_shortest_protocols`] for the search.
 //!
 //! ```
-//! use palpate_rheology::expected::{Noise, ProtocolPath, FreeOffsets, intervals};
+//! use palpate_rheology::expected::{FreeOffsets, MeasurementNoise, ProtocolPath, intervals};
 //! use palpate_model::viscoelastic::ModifiedKelvin;
 //! use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 //!
 //! let protocol = ProtocolPath::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(50.0), 1000.0);
-//! let noise = Noise::white(Newtons(0.02));
+//! let noise = MeasurementNoise::white(Newtons(0.02));
 //! let expected = intervals(&ModifiedKelvin::THESIS, &protocol, &noise, FreeOffsets::default())?;
 //! let tau = &expected.parameters[0];
 //! assert_eq!(tau.name, "tau_eps");

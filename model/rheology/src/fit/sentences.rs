@@ -77,7 +77,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
         if noise.correlation_time_s.is_none() {
             if is_few {
                 warnings.push(format!(
-                    "{} samples are few for {unknowns} parameters; the intervals are rough",
+                    "only {} samples for {unknowns} parameters; the intervals are rough",
                     report.samples
                 ));
             }

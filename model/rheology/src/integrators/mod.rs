@@ -92,7 +92,9 @@ pub enum IntegratorError {
     Body(#[from] BodyError),
     #[error(transparent)]
     Step(#[from] StepError),
-    #[error("steps of {0} s are not possible; a constant step is a finite time above zero")]
+    #[error(
+        "a time step of {0} s is not possible; a constant step is finite and greater than zero"
+    )]
     Time(f64),
     #[error(
         "{name} is unstable at steps of {dt} s, {h:.3} relaxation times; it is stable below {limit:.3}"

@@ -118,7 +118,7 @@ impl Reader {
         let unused = unused.filter(|_| !tasks.specimens.contains(&None));
         for (number, line) in unused {
             self.problems.error(line, format!(
-                "[specimen.{number}] describes a specimen that no task clips in; add specimen = {number} to the task that uses it, or remove the table"
+                "[specimen.{number}] describes a specimen that no task uses; add specimen = {number} to the task that should use it, or remove the table"
             ));
         }
         whole

@@ -129,7 +129,7 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
         .map_err(|err| format!("the blessings cannot be understood ({err}): {}", path.display()))?;
     match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
         Some(blessing) => Err(format!(
-            "decision {} is blessed without a reason; write it down: {}",
+            "decision {} is blessed without a reason; write the reason down: {}",
             blessing.decision,
             path.display()
         )),

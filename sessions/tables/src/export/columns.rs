@@ -225,7 +225,7 @@ impl<'a> Layout<'a> {
                 ));
             };
             if columns.contains(found) {
-                return Err(format!("column {name} is named twice; name it once"));
+                return Err(format!("column {name} is listed twice; list it once"));
             }
             columns.push(found.clone());
         }

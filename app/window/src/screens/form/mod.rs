@@ -190,7 +190,8 @@ impl ProtocolForm {
         let words = |problems: Vec<ProtocolProblem>| {
             problems.first().map_or_else(String::new, ToString::to_string)
         };
-        let protocol = built_in(manual.protocol).ok_or("the protocol is not built in")?;
+        let protocol =
+            built_in(manual.protocol).ok_or("this is not one of the built-in protocols")?;
         let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // A button of a manual move acknowledges nothing.

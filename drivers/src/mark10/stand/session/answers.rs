@@ -54,7 +54,7 @@ impl StandSession {
             let line = line.trim();
             self.refuse(
                 now,
-                format!("the stand reads back {line} for its {what}; check its range and that PC control is on"),
+                format!("the stand reports {line} as its {what}; check the range of the stand and that PC control is on"),
             );
         }
     }

@@ -44,7 +44,7 @@ fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
         legacy::check(bytes)?;
         // `calamine` trusts lengths in an .xls, and panics if damage has changed them.
         palpate_model::panics::catch_panic(|| read_xls(bytes))
-            .unwrap_or_else(|_| Err(damaged("its records contradict each other")))
+            .unwrap_or_else(|_| Err(damaged("the records of the workbook contradict each other")))
     } else {
         Err("the file is not a workbook: it begins neither like an .xlsx nor like an .xls".into())
     }
