@@ -19,6 +19,9 @@ const SHOWN: [(&str, &str); 7] = [
     ("f_offset", "N"),
 ];
 
+/// Height of a symbol's index in points: two thirds of the letter, as in print.
+const INDEX_SIZE: f32 = 9.0;
+
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     let live = run.and_then(|run| run.live.as_ref());
@@ -107,7 +110,7 @@ fn symbol_ui(ui: &mut Ui, name: &str) {
     let quiet = tokens_of(ui).text_quiet;
     let (letter, index) = symbol(name);
     let mut job = LayoutJob::default();
-    for text in [RichText::new(letter), RichText::new(index).small()] {
+    for text in [RichText::new(letter), RichText::new(index).size(INDEX_SIZE)] {
         let style = FontSelection::Default;
         text.color(quiet).append_to(&mut job, ui.style(), style, Align::BOTTOM);
     }
