@@ -80,7 +80,7 @@ mod tests {
             ("load -1", "a mass in g"),
             ("load nan", "a mass in g"),
             ("mount x", "number of a specimen"),
-            ("unmount 3", "or load GRAMS"),
+            ("unmount 3", "one of: load GRAMS"),
             ("melt", "garbage, drop"),
         ] {
             let err = parse(text).unwrap_err().to_string();
