@@ -15,7 +15,7 @@ mod window {
     use palpate_window::playback::run_playback;
     use palpate_window::window::{WindowOptions, run_window};
 
-    /// WindowOpener on this computer's screen.
+    /// Windows on this computer's screen.
     pub struct Desktop;
 
     impl WindowOpener for Desktop {

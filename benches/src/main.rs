@@ -18,7 +18,7 @@ use std::process::{Command, ExitCode, Stdio};
 
 /// Intervals of the thesis record: 1 kHz.
 const INTERVALS: u32 = 90_000;
-/// StressRelaxation time in s from which the peers start, a tenth of the hold; the truth is 1.023 s. What
+/// Relaxation time in s from which the peers start, a tenth of the hold; the truth is 1.023 s. What
 /// else they start from is computed from the record. palpate is given nothing.
 const TAU_START: f64 = 5.0;
 /// Repeats of our own fit; peers repeat three times.

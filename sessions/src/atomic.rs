@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use walkdir::WalkDir;
 
-/// FigureFormat of the hidden names.
+/// Form of the hidden names.
 const ENDING: &str = ".palpate.tmp";
 /// Letters of the file's name in the draft's name: file systems allow 255 bytes, and a letter has up to four.
 const NAME_LETTERS_MAX: usize = 50;

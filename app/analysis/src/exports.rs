@@ -115,7 +115,7 @@ pub fn sweep_lake(lake: &Path) {
 }
 
 pub fn add_to_lake(lake: &Path, session: &Path) -> Result<LakeAddition, ExportFailure> {
-    // ReviewSource at before it is read: a run that ends in between would be there without its end.
+    // Looked at before it is read: a run that ends in between would be there without its end.
     let is_in_use = is_in_use(session);
     let passing = edited_session::stream_edited(session)?;
     if is_in_use && passing.outline.end.is_none() {

@@ -39,7 +39,7 @@ pub fn in_order<T: Sync, R: Send>(
         .thread_name(|index| format!("fit-{}", index + 1))
         .build()
         .map_err(io::Error::other)?;
-    // ContactPieces leave the bridge one by one, in order.
+    // Pieces leave the bridge one by one, in order.
     let one = |piece: &T| match is_ending.load(Ordering::Relaxed) {
         true => Err(WorkFailure::NotBegun),
         false => {

@@ -59,7 +59,7 @@ impl TaskProgress {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// ContactPieces done, pieces in all, and what comes next.
+    /// Pieces done, pieces in all, and what comes next.
     pub fn read(&self) -> (usize, usize, String) {
         self.state.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }

@@ -19,7 +19,7 @@ use walkdir::WalkDir;
 
 /// Endings of file names that are taken for tables.
 const TABLES: [&str; 2] = ["csv", "tsv"];
-/// FigureFormat of a session's log.
+/// Ending of a session's log.
 const LOG: &str = "mcap";
 
 #[derive(Debug, Error)]

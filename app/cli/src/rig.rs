@@ -17,34 +17,34 @@ use palpate_sessions::folder::{HolderLock, library_folder};
 /// The bench of a simulated rig or behind an emulated device.
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
-    /// SimulatedMasterSlave rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
+    /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
     #[arg(long, default_value = "lab")]
     pub profile: SimProfile,
-    /// SimulatedMasterSlave rig: seed of its random numbers; the same seed gives the same run
+    /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// SimulatedMasterSlave rig: largest loss of elastic force after deeper loading, in percent
+    /// Simulated rig: largest loss of elastic force after deeper loading, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
-    /// SimulatedMasterSlave rig: white noise of the ideal load cell, rms, in mN
+    /// Simulated rig: white noise of the ideal load cell, rms, in mN
     #[arg(long, default_value = "20", value_name = "MN")]
     pub noise: SimNoise,
-    /// SimulatedMasterSlave rig: stiffness of the tissue, in percent of the default
+    /// Simulated rig: stiffness of the tissue, in percent of the default
     #[arg(long, default_value = "100", value_name = "PERCENT")]
     pub stiffness: SimStiffness,
-    /// SimulatedMasterSlave rig: thickness of the specimen on its stiff base, in mm
+    /// Simulated rig: thickness of the specimen on its stiff base, in mm
     #[arg(long, default_value = "100", value_name = "MM")]
     pub thickness: SimThickness,
-    /// SimulatedMasterSlave rig: machine compliance, in um/N
+    /// Simulated rig: machine compliance, in um/N
     #[arg(long, default_value = "0", value_name = "UM_PER_N")]
     pub compliance: SimCompliance,
-    /// SimulatedMasterSlave rig: shift of the tissue's surface by repeated loading, in percent of the greatest depth
+    /// Simulated rig: shift of the tissue's surface by repeated loading, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
-    /// SimulatedMasterSlave rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
+    /// Simulated rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
     #[arg(long, default_value = "0", value_name = "CELSIUS")]
     pub bath: SimBath,
-    /// SimulatedMasterSlave rig: when its digital input 1 goes high, in s; 0 for none
+    /// Simulated rig: when its digital input 1 goes high, in s; 0 for none
     #[arg(long, default_value = "0", value_name = "SECONDS")]
     pub input: SimInput,
 }
@@ -75,10 +75,10 @@ pub struct RigArgs {
     pub rig: String,
     #[command(flatten)]
     pub bench: BenchArgs,
-    /// SimulatedMasterSlave rig: controller clock, nominal (1000 us) or galil (976 us)
+    /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
     #[arg(long, default_value = "nominal")]
     pub clock: SimClock,
-    /// SimulatedMasterSlave rig: samples a second, 1000 to 20000
+    /// Simulated rig: samples a second, 1000 to 20000
     #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
     pub rate: SimRate,
     /// Furthest position from home, in mm; set it a little before the base, so that no search meets it

@@ -125,7 +125,7 @@ fn detect(args: &RigDetectArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn identify_device(at: &str, baud: u32) -> Result<DetectedDevice, String> {
-    // A name with a number behind the last colon is an address; ports of WindowOpener end in their colon.
+    // A name with a number behind the last colon is an address; ports of Windows end in their colon.
     let is_address = at
         .rsplit_once(':')
         .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());

@@ -18,7 +18,7 @@ pub struct Tokens {
     pub text: Color32,
     /// Labels, units, remarks.
     pub text_quiet: Color32,
-    /// SelectionReport text and toggles.
+    /// Selected text and toggles.
     pub selection: Color32,
     /// Keyboard focus.
     pub focus: Color32,

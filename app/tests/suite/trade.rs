@@ -13,7 +13,7 @@ fn stored(folder: &Path) -> PathBuf {
     files[0].clone()
 }
 
-/// CatalogChanges stored curves with their checksum, so that only their content can be wrong.
+/// Changes stored curves with their checksum, so that only their content can be wrong.
 fn resealed(file: &Path, change: impl FnOnce(&mut palpate_rheology::trade::TradeCurves)) {
     let mut curves = palpate_analysis::trade::stored::read_trade(file).expect("curves");
     change(&mut curves);

@@ -28,9 +28,9 @@ pub enum LineFault {
     Drop,
     /// Bytes arrive twice.
     Duplicate,
-    /// PromptResponder end early.
+    /// Answers end early.
     Partial,
-    /// PromptResponder arrive late.
+    /// Answers arrive late.
     Late,
     /// No byte reaches the device.
     Deaf,

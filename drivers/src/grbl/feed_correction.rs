@@ -4,7 +4,7 @@
 
 use palpate_model::Nanos;
 
-/// PromptResponder that took longer say too little of when they were true.
+/// Answers that took longer say too little of when they were true.
 const LATE_MAX: Nanos = Nanos::from_millis(40);
 /// A report is true to so much of a second, by link and segments.
 const GRAIN: f64 = 0.005;

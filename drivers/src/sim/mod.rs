@@ -48,7 +48,7 @@ const SPEED_MAX: MmPerS = MmPerS(20.0);
 const ACCELERATION: MmPerS2 = MmPerS2(4.0 * ACCELERATION_QUANTUM.0);
 /// Commands on their way; a controller's input buffer holds no more.
 const COMMANDS_MAX: usize = 64;
-/// CatalogChanges whenever equal settings no longer give equal events.
+/// Changes whenever equal settings no longer give equal events.
 const SIMULATOR_VERSION: u32 = 1;
 
 /// True values of a simulated rig, for demonstrations and tests. No decision of a run may

@@ -90,7 +90,7 @@ fn port_error(port: &str, err: &serialport::Error) -> WireError {
         Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
         Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
         // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
-        // port"; on WindowOpener a missing port has it too, with other words.
+        // port"; on Windows a missing port has it too, with other words.
         Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
         Kind::NoDevice if !std::path::Path::new(&port).exists() => {
             WireError::Missing { port, present: port_list() }

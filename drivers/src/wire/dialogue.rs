@@ -65,7 +65,7 @@ impl AnswerQueue {
         self.count
     }
 
-    /// PromptResponder a command. Returns the answers that may be given now, in order: those with none missing before them.
+    /// Answers a command. Returns the answers that may be given now, in order: those with none missing before them.
     fn answer(&mut self, number: u64, body: RigEventBody) -> Vec<RigEventBody> {
         if let Some((_, answer)) = self.owed.iter_mut().find(|(owed, _)| *owed == number) {
             *answer = Some(body);

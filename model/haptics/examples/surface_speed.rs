@@ -26,7 +26,7 @@ use std::time::Instant;
 
 /// A tick at 1 kHz.
 const TICK: f64 = 1e-3;
-/// StressRelaxation time of the thesis body in s.
+/// Relaxation time of the thesis body in s.
 const TAU: f64 = 1.023;
 /// Of neighbours, in mm.
 const SHEAR: f64 = 0.05;

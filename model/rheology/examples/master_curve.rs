@@ -15,7 +15,7 @@ use std::error::Error;
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// StressRelaxation times of the published series, in s: one to a decade.
+/// Relaxation times of the published series, in s: one to a decade.
 const DECADES: std::ops::Range<i32> = -2..29;
 
 /// Duration in s of the step that stands for the sudden one of a relaxation test: a millionth of the first

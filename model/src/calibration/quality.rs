@@ -1,4 +1,4 @@
-//! CalibrationQuality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
+//! Quality of a calibration: hysteresis, repeatability, zero shift, sensitivity, flat stretches.
 
 use super::CalibrationError;
 use super::curve::CalibrationCurve;

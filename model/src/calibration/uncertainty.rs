@@ -28,7 +28,7 @@ crate::named! {
     pub enum UncertaintyTerm {
         /// Tolerance of the weights, a rectangular distribution; each weight is one error in all its steps.
         Weights = "tolerance of the weights",
-        /// ScatterPlot of repeats over the root of their number, at each weight by itself.
+        /// Scatter of repeats over the root of their number, at each weight by itself.
         Repeatability = "repeatability",
         /// Digits with which readings were written down, rectangular, at each weight by itself.
         Resolution = "digits of the readings",

@@ -52,7 +52,7 @@ pub enum ContactFitError {
 /// Fewer points than this do not carry two outer and three linear parameters.
 const POINTS_MIN: usize = 30;
 
-/// StressRelaxation times scanned, in s: soft tissue under a slow probe.
+/// Relaxation times scanned, in s: soft tissue under a slow probe.
 const TAU_RANGE: [f64; 2] = [0.05, 20.0];
 const TAU_COUNT: usize = 12;
 const CONTACT_COUNT: usize = 60;

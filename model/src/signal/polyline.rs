@@ -35,7 +35,7 @@ pub struct PolylineReducer {
     points: [usize; 2],
 }
 
-/// PixelCoverage of every pixel by the line.
+/// Coverage of every pixel by the line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelCoverage {
     /// Pixels across and up.

@@ -33,9 +33,9 @@ pub struct ContactSearchPoint {
 /// Fewer forces than this do not carry two outer and six linear parameters.
 const FORCES_MIN: usize = 100;
 
-/// StressRelaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
+/// Relaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
 const TAU_RANGE: [f64; 2] = [0.02, 60.0];
-/// StressRelaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
+/// Relaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
 const TAU_COUNT: u32 = 10;
 /// Contact positions scanned, evenly over the search.
 const CONTACT_COUNT: u32 = 60;

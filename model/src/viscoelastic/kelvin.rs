@@ -13,7 +13,7 @@ use thiserror::Error;
 /// Parameters of the modified Kelvin body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModifiedKelvin {
-    /// StressRelaxation time of the force at constant depth, in s.
+    /// Relaxation time of the force at constant depth, in s.
     pub tau_eps: f64,
     /// Elastic coefficients `mu1, mu2, mu3` in N/mm, N/mm^2, N/mm^3.
     pub mu: [f64; 3],

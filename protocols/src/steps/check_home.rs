@@ -1,10 +1,10 @@
-//! ContactTrigger the home switch again and say how many pulses were missed.
+//! Touch the home switch again and say how many pulses were missed.
 
 use super::home::{Home, HomingPurpose, HomingRun, KEYS};
 use super::prelude::*;
 use crate::preview::CONTACT_EXPECTED_SHARE;
 
-/// ContactTrigger the home switch again and say how many pulses were missed.
+/// Touch the home switch again and say how many pulses were missed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CheckHome {
     pub speed: MmPerS,

@@ -15,7 +15,7 @@ pub(crate) enum Need {
     Outside,
 }
 
-/// SceneRequirements of every way that counts from the surface.
+/// Requirements of every way that counts from the surface.
 pub(crate) const FROM_SURFACE: &[Need] = &[Need::Motor, Need::Home, Need::Contact];
 
 impl Need {

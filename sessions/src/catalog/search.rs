@@ -16,7 +16,7 @@ use std::str::FromStr;
 pub struct CatalogQuery {
     /// Every word must begin a word of the session.
     pub words: String,
-    /// FileComparison exactly, as are the next four.
+    /// Compared exactly, as are the next four.
     pub specimen: Option<String>,
     pub operator: Option<String>,
     /// The protocol's name.

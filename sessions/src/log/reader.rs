@@ -36,7 +36,7 @@ pub struct Session {
     pub auxiliary: AuxiliaryData,
 }
 
-/// SessionSummary of a log's data other than samples and entries.
+/// Summary of a log's data other than samples and entries.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AuxiliaryData {
     /// Number of bytes exchanged with devices; [`Session::scan_parts`] visits them.

@@ -1,4 +1,4 @@
-//! SessionSummary of a session from its first and last chunk, in constant time for any length.
+//! Summary of a session from its first and last chunk, in constant time for any length.
 
 use super::content::{Content, LogPart};
 use super::files::find_files;

@@ -28,7 +28,7 @@ pub struct Recording {
 impl Recording {
     pub fn new(samples: usize, seed: u64) -> Self {
         let rows = rows(samples, seed);
-        // PromptResponder of the live fit, which wait for the next synchronisation, and a few events, which do not.
+        // Answers of the live fit, which wait for the next synchronisation, and a few events, which do not.
         let mut entries = entries(&rows, 130);
         for (number, entry) in entries.iter_mut().enumerate() {
             if number % 13 != 5 {

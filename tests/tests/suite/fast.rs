@@ -89,7 +89,7 @@ fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
             assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
             lab.now.seconds().0
         });
-        // ComplianceCorrections of a held force depend on the noise.
+        // Corrections of a held force depend on the noise.
         assert!((times[1] / times[0] - 1.0).abs() < 0.02, "{name}: {times:?}");
     }
 }

@@ -32,7 +32,7 @@ pub struct JointFit {
     pub overlays: Vec<FitOverlay>,
     /// Intervals of each recording, as far as they were asked for.
     pub intervals: Vec<FitIntervals>,
-    /// SystematicUncertainty uncertainty of each recording.
+    /// Systematic uncertainty of each recording.
     pub systematic: Option<Vec<SystematicUncertainty>>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,

@@ -98,7 +98,7 @@ pub struct BudgetTerm {
     pub uncertainty_n: Option<f64>,
 }
 
-/// CalibrationQuality, candidate curves and uncertainty of a calibration.
+/// Quality, candidate curves and uncertainty of a calibration.
 #[derive(Clone, Debug, Serialize)]
 pub struct CalibrationDetails {
     pub quality: CalibrationQuality,

@@ -9,7 +9,7 @@ use palpate_rheology::fit::{FitSample, LiveFit};
 use palpate_rheology::trade::LiveRow;
 use std::hint::black_box;
 
-/// StressRelaxation times in the bank.
+/// Relaxation times in the bank.
 const NODES: [usize; 5] = [16, 32, 64, 128, 256];
 
 /// A live fit with so many relaxation times after all samples; none that a bank cannot have.

@@ -23,7 +23,7 @@ const COLUMNS: [usize; 2] = [Quantity::Depth as usize, Quantity::Force as usize]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthLineKey {
     pub id: u64,
-    /// CatalogChanges with the samples.
+    /// Changes with the samples.
     pub version: u64,
     /// The first sample drawn and the one behind the last.
     pub rows: [usize; 2],

@@ -24,7 +24,7 @@ pub struct TimeMark {
     pub is_note: bool,
 }
 
-/// DrawStatistics behind and before the lines of every plot.
+/// Drawn behind and before the lines of every plot.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBackdrop {
     /// Start, end and phase, of the session in front.

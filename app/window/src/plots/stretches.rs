@@ -15,7 +15,7 @@ pub struct LineWindow {
     pub pixels: f64,
     /// Time of the track at the axis' zero, in s.
     pub shift: f64,
-    /// CatalogChanges with the track.
+    /// Changes with the track.
     pub version: u64,
 }
 

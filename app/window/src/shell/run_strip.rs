@@ -108,7 +108,7 @@ fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
         commands.push(UiCommand::NoteTyped);
     }
     let input = TextEdit::singleline(note).desired_width(180.0).char_limit(NOTE_MAX);
-    // DrawStatistics from the right, so the label comes after its field.
+    // Drawn from the right, so the label comes after its field.
     let input = ui.add(input).named("note");
     let label = ui.label("note");
     let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));

@@ -59,7 +59,7 @@ pub enum PreparedMotion {
     },
 }
 
-/// SwitchLevel of the axis's inputs: true is high, which is open.
+/// Levels of the axis's inputs: true is high, which is open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AxisInputs {
     /// Forward limit switch.

@@ -27,7 +27,7 @@ pub struct NumberFormat {
 }
 
 impl NumberFormat {
-    /// DecimalSign without leading zeros.
+    /// Decimals without leading zeros.
     pub const fn decimal(whole: usize, decimals: usize) -> Self {
         Self { whole, decimals, has_zeros: false, is_hex: false }
     }

@@ -40,7 +40,7 @@ impl GalilSession {
             }
             ExpectedReply::Part => {
                 let settings = self.settings.clone();
-                // PromptResponder to an order that a stop has ended are dropped.
+                // Answers to an order that a stop has ended are dropped.
                 if let Some((_, order)) = &mut self.order {
                     let next = order.take(reply, &settings);
                     self.apply_step(now, next);

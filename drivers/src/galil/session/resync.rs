@@ -29,7 +29,7 @@ impl Resynchronisation {
 }
 
 impl GalilSession {
-    /// PromptResponder and questions do not belong together any more: bytes were lost, doubled or spoilt.
+    /// Answers and questions do not belong together any more: bytes were lost, doubled or spoilt.
     pub(super) fn resynchronise(&mut self, now: Nanos) {
         self.stats.resynchronised += 1;
         self.parser.clear();

@@ -160,7 +160,7 @@ impl GalilSession {
             let text = format!("{}\r", commands.join(";"));
             return Some(Outgoing { text, expects });
         }
-        // PromptResponder of an order that a stop has ended may still be on their way.
+        // Answers of an order that a stop has ended may still be on their way.
         let has_answers_to_come = self.expected.iter().any(|(expects, _)| {
             matches!(expects, ExpectedReply::Part | ExpectedReply::RefusalReason)
         });

@@ -1,4 +1,4 @@
-//! SimulatedMasterSlave time: equal seeds and commands give equal events, nothing acts before it could, and
+//! Simulated time: equal seeds and commands give equal events, nothing acts before it could, and
 //! it is fast.
 
 use super::host::{self, answer_to, events_with, ideal, move_to, next_reading, settings};

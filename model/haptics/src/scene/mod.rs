@@ -36,7 +36,7 @@ const LED_MAX: u64 = 1000;
 pub struct SceneTick {
     /// Ticks since the start.
     pub tick: u64,
-    /// SensedPosition place of the stylus in mm.
+    /// Sensed position of the stylus in mm.
     pub device: [f64; 3],
     /// Its sensed yaw, pitch and roll in rad.
     pub turn: [f64; 3],

@@ -12,7 +12,7 @@ pub use body::{Integrator, Maxwell, MaxwellState, MaxwellStep};
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::FitError;
 
-/// StressRelaxation times tried by the scan.
+/// Relaxation times tried by the scan.
 const NODES: usize = 96;
 /// Longest relaxation time searched, in lengths of the record; the shortest is one interval.
 const LENGTHS: f64 = 10.0;

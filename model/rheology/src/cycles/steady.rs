@@ -9,7 +9,7 @@ pub struct SteadyRule {
     /// Largest change from one cycle to the next: of the peak in percent of it, of the place in percent of the greatest
     /// depth.
     pub percent: f64,
-    /// CatalogChanges in a row that have to be so small.
+    /// Changes in a row that have to be so small.
     pub in_a_row: usize,
 }
 
@@ -34,7 +34,7 @@ pub struct CycleChange {
     pub shift_percent: Option<f64>,
 }
 
-/// CatalogChanges from cycle to cycle and what they amount to.
+/// Changes from cycle to cycle and what they amount to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steadiness {
     /// One for every cycle but the first.

@@ -190,7 +190,7 @@ pub(super) fn rows(
 }
 
 fn family_answer(family: &Arc<dyn Family>, case: &RecordCase) -> SubjectAnswer {
-    // StressRelaxation times around a second on the record's scale.
+    // Relaxation times around a second on the record's scale.
     let first = if times(&**family) > 1 { 0.2 } else { 1.0 };
     let body = make_member(&**family, first * case.time, 20.0 * case.depth, 2.0 * case.force);
     let samples = case.samples(|path| body.along(path.iter().copied()).ok());

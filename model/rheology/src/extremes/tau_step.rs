@@ -1,4 +1,4 @@
-//! StressRelaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
+//! Relaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
 
 use super::ExtremesExtent;
 use super::judge::{ExtremesRow, PathCase};

@@ -5,7 +5,7 @@ use super::spectrum::Spectrum;
 use super::table::FamilyKind;
 use std::f64::consts::{LN_10, PI};
 
-/// StressRelaxation modulus `k0 + k1 E_alpha(-(t / tau)^alpha)`, with the Mittag-Leffler function; as an
+/// Relaxation modulus `k0 + k1 E_alpha(-(t / tau)^alpha)`, with the Mittag-Leffler function; as an
 /// equation `F + tau^alpha D^alpha F = k0 x + (k0 + k1) tau^alpha D^alpha x`.
 ///
 /// Mainardi, "Fractional Calculus and Waves in Linear Viscoelasticity", section 3.2. The function is
@@ -27,7 +27,7 @@ static FRACTIONAL: Spectrum = Spectrum {
 pub(super) const KIND: FamilyKind =
     FamilyKind { word: "fractional", of: |number| FRACTIONAL.family(number), compared: None };
 
-/// StressRelaxation times that no recording resolves, relative to `tau`: twelve
+/// Relaxation times that no recording resolves, relative to `tau`: twelve
 /// decades either way; what lies beyond is lumped into a dashpot and a spring.
 const DECADES: f64 = 12.0;
 

@@ -178,7 +178,7 @@ impl DepthDrive {
 /// One term `y + tau y' = elastic(x) + d/dt rate(x)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaxationTerm {
-    /// StressRelaxation time in s; 0 for a term without memory.
+    /// Relaxation time in s; 0 for a term without memory.
     pub tau: f64,
     /// The limit when depth is held.
     pub elastic: DepthDrive,

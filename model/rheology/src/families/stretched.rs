@@ -5,7 +5,7 @@ use super::spectrum::Spectrum;
 use super::table::FamilyKind;
 use std::f64::consts::{LN_10, PI};
 
-/// StressRelaxation modulus `k0 + k1 exp(-(t / tau)^beta)`; the force is `k0 x + k1 int exp(-((t - s) / tau)^beta) x' ds`.
+/// Relaxation modulus `k0 + k1 exp(-(t / tau)^beta)`; the force is `k0 x + k1 int exp(-((t - s) / tau)^beta) x' ds`.
 ///
 /// Kohlrausch 1854; Williams & Watts, Trans. Faraday Soc. 66 (1970) 80-85; of cartilage June, Ly & Fyhrie, Arch.
 /// Biochem. Biophys. 483 (2009) 75-80. The modulus is the mean of `exp(-s S)` over a positive stable random number

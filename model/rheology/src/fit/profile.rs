@@ -20,7 +20,7 @@ use super::uncertainty::{Uncertainty, UncertaintyEstimate};
 use crate::families::OuterRange;
 use serde::{Deserialize, Serialize};
 
-/// StressRelaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
+/// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
 /// leave less than a thousandth of an interval.
 const NODES: usize = 7;
 const NODES_WIDE: usize = 15;
@@ -29,7 +29,7 @@ const NARROW: f64 = 0.5;
 const REACH: f64 = 1.3;
 /// Times the range is widened before an end counts as open.
 const WIDENINGS: usize = 6;
-/// StressRelaxation times at which the maximum is looked for before it is refined.
+/// Relaxation times at which the maximum is looked for before it is refined.
 const LOOKS: usize = 400;
 
 /// Values tried for one end where a parameter is kept at one after another.

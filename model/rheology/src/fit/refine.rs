@@ -200,7 +200,7 @@ impl Iterate {
         }
     }
 
-    /// CatalogChanges of all unknowns; none of those held or bound.
+    /// Changes of all unknowns; none of those held or bound.
     fn solution(&self, linear: usize, held: &[bool], damping: f64) -> Vec<f64> {
         let joint = &self.pass.joint;
         let all = linear + held.len();

@@ -15,7 +15,7 @@ use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::brent::BrentOpt;
 use std::sync::Arc;
 
-/// StressRelaxation times tried where there is one.
+/// Relaxation times tried where there is one.
 const NODES: usize = 48;
 /// Brackets refined when the sum of squares has several valleys.
 const VALLEYS: usize = 3;
@@ -27,7 +27,7 @@ const OTHERS: [usize; 3] = [7, 4, 6];
 const CELLS: usize = 4;
 /// The grid for an unknown contact: relaxation times, contact positions.
 const CONTACT_GRID: (usize, usize) = (20, 28);
-/// StressRelaxation times of the grid from which a Prony series is grown: at least so many, and so many for
+/// Relaxation times of the grid from which a Prony series is grown: at least so many, and so many for
 /// each factor of ten, since non-negative sums of neighbours closer than that are not separable.
 const GROWN: (usize, f64) = (40, 6.0);
 

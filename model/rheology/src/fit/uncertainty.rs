@@ -18,7 +18,7 @@ const ROUNDING: f64 = 1e-24;
 /// Share of a parameter over which what is derived from it is differenced.
 const DIFFERENCE: f64 = 1e-6;
 
-/// ScatterPlot and autocorrelation of the residuals of all records.
+/// Scatter and autocorrelation of the residuals of all records.
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound(serialize = "[f64; N]: Serialize", deserialize = "[f64; N]: Deserialize<'de>"))]
 pub struct SeriesBody<const N: usize> {
-    /// StressRelaxation time in s.
+    /// Relaxation time in s.
     pub tau_eps: f64,
     /// `mu1 ..= muN` in N/mm^k.
     pub mu: [f64; N],

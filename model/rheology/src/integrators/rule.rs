@@ -147,7 +147,7 @@ impl Rule for ExponentialFirstOrder {
 
 /// The classical Runge-Kutta rule of fourth order (Kutta 1901), its four stages joined: the equation is linear in the force, so they are three weights of the forcing and one of the force.
 ///
-/// Stable below `h = 2.785`. Fourth order. SceneRequirements the depth in mid-step, which a sampled path does not
+/// Stable below `h = 2.785`. Fourth order. Needs the depth in mid-step, which a sampled path does not
 /// have: taken from the straight line between the samples.
 #[derive(Clone, Copy, Debug)]
 pub struct RungeKutta;

@@ -16,7 +16,7 @@ use psi::Weights;
 pub use rule::RuleReference;
 use thiserror::Error;
 
-/// DecimalSign digits carried unless asked otherwise: fifty that count, and a guard for the cancellation of
+/// Decimals digits carried unless asked otherwise: fifty that count, and a guard for the cancellation of
 /// the closed forms, which costs the digits of the ratio of times and depths (twelve decades each).
 pub const REFERENCE_DIGITS: usize = 75;
 

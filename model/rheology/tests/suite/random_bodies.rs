@@ -1,6 +1,6 @@
 //! Recovery without a guess: the fit finds any body whose record can show it.
 //!
-//! StressRelaxation time log-uniform in 0.01..100 s, the other parameters log-uniform over two decades
+//! Relaxation time log-uniform in 0.01..100 s, the other parameters log-uniform over two decades
 //! around the thesis's with its signs; a ramp of 40 s to 30 mm, then a hold of five relaxation times
 //! or 50 s, whichever is longer; 100 Hz, no noise. `PALPATE_RANDOM_BODIES=1000` draws a thousand
 //! bodies instead of sixty, the first sixty the same.

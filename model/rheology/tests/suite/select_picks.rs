@@ -1,4 +1,4 @@
-//! ModelSelection finds the family that made the records.
+//! Selection finds the family that made the records.
 //!
 //! Each family in turn makes three records of one body: a slow deep press and a fast shallow one, both
 //! held for eight hours, and a press that comes back; samples are 10 ms apart after every corner of the path

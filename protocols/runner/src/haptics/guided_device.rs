@@ -210,7 +210,7 @@ mod tests {
         assert_eq!(times.len(), 500);
         let apart = |pair: &[f64]| (pair[1] - pair[0] - APART.0).abs() < 1e-9;
         assert!(times.windows(2).all(apart));
-        // ReviewSource at late, the last ones are there.
+        // Looked at late, the last ones are there.
         let late: Vec<f64> = led.view().since(0).map(|point| point.t).collect();
         assert_eq!(late, times[times.len() - TRAIL..]);
     }

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// FigureFormat of a complete run in the journal.
+/// Form of a complete run in the journal.
 pub const FINISHED: &str = "finish";
 
-/// FigureFormat of a run that the rig or its preview refused: it has no session.
+/// Form of a run that the rig or its preview refused: it has no session.
 pub const REFUSED: &str = "refused";
 
 /// One line of a programme's journal.

@@ -48,7 +48,7 @@ impl Default for FindContact {
     /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is eight times slower.
     ///
     /// The press to 0.42 N leaves a sixth of the 0.5 N that contact finding may ever exert to filter and
-    /// brake; the 6 s after it are six relaxation times of pig stomach. JointFit with the pass to 0.14 N they
+    /// brake; the 6 s after it are six relaxation times of pig stomach. Together with the pass to 0.14 N they
     /// give the contact position to 0.02 mm at 0.05 N of noise, with nothing known of the body beforehand; a
     /// pass of its own would give 0.06 mm.
     fn default() -> Self {

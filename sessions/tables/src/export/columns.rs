@@ -170,7 +170,7 @@ pub(super) struct Layout<'a> {
     manifest: &'a Manifest,
 }
 
-/// SelectionReport samples: their numbers in the session, and their rows.
+/// Selected samples: their numbers in the session, and their rows.
 #[derive(Clone, Copy)]
 pub(super) struct Samples<'a> {
     pub numbers: &'a [u64],

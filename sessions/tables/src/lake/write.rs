@@ -32,7 +32,7 @@ pub struct LakeAddition {
     pub was_there: bool,
 }
 
-/// Adds a session to a lake. ExistingFile files must have the same content.
+/// Adds a session to a lake. Existing files must have the same content.
 pub fn add_session(
     lake: &Path,
     outline: &SessionOutline,

@@ -87,7 +87,7 @@ impl ReviewSubject {
         !matches!(self.recording.stage, Stage::Waiting | Stage::Reading)
     }
 
-    /// CatalogChanges with every fifth of it that was read, so that lines are not found again for every piece.
+    /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
     pub fn fifths(&self) -> u64 {
         if self.is_settled() { u64::MAX } else { (self.recording.share() * 5.0) as u64 }
     }

@@ -16,7 +16,7 @@ use palpate_model::units::{Newtons, Volts};
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// ContactPieces that reach further than bytes alone do: of gauges, boards, and what they are asked.
+/// Pieces that reach further than bytes alone do: of gauges, boards, and what they are asked.
 const PIECES: &[&str] = &[
     "4.285 N",
     "-18.78 lbF",

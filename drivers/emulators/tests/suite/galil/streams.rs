@@ -6,7 +6,7 @@ use palpate_emulators::galil::GalilModel;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 
-/// ContactPieces that reach further into the language than bytes alone do.
+/// Pieces that reach further into the language than bytes alone do.
 const PIECES: &[&str] = &[
     "MG ",
     "_TPA",

@@ -11,7 +11,7 @@ use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::RigCommand;
 
-/// ContactPieces that reach further than bytes alone do: of the board, and of whoever talks to it.
+/// Pieces that reach further than bytes alone do: of the board, and of whoever talks to it.
 const PIECES: &[&[u8]] = &[
     b"ok\r\n",
     b"error:",

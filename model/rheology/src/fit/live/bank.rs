@@ -7,7 +7,7 @@
 use crate::vectors::run_wide;
 use palpate_model::viscoelastic::{ContactPieces, NEGLIGIBLE, psi_all};
 
-/// StressRelaxation times in the bank unless asked otherwise: on the protocol of the thesis twice as many are no
+/// Relaxation times in the bank unless asked otherwise: on the protocol of the thesis twice as many are no
 /// more exact and half as many leave tau off by 2e-6 (`palpate trade`).
 pub(super) const NODES: usize = 64;
 /// Fewest: a factor of two between neighbours. Most: what a sample at 1 kHz leaves time for.
@@ -89,7 +89,7 @@ pub(super) struct Bank {
     shared: [f64; 3],
 }
 
-/// StressRelaxation times evenly placed by their logarithm.
+/// Relaxation times evenly placed by their logarithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Grid {
     /// How many: a whole number of chunks.
@@ -108,7 +108,7 @@ impl Grid {
         (TAU_RANGE[1] / TAU_RANGE[0]).ln() / (self.nodes - 1) as f64
     }
 
-    /// StressRelaxation time in s at a place between nodes, counted in nodes.
+    /// Relaxation time in s at a place between nodes, counted in nodes.
     pub fn tau_at(self, place: f64) -> f64 {
         TAU_RANGE[0] * (self.spacing() * place).exp()
     }

@@ -8,7 +8,7 @@ const TOLERANCE_SHARE: f64 = 0.002;
 /// Tolerance in mean steps between samples: stairs deviate by one, noise of the depth by up to
 /// four standard deviations where its mean step is 1.13 of them.
 const TOLERANCE_STEPS: f64 = 4.0;
-/// ContactPieces kept. What the first ones identify, the later ones cannot undo.
+/// Pieces kept. What the first ones identify, the later ones cannot undo.
 const PIECES_MAX: usize = 256;
 
 #[derive(Clone, Debug, Default, PartialEq)]
