@@ -15,8 +15,9 @@ use crate::source::{self, FitSource, SourceError, SourceSelection};
 use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty};
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
-    self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample,
-    ProfileInterval, SystematicUncertainty, TracedRecord, estimate_systematic,
+    self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample, FitSolution,
+    ProfileInterval, Signal, SignalRecord, SystematicUncertainty, TracedRecord,
+    estimate_systematic,
 };
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
@@ -112,6 +113,8 @@ pub struct SourceFit {
     pub seconds: f64,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
+    /// What the load cell reported, where it was recorded.
+    pub signal: Option<Signal>,
     pub systematic: Option<SystematicUncertainty>,
     /// Effect of the machine compliance on the depths, applied or not.
     pub compliance: Option<ComplianceCorrection>,
@@ -121,13 +124,19 @@ impl SourceFit {
     #[must_use]
     pub fn of(source: FitSource, options: &FitOptions) -> Self {
         let watch = Stopwatch::start();
-        let result = fit::fit(&source.samples, options);
+        let record = SignalRecord {
+            name: "the record",
+            samples: &source.samples,
+            signal: source.signal.as_ref(),
+        };
+        let result = FitSolution::fit_signals(&[record], options, &[]).map(|one| one.report());
         Self {
             seconds: watch.seconds(),
             samples: source.samples,
             start: source.start,
             notes: source.notes,
             calibration: source.calibration,
+            signal: source.signal,
             systematic: None,
             compliance: None,
             result,

@@ -1,13 +1,14 @@
 //! Reads sessions and foreign tables for a fit.
 
 mod error;
+mod signal;
 
 pub use error::SourceError;
 
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
-use palpate_rheology::fit::FitSample;
+use palpate_rheology::fit::{FitSample, Signal};
 use palpate_sessions::{EntryKind, LogEntry, SampleRow, Session};
 use palpate_tables::import::{ColumnNames, MeasurementTable, read_table};
 use std::path::Path;
@@ -31,6 +32,8 @@ pub struct FitSource {
     pub rig: Option<String>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
+    /// What the load cell reported; `None` where it was not recorded or the zero was not seen.
+    pub signal: Option<Signal>,
 }
 
 /// Part of an indentation that is read.
@@ -146,7 +149,8 @@ pub fn of_session(
         leave_out(left_out_s, Seconds(0.0), &mut samples);
         return Ok(FitSource { samples, specimen, notes: session.notes, ..FitSource::default() });
     }
-    let mut samples = fit_samples(&session, stretch)?;
+    let (rows, mut samples) = fitted_rows(&session, stretch)?;
+    let signal = signal::of_session(&session, &rows)?;
     leave_out(left_out_s, since_first(&session, stretch), &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
@@ -158,7 +162,7 @@ pub fn of_session(
         ));
     }
     let rig = session.manifest.rig.map(|rig| rig.name);
-    Ok(FitSource { samples, start, notes, specimen, rig, calibration })
+    Ok(FitSource { samples, start, notes, specimen, rig, calibration, signal })
 }
 
 /// The samples of an imported session, its time from the first one.
@@ -196,19 +200,28 @@ pub fn fit_samples(
     session: &Session,
     stretch: RecordStretch,
 ) -> Result<Vec<FitSample>, SourceError> {
+    fitted_rows(session, stretch).map(|(_, samples)| samples)
+}
+
+/// These samples, and the numbers of the rows that they were made of.
+fn fitted_rows(
+    session: &Session,
+    stretch: RecordStretch,
+) -> Result<(Vec<usize>, Vec<FitSample>), SourceError> {
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.tick().0;
     let trusted = trusted_samples(&decisions);
     let rows = session.rows.iter().enumerate();
-    let (mut first_tick, mut phases) = (None, Vec::new());
+    let (mut first_tick, mut phases, mut taken) = (None, Vec::new(), Vec::new());
     let mut samples: Vec<FitSample> = rows
         .filter(|(_, row)| is_fitted(row, stretch))
         .filter_map(|(index, row)| {
             let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
             let first_tick = *first_tick.get_or_insert(row.tick);
             phases.push(row.phase);
+            taken.push(index);
             let is_known = index < trusted && !is_saturated(session, row);
             let unknown = Newtons(f64::INFINITY);
             let sigma = if is_known { curve.force_sigma(force, noise) } else { unknown };
@@ -221,7 +234,7 @@ pub fn fit_samples(
             sample.sigma = Newtons(f64::INFINITY);
         }
     }
-    if samples.is_empty() { Err(SourceError::Empty) } else { Ok(samples) }
+    if samples.is_empty() { Err(SourceError::Empty) } else { Ok((taken, samples)) }
 }
 
 fn is_fitted(row: &SampleRow, stretch: RecordStretch) -> bool {

@@ -23,6 +23,7 @@ mod report;
 mod sample;
 mod search;
 mod sentences;
+mod signal;
 mod solve;
 mod system;
 mod systematic;
@@ -37,6 +38,7 @@ pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
 pub use report::{FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate};
 pub use sample::{FitError, FitSample};
+pub use signal::{Signal, SignalRecord, UnloadedMean};
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
     SystematicError, SystematicUncertainty, TermError, TracedRecord, estimate_systematic,

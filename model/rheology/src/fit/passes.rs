@@ -77,7 +77,9 @@ impl System<'_> {
             .collect();
         let records = records?;
         let factors = records.iter().map(|record| &record.factor);
-        Some(Pass { joint: self.stack(factors, Column::Residual), records })
+        let mut joint = self.stack(factors, Column::Residual);
+        self.push_contacts(points, &mut joint);
+        Some(Pass { joint: joint.finish(), records })
     }
 
     /// All records triangularised at given outer parameters, without derivatives.
@@ -91,7 +93,7 @@ impl System<'_> {
                 (rows == Rows::Thin || factor.is_finite()).then_some(factor)
             })
             .collect();
-        Some(self.stack(factors?.iter(), Column::Force))
+        Some(self.stack(factors?.iter(), Column::Force).finish())
     }
 
     /// The best coefficients at given outer parameters and the weighted sum of squares left; `None` where these are no
@@ -134,7 +136,7 @@ impl System<'_> {
     }
 
     /// Stacks the triangles of the records with their columns mapped to the unknowns.
-    fn stack<'f>(&self, factors: impl Iterator<Item = &'f Factor>, last_is: Column) -> Factor {
+    fn stack<'f>(&self, factors: impl Iterator<Item = &'f Factor>, last_is: Column) -> Triangle {
         let unknowns = match last_is {
             Column::Residual => self.unknowns.len(),
             Column::Force => self.linear,
@@ -157,7 +159,7 @@ impl System<'_> {
                 joint.push(&mapped, 1.0);
             }
         }
-        joint.finish()
+        joint
     }
 
     /// Where each of the first `unknowns` finds its column in a record's triangle.
@@ -196,6 +198,9 @@ impl System<'_> {
         let is_residual = last_is == Column::Residual;
         let slopes = if is_residual { self.slopes(record) } else { Vec::new() };
         let scale = self.scale(&point.outer);
+        if let (Some(term), true, Rows::All) = (&self.signals[record], is_residual, rows) {
+            return self.signal_factor(record, term, point, &slopes);
+        }
         if rows == Rows::Thin {
             let factor = self.source.thin_factor(&thin.blocks, scale, point, &slopes)?;
             let factor = if is_residual { factor.subtract_explained(&point.at) } else { factor };

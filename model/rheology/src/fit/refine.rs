@@ -150,7 +150,7 @@ impl Iterate {
         rows: Rows,
         allowed: f64,
     ) -> Option<Self> {
-        if !system.source.is_fast() {
+        if !system.source.is_fast() && !system.has_signal() {
             let outers: Vec<OuterPoint> = points.iter().map(|point| point.outer.clone()).collect();
             let (solved, sum) = system.solved(&outers, rows)?;
             if sum > allowed {

@@ -8,6 +8,7 @@ use super::refine::{GAIN_THIN, RefinedFit, StopRule, refine};
 use super::report::{FitReport, JointReport};
 use super::sample::{FitError, FitSample, NamedSamples};
 use super::search::best_outers;
+use super::signal::SignalRecord;
 use super::system::{Rows, System};
 use crate::families::{Family, Model, ModelError};
 use std::sync::Arc;
@@ -172,6 +173,28 @@ impl<'a> FitSolution<'a> {
     ) -> Result<Self, FitError> {
         let system = joint_system(records, options, shared)?;
         let points = search_start(&system)?;
+        Self::refined(system, &points)
+    }
+
+    /// Fits several records together in what the load cell reported, where their signals are given: noise, zero and
+    /// contact position then have the uncertainty that they have. [`fit_joint`] says what `shared` is.
+    pub fn fit_signals(
+        records: &[SignalRecord<'a>],
+        options: &FitOptions,
+        shared: &[&str],
+    ) -> Result<Self, FitError> {
+        let named: Vec<NamedSamples<'a>> =
+            records.iter().map(|one| (one.name, one.samples)).collect();
+        let system = joint_system(&named, options, shared)?;
+        let mut points = search_start(&system)?;
+        let system = system.with_signals(records);
+        for (point, signal) in points.iter_mut().zip(&system.signals) {
+            if signal.is_some()
+                && let Some(offset) = point.at.last_mut()
+            {
+                *offset = 0.0;
+            }
+        }
         Self::refined(system, &points)
     }
 

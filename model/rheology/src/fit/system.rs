@@ -11,8 +11,12 @@ use super::options::{FitOptions, KnownParameter, Layout};
 use super::parameters::union;
 use super::record::{Record, check};
 use super::sample::{FitError, FitSample, NamedSamples};
+use super::signal::{SignalRecord, SignalTerm};
 use crate::families::Family;
 use std::sync::Arc;
+
+/// Standard uncertainties from where its touch found it within which a contact is searched.
+const CONTACT_REACH: f64 = 20.0;
 
 /// One number the fit finds: a parameter of one record, or of all.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +62,8 @@ pub(super) struct System<'a> {
     pub unknowns: Vec<Unknown>,
     pub linear: usize,
     pub ranges: Vec<Ranges>,
+    /// The signal of each record that has one, once the search is over.
+    pub signals: Vec<Option<SignalTerm<'a>>>,
 }
 
 impl<'a> System<'a> {
@@ -100,6 +106,7 @@ impl<'a> System<'a> {
             unknowns: Vec::new(),
             linear: 0,
             ranges: Vec::new(),
+            signals: vec![None; records.len()],
         };
         system.ranges = (0..records.len()).map(|k| system.range(k)).collect();
         for k in (0..layout.outers).filter(|&k| several && system.shared[k]) {
@@ -154,6 +161,7 @@ impl<'a> System<'a> {
             records: vec![self.records[record].clone()],
             fixed: vec![self.fixed[record].clone()],
             ranges: vec![self.range(record)],
+            signals: vec![None],
             ..self.clone()
         }
         .list_unknowns()
@@ -196,6 +204,7 @@ impl<'a> System<'a> {
             source: ColumnSource::new(Arc::clone(&options.family), true),
             options: options.clone(),
             shared: (0..layout.count()).map(is_body).collect(),
+            signals: vec![None; self.records.len()],
             ..self.clone()
         }
         .list_unknowns()
@@ -228,8 +237,32 @@ impl<'a> System<'a> {
         let pairs = self.records.iter().zip(samples);
         System {
             records: pairs.map(|(record, samples)| Record { samples, ..record.clone() }).collect(),
+            signals: vec![None; self.records.len()],
             ..self.clone()
         }
+    }
+
+    /// The same records with their signals: the measured zero takes the place of an offset, and contact is where its
+    /// touch found it, to within the uncertainty of the touch.
+    pub fn with_signals(mut self, records: &[SignalRecord<'a>]) -> Self {
+        let layout = self.layout();
+        for (record, own) in records.iter().enumerate() {
+            let known = self.fixed[record][layout.contact()];
+            let Some(term) = SignalTerm::new(*own, known) else { continue };
+            self.fixed[record][layout.offset()] = Some(0.0);
+            if let Some(contact) = known {
+                let reach = CONTACT_REACH * term.signal.contact_error_mm;
+                self.ranges[record].contact =
+                    ((contact - reach) / self.depth_mm, (contact + reach) / self.depth_mm);
+                self.fixed[record][layout.contact()] = None;
+            }
+            self.signals[record] = Some(term);
+        }
+        self.list_unknowns()
+    }
+
+    pub fn has_signal(&self) -> bool {
+        self.signals.iter().any(Option::is_some)
     }
 
     /// Samples whose force counts, in all records.

@@ -1,0 +1,111 @@
+//! The load cell's signal of a fitted record, and where its zero was seen.
+
+use super::{SourceError, curve_of, decisions, records};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Seconds, Volts};
+use palpate_protocols::engine::Record;
+use palpate_rheology::fit::{Signal, UnloadedMean};
+use palpate_sessions::{SampleRow, Session};
+
+/// So far before the contact position the probe touches nothing, in mm: tissue that sticks to a probe follows it by
+/// less.
+const CLEARANCE_MM: f64 = 1.0;
+/// The zero is averaged over so long, in s: many samples, and a small part of the time in which it drifts.
+const MEAN_SECS: f64 = 0.25;
+/// The zero is looked at so long before and after a record, in s, and at least so many times its length.
+const AROUND_SECS: f64 = 120.0;
+const AROUND_LENGTHS: f64 = 2.0;
+
+/// The signal at these rows of a session; `None` where a tare or a contact position is missing before them.
+pub(super) fn of_session(session: &Session, rows: &[usize]) -> Result<Option<Signal>, SourceError> {
+    let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(None) };
+    let volts: Option<Vec<f64>> = rows.iter().map(|&row| session.rows[row].volts).collect();
+    let decisions = decisions(session)?;
+    let Some((volts, span)) =
+        volts.zip(ZeroSpan::of(session, &records(&decisions).collect::<Vec<_>>(), first))
+    else {
+        return Ok(None);
+    };
+    let at = |row: &SampleRow| {
+        let ticks = row.tick as f64 - session.rows[first].tick as f64;
+        ticks * session.manifest.tick().0
+    };
+    let length = at(&session.rows[last]);
+    let around = AROUND_SECS.max(AROUND_LENGTHS * length);
+    let unloaded = session.rows[span.rows.clone()].iter().filter(|row| span.is_unloaded(row));
+    let unloaded = unloaded.filter_map(|row| Some((at(row), row.volts?)));
+    let near = unloaded.filter(|(t, _)| (-around..=length + around).contains(t));
+    Ok(Some(Signal {
+        volts,
+        unloaded: means(near),
+        curve: curve_of(session)?,
+        contact_error_mm: span.contact_error_mm,
+    }))
+}
+
+/// Rows around a record in which the zero may be seen.
+struct ZeroSpan {
+    rows: std::ops::Range<usize>,
+    /// From home, in mm.
+    contact_mm: f64,
+    contact_error_mm: f64,
+    mm_per_pulse: f64,
+}
+
+impl ZeroSpan {
+    /// From the tare before the record up to the next one, or to a new contact position or an interlock.
+    fn of(session: &Session, records: &[(u64, &Record)], first: usize) -> Option<Self> {
+        let before = || records.iter().filter(|(after, _)| *after as usize <= first).rev();
+        let (contact, error) = before().find_map(|(_, record)| match record {
+            Record::ContactFound { position, std_error_mm } => Some((position.0, *std_error_mm)),
+            _ => None,
+        })?;
+        let is_tare =
+            |record: &Record| matches!(record, Record::PhaseStarted { phase: Phase::Tare, .. });
+        let (start, _) = before().find(|(_, record)| is_tare(record))?;
+        let ends = |record: &Record| {
+            is_tare(record)
+                || matches!(record, Record::ContactFound { .. } | Record::InterlockTripped { .. })
+        };
+        let mut after = records.iter().filter(|(after, _)| *after as usize > first);
+        let end = after.find(|(_, record)| ends(record));
+        let end = end.map_or(session.rows.len(), |(after, _)| *after as usize);
+        Some(Self {
+            rows: *start as usize..end.min(session.rows.len()),
+            contact_mm: contact,
+            contact_error_mm: error,
+            mm_per_pulse: session.manifest.rig.as_ref()?.mm_per_pulse,
+        })
+    }
+
+    fn is_unloaded(&self, row: &SampleRow) -> bool {
+        let position = row.pulses.map(|pulses| pulses as f64 * self.mm_per_pulse);
+        let is_clear = |position: f64| position < self.contact_mm - CLEARANCE_MM;
+        row.phase == Phase::Tare || position.is_some_and(is_clear)
+    }
+}
+
+/// Means over stretches without a gap.
+fn means(samples: impl Iterator<Item = (f64, f64)>) -> Vec<UnloadedMean> {
+    let mut means = Vec::new();
+    let (mut start, mut times, mut volts, mut count) = (0.0, 0.0, 0.0, 0usize);
+    let mut close = |times: f64, volts: f64, count: usize| {
+        if count > 0 {
+            let over = 1.0 / count as f64;
+            let (t, volts) = (Seconds(over * times), Volts(over * volts));
+            means.push(UnloadedMean { t, volts, count });
+        }
+    };
+    for (t, one) in samples {
+        if count > 0 && t - start > MEAN_SECS {
+            close(times, volts, count);
+            (times, volts, count) = (0.0, 0.0, 0);
+        }
+        if count == 0 {
+            start = t;
+        }
+        (times, volts, count) = (times + t, volts + one, count + 1);
+    }
+    close(times, volts, count);
+    means
+}

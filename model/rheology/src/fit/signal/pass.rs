@@ -1,0 +1,184 @@
+//! One record's rows in volts, with the zero eliminated.
+
+use super::super::block_sums::NoiseBlock;
+use super::super::columns::{ParameterPoint, Slope};
+use super::super::design::LANES;
+use super::super::passes::RecordFactor;
+use super::super::system::System;
+use super::super::triangle::Triangle;
+use super::SignalTerm;
+use super::zero::ZeroFilter;
+use palpate_model::units::Newtons;
+
+/// Means into which the samples of a record are taken, at most about: within one of them the columns are as good as
+/// straight, so that its mean holds all that it knows.
+const MEANS: usize = 4096;
+/// Blocks in which autocorrelation is estimated, as of records without a signal.
+const NOISE_BLOCKS: usize = 400;
+
+/// Columns of some neighbouring samples.
+struct SampleMean {
+    t: f64,
+    count: usize,
+    /// In V, the residual behind them.
+    columns: Vec<f64>,
+}
+
+/// All means of a record.
+struct SignalMeans {
+    means: Vec<SampleMean>,
+    /// Squares about the means, in V^2.
+    within: f64,
+}
+
+impl System<'_> {
+    /// One record triangularised at a point, the residual last; see the module above.
+    pub(in super::super) fn signal_factor(
+        &self,
+        record: usize,
+        term: &SignalTerm<'_>,
+        point: &ParameterPoint,
+        slopes: &[Slope],
+    ) -> Option<RecordFactor> {
+        let SignalMeans { means, within } = self.signal_means(record, term, point, slopes)?;
+        let width = self.layout().linear_count() + slopes.len() + 1;
+        let weight = self.sigma_scale / term.drift.noise;
+        let mut filter = ZeroFilter::new(term.drift.nodes(self.sigma_scale), width);
+        let mut unloaded = term.signal.unloaded.iter().peekable();
+        let mut empty = vec![0.0; width];
+        let mut push_unloaded = |filter: &mut ZeroFilter, until: f64| {
+            while let Some(one) = unloaded.next_if(|one| one.t.0 < until) {
+                empty[width - 1] = one.volts.0 - self.unloaded_volts(term);
+                filter.push(one.t.0, &empty, weight * (one.count as f64).sqrt());
+            }
+        };
+        for mean in &means {
+            push_unloaded(&mut filter, mean.t);
+            filter.push(mean.t, &mean.columns, weight * (mean.count as f64).sqrt());
+        }
+        push_unloaded(&mut filter, f64::INFINITY);
+        let solution = filter.finish();
+        let mut triangle = Triangle::new(width);
+        (0..width).for_each(|i| triangle.push(solution.factor.row(i), 1.0));
+        let mut row = vec![0.0; width];
+        row[width - 1] = weight * within.sqrt();
+        triangle.push(&row, 1.0);
+        let explained: Vec<SampleMean> = means
+            .into_iter()
+            .map(|mut mean| {
+                for (k, value) in mean.columns.iter_mut().enumerate() {
+                    *value -= solution.explained(mean.t, k);
+                }
+                mean
+            })
+            .collect();
+        let factor = triangle.finish();
+        factor
+            .is_finite()
+            .then(|| RecordFactor { factor, blocks: noise_blocks(&explained, weight) })
+    }
+
+    /// Signal in V without load, as the curve has it.
+    fn unloaded_volts(&self, term: &SignalTerm<'_>) -> f64 {
+        term.signal.curve.volts_from_newtons(Newtons(0.0)).0
+    }
+
+    fn signal_means(
+        &self,
+        record: usize,
+        term: &SignalTerm<'_>,
+        point: &ParameterPoint,
+        slopes: &[Slope],
+    ) -> Option<SignalMeans> {
+        let samples = self.records[record].samples;
+        let columns = self.layout().linear_count() + slopes.len();
+        let length = samples.len().div_ceil(MEANS).max(1);
+        let mut found = SignalMeans { means: Vec::with_capacity(MEANS + 1), within: 0.0 };
+        let mut lanes = vec![[0.0; LANES]; columns + 1];
+        let mut sums = vec![0.0; columns];
+        let (mut taken, mut count) = (0usize, 0usize);
+        // Times and volts from the first sample of a mean: their squares stay small.
+        let (mut origin, mut time, mut volts, mut square) = ((0.0, 0.0), 0.0, 0.0, 0.0);
+        let mut place = 0;
+        let curve = &term.signal.curve;
+        let mut close = |sums: &mut [f64], count: usize, t: f64, volts: f64| {
+            let over = 1.0 / count as f64;
+            sums.iter_mut().for_each(|sum| *sum *= over);
+            let force = sums.iter().zip(&point.at).map(|(column, share)| column * share).sum();
+            let slope = curve.sensitivity_at(Newtons(force));
+            let mut columns: Vec<f64> = sums.iter().map(|column| slope * column).collect();
+            columns.push(volts - curve.volts_from_newtons(Newtons(force)).0);
+            found.means.push(SampleMean { t, count, columns });
+            sums.fill(0.0);
+        };
+        let mut within = 0.0;
+        self.source.walk(samples, self.scale(&point.outer), point, slopes, |block, filled| {
+            filled.write(&mut lanes, point, slopes);
+            for (i, sample) in block.iter().enumerate() {
+                if sample.is_measured() {
+                    let signal = term.signal.volts[place];
+                    if count == 0 {
+                        origin = (sample.t.0, signal);
+                    }
+                    count += 1;
+                    time += sample.t.0 - origin.0;
+                    volts += signal - origin.1;
+                    square += (signal - origin.1).powi(2);
+                    for (sum, lane) in sums.iter_mut().zip(&lanes) {
+                        *sum += lane[i];
+                    }
+                }
+                place += 1;
+                taken += 1;
+                if (taken == length || place == samples.len()) && count > 0 {
+                    let over = 1.0 / count as f64;
+                    close(&mut sums, count, origin.0 + over * time, origin.1 + over * volts);
+                    within += (square - over * volts * volts).max(0.0);
+                    (taken, count, time, volts, square) = (0, 0, 0.0, 0.0, 0.0);
+                }
+                if taken == length {
+                    taken = 0;
+                }
+            }
+        })?;
+        found.within = within;
+        (!found.means.is_empty()).then_some(found)
+    }
+
+    /// The rows that say where the contact positions were before the records were looked at, for small changes of
+    /// the unknowns.
+    pub(in super::super) fn push_contacts(&self, points: &[ParameterPoint], joint: &mut Triangle) {
+        let contact = self.layout().contact();
+        let mut row = vec![0.0; self.unknowns.len() + 1];
+        for (k, unknown) in self.unknowns.iter().enumerate() {
+            let Some(record) = unknown.record.or((self.records.len() == 1).then_some(0)) else {
+                continue;
+            };
+            let Some(term) = self.signals[record].filter(|_| unknown.parameter == contact) else {
+                continue;
+            };
+            if !term.is_contact_known {
+                continue;
+            }
+            row.fill(0.0);
+            row[k] = self.depth_mm;
+            row[self.unknowns.len()] =
+                term.contact_mm - points[record].outer.contact * self.depth_mm;
+            joint.push(&row, self.sigma_scale / term.signal.contact_error_mm);
+        }
+    }
+}
+
+fn noise_blocks(means: &[SampleMean], weight: f64) -> Vec<NoiseBlock> {
+    let length = means.len().div_ceil(NOISE_BLOCKS).max(1);
+    let full = means.iter().map(|mean| mean.count).max().unwrap_or(1) * length;
+    let blocks = means.chunks(length).enumerate().map(|(place, chunk)| {
+        let count = chunk.iter().map(|mean| mean.count).sum();
+        let sums = (0..chunk[0].columns.len()).map(|k| {
+            let sum: f64 = chunk.iter().map(|mean| mean.count as f64 * mean.columns[k]).sum();
+            weight * sum
+        });
+        NoiseBlock { sums: sums.collect(), count, place }
+    });
+    blocks.filter(|block| 2 * block.count >= full).collect()
+}
