@@ -8,6 +8,11 @@ fn main() {
     let seeds = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(20);
     let profile = profile.parse().expect("lab or ideal");
     let found = draws(SimSettings { profile, ..SimSettings::default() }, 1..seeds + 1);
+    if std::env::args().nth(3).is_some() {
+        for one in &found.signal {
+            println!("Z {}", one.map(|k| format!("{:.3}", k.error / k.std_error)).join(" "));
+        }
+    }
     print_table("in volts", &found.signal);
     print_table("in newtons", &found.force);
 }

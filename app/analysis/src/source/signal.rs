@@ -1,5 +1,7 @@
 //! The load cell's signal of a fitted record, and where its zero was seen.
 
+use crate::analysed_session;
+
 use super::{SourceError, curve_of, decisions, records};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Seconds, Volts};
@@ -40,6 +42,7 @@ pub(super) fn of_session(session: &Session, rows: &[usize]) -> Result<Option<Sig
         unloaded: means(near),
         curve: curve_of(session)?,
         contact_error_mm: span.contact_error_mm,
+        search_secs: span.search_secs(session),
     }))
 }
 
@@ -49,6 +52,8 @@ struct ZeroSpan {
     /// From home, in mm.
     contact_mm: f64,
     contact_error_mm: f64,
+    /// Rows before the record at which the search for contact began and ended.
+    search: std::ops::Range<usize>,
     mm_per_pulse: f64,
 }
 
@@ -56,13 +61,18 @@ impl ZeroSpan {
     /// From the tare before the record up to the next one, or to a new contact position or an interlock.
     fn of(session: &Session, records: &[(u64, &Record)], first: usize) -> Option<Self> {
         let before = || records.iter().filter(|(after, _)| *after as usize <= first).rev();
-        let (contact, error) = before().find_map(|(_, record)| match record {
-            Record::ContactFound { position, std_error_mm } => Some((position.0, *std_error_mm)),
+        let (found, contact, error) = before().find_map(|(after, record)| match record {
+            Record::ContactFound { position, std_error_mm } => {
+                Some((*after as usize, position.0, *std_error_mm))
+            }
             _ => None,
         })?;
-        let is_tare =
-            |record: &Record| matches!(record, Record::PhaseStarted { phase: Phase::Tare, .. });
+        let is_start = |record: &Record, wanted: Phase| matches!(record, Record::PhaseStarted { phase, .. } if *phase == wanted);
+        let is_tare = |record: &Record| is_start(record, Phase::Tare);
         let (start, _) = before().find(|(_, record)| is_tare(record))?;
+        let mut searches = before().filter(|(after, _)| *after as usize <= found);
+        let search = searches.find(|(_, record)| is_start(record, Phase::Contact));
+        let search = search.map_or(found, |(after, _)| *after as usize);
         let ends = |record: &Record| {
             is_tare(record)
                 || matches!(record, Record::ContactFound { .. } | Record::InterlockTripped { .. })
@@ -74,8 +84,14 @@ impl ZeroSpan {
             rows: *start as usize..end.min(session.rows.len()),
             contact_mm: contact,
             contact_error_mm: error,
+            search: search..found.min(session.rows.len() - 1),
             mm_per_pulse: session.manifest.rig.as_ref()?.mm_per_pulse,
         })
+    }
+
+    fn search_secs(&self, session: &Session) -> f64 {
+        let [from, to] = [self.search.start, self.search.end].map(|row| &session.rows[row]);
+        analysed_session::time_between(session, from, to).0
     }
 
     fn is_unloaded(&self, row: &SampleRow) -> bool {

@@ -56,7 +56,7 @@ impl UnknownPlace {
 
 impl System<'_> {
     /// The parameters by which the force of a record is derived, in the order of its slopes.
-    fn slopes(&self, record: usize) -> Vec<Slope> {
+    pub fn slopes(&self, record: usize) -> Vec<Slope> {
         let layout = self.layout();
         let outers = (0..layout.outers).map(|k| (k, Slope::Outer(k)));
         outers

@@ -195,7 +195,12 @@ impl<'a> FitSolution<'a> {
                 *offset = 0.0;
             }
         }
-        Self::refined(system, &points)
+        let first = Self::refined(system, &points)?;
+        if !first.system.has_signal() {
+            return Ok(first);
+        }
+        let system = first.system.with_drift_of_records(&first.refined.points);
+        Self::refined(system, &first.refined.points)
     }
 
     /// Fits other records of the same kind that differ little. What takes more than a scan to find is not searched

@@ -250,8 +250,8 @@ impl<'a> System<'a> {
             let known = self.fixed[record][layout.contact()];
             let Some(term) = SignalTerm::new(*own, known) else { continue };
             self.fixed[record][layout.offset()] = Some(0.0);
-            if let Some(contact) = known {
-                let reach = CONTACT_REACH * term.signal.contact_error_mm;
+            if let Some((contact, error)) = known.zip(term.contact_error_mm) {
+                let reach = CONTACT_REACH * error;
                 self.ranges[record].contact =
                     ((contact - reach) / self.depth_mm, (contact + reach) / self.depth_mm);
                 self.fixed[record][layout.contact()] = None;

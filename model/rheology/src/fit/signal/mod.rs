@@ -11,11 +11,14 @@ mod drift;
 mod pass;
 mod zero;
 
-pub(super) use drift::Drift;
+pub(super) use drift::{Drift, DriftSizes};
 use palpate_model::calibration::CalibrationCurve;
-use palpate_model::units::{Seconds, Volts};
+use palpate_model::units::{Newtons, Seconds, Volts};
 
 use super::sample::FitSample;
+
+/// About the force at which a search for contact ends: enough to be felt, too little to deform.
+const TOUCH_FORCE: Newtons = Newtons(0.15);
 
 /// Mean of the signal over a short time in which the probe touches nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,8 +38,11 @@ pub struct Signal {
     /// The signal out of contact, in the order of time.
     pub unloaded: Vec<UnloadedMean>,
     pub curve: CalibrationCurve,
-    /// Standard uncertainty in mm of the contact position, from which depths count.
+    /// Standard uncertainty in mm of the contact position, from which depths count, if the zero did nothing but
+    /// drift steadily while it was searched.
     pub contact_error_mm: f64,
+    /// Time in s over which it was searched.
+    pub search_secs: f64,
 }
 
 /// A record, with its signal where one was recorded.
@@ -48,14 +54,16 @@ pub struct SignalRecord<'a> {
 }
 
 /// A signal in a system of records.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct SignalTerm<'a> {
     pub signal: &'a Signal,
+    /// What is possible where the probe touches nothing, and what is taken.
+    pub sizes: DriftSizes,
     pub drift: Drift,
     /// Contact position in mm before the record was looked at.
     pub contact_mm: f64,
-    /// Whether anything was known of it then.
-    pub is_contact_known: bool,
+    /// Its standard uncertainty in mm, the wandering of the zero included; `None` where nothing was known of it.
+    pub contact_error_mm: Option<f64>,
 }
 
 impl<'a> SignalTerm<'a> {
@@ -65,10 +73,28 @@ impl<'a> SignalTerm<'a> {
         let (first, last) = (record.samples.first()?.t.0, record.samples.last()?.t.0);
         let times = || signal.unloaded.iter().map(|one| one.t.0);
         let (start, end) = (times().fold(first, f64::min), times().fold(last, f64::max));
-        let drift = Drift::estimate(&signal.unloaded, start, end)?;
-        let is_contact_known = contact_mm.is_some();
-        let contact_mm = contact_mm.unwrap_or(0.0);
-        let whole = Self { signal, drift, contact_mm, is_contact_known };
+        let sizes = DriftSizes::of(&signal.unloaded, start, end)?;
+        let drift = sizes.mean()?;
+        let error = signal.contact_error_mm.hypot(wander_mm(record.samples, signal, &drift));
+        let whole = Self {
+            signal,
+            sizes,
+            drift,
+            contact_error_mm: contact_mm.map(|_| error),
+            contact_mm: contact_mm.unwrap_or(0.0),
+        };
         (signal.volts.len() == record.samples.len()).then_some(whole)
     }
+}
+
+/// Error in mm of a contact position from the wandering of the zero while it was searched. A random walk of variance
+/// `q^2` per second leaves a straight line by `q^2 T / 15` in the mean over a time `T`, and a force in error by so much
+/// meets the tissue so much sooner or later, by the stiffness at the force at which a search ends.
+fn wander_mm(samples: &[FitSample], signal: &Signal, drift: &Drift) -> f64 {
+    let volts = drift.walk * (signal.search_secs / 15.0).sqrt();
+    let force = volts / signal.curve.sensitivity_at(Newtons(0.0));
+    let is_pressed =
+        |one: &&FitSample| one.is_measured() && one.force > TOUCH_FORCE && one.depth.0 > 0.0;
+    let touched = samples.iter().find(is_pressed);
+    touched.map_or(0.0, |one| force * one.depth.0 / one.force.0)
 }

@@ -3,11 +3,11 @@
 use super::super::block_sums::NoiseBlock;
 use super::super::columns::{ParameterPoint, Slope};
 use super::super::design::LANES;
-use super::super::passes::RecordFactor;
+use super::super::passes::{RecordFactor, UnknownPlace};
 use super::super::system::System;
 use super::super::triangle::Triangle;
-use super::SignalTerm;
 use super::zero::ZeroFilter;
+use super::{Drift, SignalTerm};
 use palpate_model::units::Newtons;
 
 /// Means into which the samples of a record are taken, at most about: within one of them the columns are as good as
@@ -76,6 +76,67 @@ impl System<'_> {
         factor
             .is_finite()
             .then(|| RecordFactor { factor, blocks: noise_blocks(&explained, weight) })
+    }
+
+    /// The same with the sizes of noise and wandering that the records' own rows make likely, too.
+    pub(in super::super) fn with_drift_of_records(&self, points: &[ParameterPoint]) -> Self {
+        let mut system = self.clone();
+        for (record, point) in points.iter().enumerate() {
+            let Some(term) = &mut system.signals[record] else { continue };
+            if let Some(drift) = self.drift_of_record(record, term, point) {
+                term.drift = drift;
+            }
+        }
+        system
+    }
+
+    fn drift_of_record(
+        &self,
+        record: usize,
+        term: &SignalTerm<'_>,
+        point: &ParameterPoint,
+    ) -> Option<Drift> {
+        let slopes = self.slopes(record);
+        let means = self.signal_means(record, term, point, &slopes)?.means;
+        let map = self.map(record, self.unknowns.len());
+        let own: Vec<_> =
+            map.iter().filter(|place| !matches!(place, UnknownPlace::Nowhere)).collect();
+        let width = own.len() + 1;
+        let mut rows: Vec<(f64, Vec<f64>, f64)> = Vec::with_capacity(means.len());
+        for one in &term.signal.unloaded {
+            let mut row = vec![0.0; width];
+            row[width - 1] = one.volts.0 - self.unloaded_volts(term);
+            rows.push((one.t.0, row, (one.count as f64).sqrt()));
+        }
+        for mean in &means {
+            let mut row: Vec<f64> = own.iter().map(|place| place.of(&mean.columns)).collect();
+            row.push(mean.columns[mean.columns.len() - 1]);
+            rows.push((mean.t, row, (mean.count as f64).sqrt()));
+        }
+        rows.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let count = rows.len();
+        let contact = self.unknowns.iter().zip(&map);
+        let contact = contact.filter(|(_, place)| !matches!(place, UnknownPlace::Nowhere));
+        let mut contact = contact.map(|(unknown, _)| unknown.parameter);
+        let contact = contact.position(|parameter| parameter == self.layout().contact());
+        let judged = term.sizes.judged_by(|nodes| {
+            let mut filter = ZeroFilter::new(nodes, width);
+            rows.iter().for_each(|(t, row, weight)| filter.push(*t, row, *weight));
+            let solution = filter.finish();
+            let mut triangle = Triangle::new(width);
+            (0..width).for_each(|i| triangle.push(solution.factor.row(i), 1.0));
+            if let (Some(k), Some(error)) = (contact, term.contact_error_mm) {
+                let mut row = vec![0.0; width];
+                row[k] = self.depth_mm;
+                row[width - 1] = term.contact_mm - point.outer.contact * self.depth_mm;
+                triangle.push(&row, term.drift.noise / error);
+            }
+            let factor = triangle.finish();
+            let logs = (0..width - 1).map(|k| factor.row(k)[k].abs().ln()).sum();
+            let square = factor.residual_sum(width - 1);
+            (solution, square, logs, count + 1 - width)
+        });
+        judged.mean()
     }
 
     /// Signal in V without load, as the curve has it.
@@ -154,17 +215,14 @@ impl System<'_> {
             let Some(record) = unknown.record.or((self.records.len() == 1).then_some(0)) else {
                 continue;
             };
-            let Some(term) = self.signals[record].filter(|_| unknown.parameter == contact) else {
-                continue;
-            };
-            if !term.is_contact_known {
-                continue;
-            }
+            let term = self.signals[record].as_ref().filter(|_| unknown.parameter == contact);
+            let Some(term) = term else { continue };
+            let Some(error) = term.contact_error_mm else { continue };
             row.fill(0.0);
             row[k] = self.depth_mm;
             row[self.unknowns.len()] =
                 term.contact_mm - points[record].outer.contact * self.depth_mm;
-            joint.push(&row, self.sigma_scale / term.signal.contact_error_mm);
+            joint.push(&row, self.sigma_scale / error);
         }
     }
 }
