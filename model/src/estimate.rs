@@ -20,6 +20,9 @@ pub struct FittedParameter {
     /// known or not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub systematic_error: Option<f64>,
+    /// 95 % interval of everything that is known to be uncertain: the statistical interval and the systematic error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub total95: Option<[f64; 2]>,
 }
 
 /// Whether the record so far determines one parameter.

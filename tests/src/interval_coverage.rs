@@ -112,21 +112,6 @@ pub fn draw(settings: SimSettings) -> [[CoverageDraw; 6]; 2] {
     })
 }
 
-/// Error of the touch and its standard error in mm.
-pub fn touch(settings: SimSettings) -> (f64, f64) {
-    let rig = SimRig::new(settings);
-    let calibration = rig.calibration();
-    let truth = Arc::new(Mutex::new(rig.truth()));
-    let watched = Box::new(WatchedRig(rig, Arc::clone(&truth)));
-    let mut params = RampHold::default();
-    params.hold = palpate_model::Seconds(0.5);
-    let session = record_ramp_hold(watched, calibration, params);
-    let truth = *truth.lock().expect("the run is over");
-    let contact = contact_of(&session);
-    let source = source::of_session(session, RecordStretch::RampHold, &[]).expect("a session");
-    (contact - truth.surface_counted().0, source.signal.expect("signal").contact_error_mm)
-}
-
 /// Draws of these seeds on two threads.
 #[must_use]
 pub fn draws(settings: SimSettings, seeds: std::ops::Range<u64>) -> CoverageDraws {

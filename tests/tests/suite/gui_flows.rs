@@ -92,6 +92,7 @@ fn every_sentence_of_a_report_is_on_the_screen() {
         ci95: std_error.map(|error| [1.5 - 2.0 * error, 1.5 + 2.0 * error]),
         is_fixed: false,
         systematic_error: None,
+        total95: None,
     };
     let report = FitReport {
         model: "a model".into(),

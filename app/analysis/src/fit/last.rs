@@ -183,6 +183,7 @@ mod tests {
             ci95: None,
             is_fixed,
             systematic_error: None,
+            total95: None,
         };
         assert!(!is_poorly_identified(&[tau(Some(0.01), false)]));
         assert!(!is_poorly_identified(&[tau(None, true)]));

@@ -150,8 +150,8 @@ impl SourceFit {
         let Ok(report) = &self.result else { return self };
         let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
         let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
-            let record = origin.traced("", &self.samples);
-            let found = origin.is_known().then(|| estimate_systematic(record, options));
+            let traced = origin.traced("", &self.samples);
+            let found = origin.is_known().then(|| self.systematic(traced, options));
             found.transpose().map_err(|err| err.to_string())
         });
         match found {
@@ -163,6 +163,17 @@ impl SourceFit {
             Err(reason) => self.notes.push(no_systematic(&reason)),
         }
         self
+    }
+
+    fn systematic(
+        &self,
+        traced: TracedRecord<'_>,
+        options: &FitOptions,
+    ) -> Result<SystematicUncertainty, FitError> {
+        let Some(signal) = &self.signal else { return estimate_systematic(traced, options) };
+        let record = SignalRecord { name: "", samples: &self.samples, signal: Some(signal) };
+        let fitted = FitSolution::fit_signals(&[record], options, &[])?;
+        Ok(fitted.systematic(&[traced])?.pop().unwrap_or_default())
     }
 
     #[must_use]

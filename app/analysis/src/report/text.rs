@@ -228,6 +228,7 @@ mod tests {
             ci95: std_error.map(|error| [1.5 - 2.0 * error, 1.5 + 2.0 * error]),
             is_fixed,
             systematic_error: None,
+            total95: None,
         }
     }
 

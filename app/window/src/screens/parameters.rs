@@ -213,6 +213,7 @@ mod tests {
             ci95: None,
             is_fixed: false,
             systematic_error: None,
+            total95: None,
         }
     }
 

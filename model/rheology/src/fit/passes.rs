@@ -78,7 +78,7 @@ impl System<'_> {
         let records = records?;
         let factors = records.iter().map(|record| &record.factor);
         let mut joint = self.stack(factors, Column::Residual);
-        self.push_contacts(points, &mut joint);
+        self.push_contacts(points, 0, &mut joint);
         Some(Pass { joint: joint.finish(), records })
     }
 

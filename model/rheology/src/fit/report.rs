@@ -296,6 +296,7 @@ impl FitSolution<'_> {
             ci95: error.map(|error| interval(value, error, range)),
             is_fixed,
             systematic_error: None,
+            total95: None,
         })
         .collect()
     }

@@ -4,7 +4,7 @@ use super::noise::{self, Blocks, Memory};
 use super::passes::{RecordFactor, UnknownPlace};
 use super::refine::RefinedFit;
 use super::solve::FitSolution;
-use super::system::System;
+use super::system::{Rows, System};
 use super::triangle::Factor;
 
 /// A search coordinate this close to an end of the searched range is at the end.
@@ -25,6 +25,21 @@ pub(super) struct Uncertainty {
     /// Blocks, memory, and variance of the weighted residuals.
     records: Vec<(Blocks, Option<Memory>, f64)>,
     block_factor: Factor,
+    /// The joint triangle with drift of a larger variance, and how well that variance is known; where signals are fitted.
+    drift: Option<(Factor, f64)>,
+}
+
+/// Factor on the variance of drift from whose effect its share is taken.
+const DRIFT_STEP: f64 = 1.1;
+
+fn more_drift(system: &System<'_>, refined: &RefinedFit) -> Option<(Factor, f64)> {
+    let mut other = system.clone();
+    let mut known = 0.0f64;
+    for term in other.signals.iter_mut().flatten() {
+        term.drift.walk *= DRIFT_STEP.sqrt();
+        known = known.max(term.drift.log_variance);
+    }
+    Some((other.pass(&refined.points, Rows::All)?.joint, known))
 }
 
 /// One parameter's uncertainty.
@@ -72,7 +87,8 @@ impl Uncertainty {
                 (blocks, memory, own)
             })
             .collect();
-        Self { scatter, records, block_factor }
+        let drift = system.has_signal().then(|| more_drift(system, refined)).flatten();
+        Self { scatter, records, block_factor, drift }
     }
 
     /// Samples in a block of a record.
@@ -114,6 +130,13 @@ impl Uncertainty {
         let (inflation, uncertainty) =
             noise::inflation(&self.records, &self.block_factor, combination, white);
         let std_error = independent * inflation.sqrt();
+        // The drift's share of the variance is no better known than the drift (Welch and Satterthwaite, JCGM 100:2008,
+        // G.4).
+        let drift = self.drift.as_ref().map_or(0.0, |(factor, known)| {
+            let more = (scatter * factor.deviation(combination) / independent).powi(2) - 1.0;
+            known * (more / (DRIFT_STEP - 1.0)).clamp(0.0, 1.0).powi(2)
+        });
+        let uncertainty = uncertainty + drift;
         let freedom = if uncertainty > 0.0 { spare.min(2.0 / uncertainty) } else { spare };
         std_error.is_finite().then_some(UncertaintyEstimate { std_error, inflation, freedom })
     }
@@ -207,18 +230,24 @@ impl FitSolution<'_> {
         uncertainty: &Uncertainty,
         record: usize,
     ) -> Vec<Option<UncertaintyEstimate>> {
-        let layout = self.system.layout();
         let spare = (self.system.measured() - self.system.unknowns.len()) as f64;
+        let combinations = self.combinations(record).into_iter();
+        combinations.map(|one| uncertainty.error(&self.refined, &one?, spare)).collect()
+    }
+
+    /// Every parameter of a record as a combination of small changes of the unknowns, `None` where fixed or not determined;
+    /// then what is derived from them.
+    pub(super) fn combinations(&self, record: usize) -> Vec<Option<Vec<f64>>> {
+        let layout = self.system.layout();
         let point = &self.refined.points[record];
         let is_stopped = |parameter: usize| match parameter {
             k if k < layout.outers => self.range_end(record, k).is_some(),
             k => k == layout.contact() && self.is_contact_at_start(record),
         };
         let of = |parameter: usize| self.system.combination(record, parameter, point);
-        let error = |combination: &[f64]| uncertainty.error(&self.refined, combination, spare);
         let own = (0..layout.count()).map(|parameter| {
             let is_free = self.system.fixed(record, parameter).is_none();
-            (is_free && !is_stopped(parameter)).then(|| error(&of(parameter)))?
+            (is_free && !is_stopped(parameter)).then(|| of(parameter))
         });
         let derived = self.gradients(record).into_iter().map(|gradient| {
             let mut combination = vec![0.0; self.system.unknowns.len()];
@@ -230,7 +259,7 @@ impl FitSolution<'_> {
                     *sum += share * one;
                 }
             }
-            error(&combination)
+            Some(combination)
         });
         own.chain(derived).collect()
     }

@@ -16,6 +16,7 @@ fn answer(relative: f64, is_identified: bool) -> EngineInput {
             ci95: Some([1.02 - half, 1.02 + half]),
             is_fixed: false,
             systematic_error: None,
+            total95: None,
         }],
         rmse_weighted_n: 0.02,
         samples: 1000,

@@ -322,5 +322,6 @@ fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> FittedParam
         ci95: known.map(|(error, quantile)| [value - quantile * error, value + quantile * error]),
         is_fixed: false,
         systematic_error: None,
+        total95: None,
     }
 }

@@ -6,9 +6,10 @@ use super::super::design::LANES;
 use super::super::passes::{RecordFactor, UnknownPlace};
 use super::super::system::System;
 use super::super::triangle::Triangle;
-use super::zero::ZeroFilter;
+use super::zero::{ZeroFilter, ZeroSolution};
 use super::{Drift, SignalTerm};
 use palpate_model::units::Newtons;
+use std::ops::Range;
 
 /// Means into which the samples of a record are taken, at most about: within one of them the columns are as good as
 /// straight, so that its mean holds all that it knows.
@@ -20,6 +21,12 @@ const NOISE_BLOCKS: usize = 400;
 struct SampleMean {
     t: f64,
     count: usize,
+    /// The samples of the record that it is the mean of.
+    samples: Range<usize>,
+    /// Modelled force in N.
+    force: f64,
+    /// Slope of the curve there in V/N.
+    slope: f64,
     /// In V, the residual behind them.
     columns: Vec<f64>,
 }
@@ -43,21 +50,7 @@ impl System<'_> {
         let SignalMeans { means, within } = self.signal_means(record, term, point, slopes)?;
         let width = self.layout().linear_count() + slopes.len() + 1;
         let weight = self.sigma_scale / term.drift.noise;
-        let mut filter = ZeroFilter::new(term.drift.nodes(self.sigma_scale), width);
-        let mut unloaded = term.signal.unloaded.iter().peekable();
-        let mut empty = vec![0.0; width];
-        let mut push_unloaded = |filter: &mut ZeroFilter, until: f64| {
-            while let Some(one) = unloaded.next_if(|one| one.t.0 < until) {
-                empty[width - 1] = one.volts.0 - self.unloaded_volts(term);
-                filter.push(one.t.0, &empty, weight * (one.count as f64).sqrt());
-            }
-        };
-        for mean in &means {
-            push_unloaded(&mut filter, mean.t);
-            filter.push(mean.t, &mean.columns, weight * (mean.count as f64).sqrt());
-        }
-        push_unloaded(&mut filter, f64::INFINITY);
-        let solution = filter.finish();
+        let solution = self.without_zero(term, &means);
         let mut triangle = Triangle::new(width);
         (0..width).for_each(|i| triangle.push(solution.factor.row(i), 1.0));
         let mut row = vec![0.0; width];
@@ -76,6 +69,71 @@ impl System<'_> {
         factor
             .is_finite()
             .then(|| RecordFactor { factor, blocks: noise_blocks(&explained, weight) })
+    }
+
+    /// The means and the signal out of contact, with the zero eliminated.
+    fn without_zero(&self, term: &SignalTerm<'_>, means: &[SampleMean]) -> ZeroSolution {
+        let width = means[0].columns.len();
+        let weight = self.sigma_scale / term.drift.noise;
+        let mut filter = ZeroFilter::new(term.drift.nodes(self.sigma_scale), width);
+        let mut unloaded = term.signal.unloaded.iter().peekable();
+        let mut empty = vec![0.0; width];
+        let zero = self.unloaded_volts(term);
+        let mut push_unloaded = |filter: &mut ZeroFilter, until: f64| {
+            while let Some(one) = unloaded.next_if(|one| one.t.0 < until) {
+                empty[width - 1] = one.volts.0 - zero;
+                filter.push(one.t.0, &empty, weight * (one.count as f64).sqrt());
+            }
+        };
+        for mean in means {
+            push_unloaded(&mut filter, mean.t);
+            filter.push(mean.t, &mean.columns, weight * (mean.count as f64).sqrt());
+        }
+        push_unloaded(&mut filter, f64::INFINITY);
+        filter.finish()
+    }
+
+    /// What each of several errors does to the linear and outer unknowns at the end of a fit, to first order. `errors` gives
+    /// for each record the changes of its force in N that the errors make, at a force and at the samples of a mean.
+    pub(in super::super) fn changes_by(
+        &self,
+        points: &[ParameterPoint],
+        count: usize,
+        errors: impl Fn(usize, f64, Range<usize>) -> Vec<f64>,
+    ) -> Option<Vec<Vec<f64>>> {
+        let unknowns = self.unknowns.len();
+        let mut joint = Triangle::new(unknowns + count + 1);
+        for (record, point) in points.iter().enumerate() {
+            let term = self.signals[record].as_ref()?;
+            let slopes = self.slopes(record);
+            let own = self.layout().linear_count() + slopes.len();
+            let mut means = self.signal_means(record, term, point, &slopes)?.means;
+            for mean in &mut means {
+                let residual = mean.columns.pop()?;
+                let changes = errors(record, mean.force, mean.samples.clone());
+                mean.columns.extend(changes.iter().map(|change| mean.slope * change));
+                mean.columns.push(residual);
+            }
+            let solution = self.without_zero(term, &means);
+            let map = self.map(record, unknowns);
+            let mut mapped = vec![0.0; unknowns + count + 1];
+            for i in 0..solution.factor.width() {
+                let row = solution.factor.row(i);
+                for (slot, place) in mapped.iter_mut().zip(&map) {
+                    *slot = place.of(row);
+                }
+                mapped[unknowns..].copy_from_slice(&row[own..]);
+                joint.push(&mapped, 1.0);
+            }
+        }
+        self.push_contacts(points, count, &mut joint);
+        let factor = joint.finish();
+        let all: Vec<usize> = (0..unknowns).collect();
+        let columns = (0..count).map(|k| {
+            let columns: Vec<usize> = all.iter().copied().chain([unknowns + k]).collect();
+            factor.select_leading(&columns).solve(unknowns)
+        });
+        Some(columns.collect())
     }
 
     /// The same with the sizes of noise and wandering that the records' own rows make likely, too.
@@ -162,16 +220,18 @@ impl System<'_> {
         let (mut origin, mut time, mut volts, mut square) = ((0.0, 0.0), 0.0, 0.0, 0.0);
         let mut place = 0;
         let curve = &term.signal.curve;
-        let mut close = |sums: &mut [f64], count: usize, t: f64, volts: f64| {
-            let over = 1.0 / count as f64;
-            sums.iter_mut().for_each(|sum| *sum *= over);
-            let force = sums.iter().zip(&point.at).map(|(column, share)| column * share).sum();
-            let slope = curve.sensitivity_at(Newtons(force));
-            let mut columns: Vec<f64> = sums.iter().map(|column| slope * column).collect();
-            columns.push(volts - curve.volts_from_newtons(Newtons(force)).0);
-            found.means.push(SampleMean { t, count, columns });
-            sums.fill(0.0);
-        };
+        let mut close =
+            |sums: &mut [f64], samples: Range<usize>, count: usize, t: f64, volts: f64| {
+                let over = 1.0 / count as f64;
+                sums.iter_mut().for_each(|sum| *sum *= over);
+                let shares = sums.iter().zip(&point.at);
+                let force = shares.map(|(column, share)| column * share).sum::<f64>();
+                let slope = curve.sensitivity_at(Newtons(force));
+                let mut columns: Vec<f64> = sums.iter().map(|column| slope * column).collect();
+                columns.push(volts - curve.volts_from_newtons(Newtons(force)).0);
+                found.means.push(SampleMean { t, count, samples, force, slope, columns });
+                sums.fill(0.0);
+            };
         let mut within = 0.0;
         self.source.walk(samples, self.scale(&point.outer), point, slopes, |block, filled| {
             filled.write(&mut lanes, point, slopes);
@@ -193,7 +253,14 @@ impl System<'_> {
                 taken += 1;
                 if (taken == length || place == samples.len()) && count > 0 {
                     let over = 1.0 / count as f64;
-                    close(&mut sums, count, origin.0 + over * time, origin.1 + over * volts);
+                    let samples = place - taken..place;
+                    close(
+                        &mut sums,
+                        samples,
+                        count,
+                        origin.0 + over * time,
+                        origin.1 + over * volts,
+                    );
                     within += (square - over * volts * volts).max(0.0);
                     (taken, count, time, volts, square) = (0, 0, 0.0, 0.0, 0.0);
                 }
@@ -207,10 +274,16 @@ impl System<'_> {
     }
 
     /// The rows that say where the contact positions were before the records were looked at, for small changes of
-    /// the unknowns.
-    pub(in super::super) fn push_contacts(&self, points: &[ParameterPoint], joint: &mut Triangle) {
+    /// the unknowns, with so many other columns behind these.
+    pub(in super::super) fn push_contacts(
+        &self,
+        points: &[ParameterPoint],
+        others: usize,
+        joint: &mut Triangle,
+    ) {
         let contact = self.layout().contact();
-        let mut row = vec![0.0; self.unknowns.len() + 1];
+        let last = self.unknowns.len() + others;
+        let mut row = vec![0.0; last + 1];
         for (k, unknown) in self.unknowns.iter().enumerate() {
             let Some(record) = unknown.record.or((self.records.len() == 1).then_some(0)) else {
                 continue;
@@ -220,8 +293,7 @@ impl System<'_> {
             let Some(error) = term.contact_error_mm else { continue };
             row.fill(0.0);
             row[k] = self.depth_mm;
-            row[self.unknowns.len()] =
-                term.contact_mm - points[record].outer.contact * self.depth_mm;
+            row[last] = term.contact_mm - points[record].outer.contact * self.depth_mm;
             joint.push(&row, self.sigma_scale / error);
         }
     }

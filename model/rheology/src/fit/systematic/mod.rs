@@ -15,6 +15,7 @@ use palpate_model::units::{Depth, Newtons};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
+mod in_volts;
 mod sentence;
 #[cfg(test)]
 mod tests;

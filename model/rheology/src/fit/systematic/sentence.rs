@@ -4,6 +4,9 @@ use super::super::report::{FitReport, JointReport};
 use super::{StatedTerms, SystematicUncertainty};
 use palpate_model::calibration::UncertaintyTerm;
 
+/// Half of the 95 % interval of a standard normal error.
+const NORMAL975: f64 = 1.959_963_985;
+
 impl StatedTerms {
     /// Its own part of a sentence.
     fn words(&self) -> String {
@@ -90,6 +93,13 @@ impl FitReport {
         let known = self.parameters.iter_mut();
         for parameter in known.filter(|one| one.std_error.is_some()) {
             parameter.systematic_error = systematic.error(&parameter.name);
+            let (Some(own), Some([low, high])) = (parameter.systematic_error, parameter.ci95)
+            else {
+                continue;
+            };
+            // Two standard normal errors add in quadrature, and so do the halves of their intervals.
+            let half = (0.5 * (high - low)).hypot(NORMAL975 * own);
+            parameter.total95 = Some([parameter.value - half, parameter.value + half]);
         }
     }
 }
