@@ -74,7 +74,7 @@ impl AnalysisReading {
             let changed = changed_inputs(&one, &read_session_inputs(path)?);
             if !changed.is_empty() {
                 let changed = changed.join(", ");
-                reading.notes.push(format!("analysis '{name}' was made before {changed} changed"));
+                reading.notes.push(format!("{changed} changed after analysis '{name}' was made"));
             }
             match one.what {
                 AnalysisContent::Fit { based_on, .. } => next = based_on,
@@ -82,14 +82,14 @@ impl AnalysisReading {
                     let own: Calibration =
                         serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;
                     reading.notes.push(format!(
-                        "forces are made from the raw signal with calibration {}, as analysis '{name}' has it",
+                        "analysis '{name}' recalculates the forces from the raw signal with calibration {}",
                         own.name
                     ));
                     reading.calibration = Some((calibration, own));
                 }
                 AnalysisContent::Mask { left_out_s } => {
                     reading.notes.push(format!(
-                        "forces in {} stretches do not count, as analysis '{name}' has it",
+                        "analysis '{name}' excludes the forces of {} time interval(s)",
                         left_out_s.len()
                     ));
                     reading.left_out_s = left_out_s;

@@ -27,15 +27,15 @@ pub enum ComplianceMeasurementError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "an imported session has no rig and no calibration, so it gives no compliance; run stiff-surface and name its session"
+        "an imported session has no rig and no calibration, so it gives no compliance; run stiff-surface and name that session"
     )]
     Imported,
     #[error(
-        "the session found no stiff surface, so what it pressed may have been tissue; run stiff-surface and name its session"
+        "the session found no stiff surface, so it may have pressed tissue; run stiff-surface and name that session"
     )]
     NoSurface,
     #[error(
-        "the session found a stiff surface and did not press it with a known force; run stiff-surface to its end"
+        "the session found a stiff surface but did not press it with a known force; run stiff-surface to its end"
     )]
     NoPress,
     #[error(transparent)]
@@ -106,15 +106,15 @@ pub enum ComplianceCorrectionError {
     #[error(transparent)]
     Library(#[from] LibraryError),
     #[error(
-        "the library has no compliance of rig {rig}; run stiff-surface on it and store the compliance of that session"
+        "the library has no compliance of rig {rig}; run stiff-surface on that rig and store the compliance of its session"
     )]
     NoneInForce { rig: String },
     #[error(
-        "a table does not say which rig it is from, so there is no last compliance for it; name the compliance's file"
+        "a table does not say which rig it is from, so its latest compliance is unknown; name the file of a compliance"
     )]
     NoRig,
     #[error(
-        "{id} is the compliance of rig {of}, and this was recorded on rig {rig}; name one of that rig"
+        "{id} is the compliance of rig {of}, but the record is from rig {rig}; name a compliance of rig {rig}"
     )]
     OtherRig { id: String, of: String, rig: String },
 }
@@ -240,7 +240,7 @@ impl ComplianceCorrection {
         let document = &stored.document;
         let doubt = (peak > document.force_max_n).then(|| {
             format!(
-                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond that the compliance is extrapolated as a straight line",
+                "the compliance was measured up to {:.1} N, but the record reaches {peak:.1} N; above the measured force the compliance is extrapolated as a straight line",
                 document.force_max_n
             )
         });
@@ -260,12 +260,12 @@ impl ComplianceCorrection {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {
             format!(
-                "depths are corrected for machine compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
+                "depths are corrected for machine compliance {id}, by {um:.0} ± {:.1} um at {peak:.2} N",
                 self.at_peak_std_error_um
             )
         } else {
             format!(
-                "depths are not corrected; machine compliance {id} would make them {um:.0} um less at {peak:.2} N"
+                "depths are not corrected; machine compliance {id} would reduce them by {um:.0} um at {peak:.2} N"
             )
         }
     }

@@ -51,7 +51,9 @@ pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, S
 }
 
 fn of_table(table: &MeasurementTable, mut notes: Vec<String>) -> CycleSource {
-    notes.push("a table: its cycles, holds and unloading are found from the depth".into());
+    notes.push(
+        "the source is a table, so its cycles, holds and unloading are found from the depth".into(),
+    );
     CycleSource {
         samples: split_by_depth(&table.t, &table.depth, &table.force),
         notes,
@@ -108,12 +110,12 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
         .collect();
     if left_out > 0 {
         source.notes.push(format!(
-            "{left_out} samples are left out: the converter was at the end of its range, or an interlock had tripped"
+            "{left_out} samples are left out, because the converter was at the end of its range, or an interlock had tripped"
         ));
     }
     if contacts.len() > 1 {
         source.notes.push(format!(
-            "contact was found {} times; depths count from the first",
+            "contact was found {} times; depths count from the first contact",
             contacts.len()
         ));
     }

@@ -52,7 +52,7 @@ pub fn past_checks(
     let count = checks.len();
     let mut past = Vec::with_capacity(count);
     for (done, check) in checks.into_iter().enumerate() {
-        if progress.report(done, count, "the sessions of the checks").is_break() {
+        if progress.report(done, count, "reading the sessions of the daily checks").is_break() {
             break;
         }
         let folder = folders.get(&check.session_id);
@@ -94,7 +94,7 @@ pub fn assess_daily_check(session: &Session) -> Result<Vec<CheckPart>, SourceErr
     let unfinished = match &session.end {
         Some(end) if end.outcome == EndingKind::Finish.name() => None,
         Some(end) => Some(format!("the check did not finish: {}", end.reason)),
-        None => Some("the check was interrupted; make it again".to_owned()),
+        None => Some("the check was interrupted; repeat it".to_owned()),
     };
     parts.extend(unfinished.map(|reason| part("run", Err(reason))));
     Ok(parts)
@@ -124,7 +124,7 @@ fn zero_of(
     let (_, volts) = readings(records)
         .into_iter()
         .find(|(mass_g, _)| *mass_g == 0.0)
-        .ok_or("the empty cell was not read; make the check again")?;
+        .ok_or("the check has no reading of the empty load cell; repeat the check")?;
     let curve = calibration.curve().map_err(|err| err.to_string())?;
     let (_, heaviest) = curve.force_range();
     let deviation = DailyCheckDeviation {
@@ -139,9 +139,9 @@ fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String)
     let is_passed = newtons.abs() <= limit;
     let side = if is_passed { "within" } else { "beyond" };
     let sentence = format!(
-        "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {side} the limit of {limit:.3} N"
+        "the empty load cell reads {volts:.4}, which is {newtons:+.3} N and {side} the limit of {limit:.3} N"
     );
-    let advice = "check what touches the probe, then take a new calibration";
+    let advice = "remove what touches the probe; if nothing does, calibrate the load cell again";
     Ok(advised(is_passed, sentence, advice))
 }
 
@@ -159,7 +159,7 @@ fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<WeightChe
         *mass_g > 0.0
     });
     let (Some((mass_g, volts)), Some(tare)) = (known, tare) else {
-        return Err("no known weight was read; make the check again".into());
+        return Err("the check has no reading of a known weight; repeat the check".into());
     };
     let refusal = calibration.check_refusal(mass_g);
     if let Some(reason) = refusal.map_err(|err| err.to_string())? {
@@ -181,10 +181,9 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
         Record::HomeChecked { missed_pulses } => Some(*missed_pulses),
         _ => None,
     });
-    let missed = missed.ok_or("the home switch was not touched twice; make the check again")?;
-    let sentence =
-        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed");
-    let advice = "check the switch, its cable and whether the slider moves freely";
+    let missed = missed.ok_or("the check did not reach the home switch twice; repeat the check")?;
+    let sentence = format!("two homings differ by {missed} pulses; the limit is {HOME_PULSES}");
+    let advice = "check the home switch, its cable and whether the slider moves freely";
     Ok(advised(missed.abs() <= HOME_PULSES, sentence, advice))
 }
 
@@ -223,13 +222,13 @@ impl DailyCheckGate {
         Ok(match last_check_of_day(&checks, now.into()) {
             Some(check) if check.is_passed => Self::Open,
             Some(check) => Self::Acknowledge(format!(
-                "rig {rig} failed its daily check today ({}); mend it and repeat '{DAILY_CHECK_COMMAND}'",
+                "rig {rig} failed its daily check today ({}); repair the rig and repeat '{DAILY_CHECK_COMMAND}'",
                 check.failures()
             )),
-            None if is_virtual => Self::Note(format!("{none}; '{DAILY_CHECK_COMMAND}' makes one")),
-            None => {
-                Self::Acknowledge(format!("{none}; make one with '{DAILY_CHECK_COMMAND}' first"))
+            None if is_virtual => {
+                Self::Note(format!("{none}; '{DAILY_CHECK_COMMAND}' runs the check"))
             }
+            None => Self::Acknowledge(format!("{none}; run '{DAILY_CHECK_COMMAND}' first")),
         })
     }
 

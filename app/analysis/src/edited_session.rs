@@ -43,7 +43,7 @@ pub fn open(path: &Path) -> Result<EditedSession, SourceError> {
 fn doubts(edits: &Edits) -> Vec<String> {
     let mut notes = Vec::new();
     if edits.is_torn {
-        notes.push("the last edit was begun and never finished; it does not count, and the next one moves it to edits.jsonl.torn".into());
+        notes.push("the last edit is incomplete and does not count; the next edit moves it to edits.jsonl.torn".into());
     }
     if let Some((verdict @ (DataQuality::Suspect | DataQuality::Rejected), edit)) = edits.verdict()
     {
@@ -164,7 +164,7 @@ fn shifts(entries: &mut [LogEntry], last: u64, edits: &Edits) -> (Vec<Shift>, Ve
             *at = position.0.into();
         }
         notes.push(format!(
-            "contact {number} was corrected from {:.3} to {:.3} mm by {}: {}; depths count from there",
+            "contact {number} was corrected from {:.3} mm to {:.3} mm by {} ({}); depths count from the corrected contact",
             found.position.0, position.0, edit.by, edit.reason
         ));
     }

@@ -20,7 +20,7 @@ pub enum ExportFailure {
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error(
-        "{} is being recorded, and files of a lake never change; add it when the run has ended", .0.display()
+        "{} is being recorded, and files of a lake never change; add the session when the run has ended", .0.display()
     )]
     BeingRecorded(PathBuf),
 }
@@ -173,15 +173,18 @@ pub fn export_all(
         ExportDestination::Tables(..) => (sessions, Vec::new()),
         ExportDestination::Lake(_) => remove_recovered_originals(sessions, |_| true),
     };
-    let left_out =
-        |path: &PathBuf| format!("{}: left out, its recovered copy is chosen too", name(path));
+    let left_out = |path: &PathBuf| {
+        format!("{}: left out, because its recovered copy is included", name(path))
+    };
     let mut remarks: Vec<String> = copied.iter().map(left_out).collect();
     match to {
         ExportDestination::Lake(lake) => sweep_lake(lake),
         ExportDestination::Tables(format, folder) => {
             if let Err(err) = std::fs::create_dir_all(folder) {
                 let folder = folder.display();
-                let sentence = format!("{folder} cannot be made ({err}); nothing was written");
+                let sentence = format!(
+                    "cannot create the folder {folder} ({err}), so nothing was written; choose another folder"
+                );
                 return ExportSummary { sentence, remarks };
             }
             ExportTarget::Table(*format, folder.clone()).sweep();

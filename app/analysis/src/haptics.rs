@@ -52,9 +52,9 @@ pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
     let options = FitOptions::default();
     let fitted = SourceFit::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
-    let body = report.kelvin().ok_or_else(|| {
-        format!("the fit of {} is not of the modified Kelvin model", source.display())
-    })?;
+    let body = report
+        .kelvin()
+        .ok_or_else(|| format!("the fit of {} is not a modified Kelvin model", source.display()))?;
     let depths = fitted.samples.iter().map(|sample| sample.depth.0);
     let mut notes = fitted.notes;
     notes.extend(report.warnings.iter().cloned());
@@ -66,7 +66,7 @@ impl HapticBody {
     pub fn extrapolation_warning(&self, deepest: Depth) -> Option<String> {
         (deepest.0 > self.deepest.0 + 0.015).then(|| {
             format!(
-                "the record goes to {:.3}; from there to {deepest:.3} the model is extrapolated without any evidence",
+                "the record reaches a depth of {:.3}; between this depth and {deepest:.3} the model is extrapolated without evidence",
                 self.deepest
             )
         })
@@ -243,7 +243,7 @@ fn try_out(
             (low, high) = (low.min(one.x), high.max(one.x));
         }
         if tick.is_multiple_of(100) && !is_going(tick as f64 / ticks as f64) {
-            return Err("ended before it was done".into());
+            return Err("the simulation was cancelled".into());
         }
     }
     Ok(SimulatedTrial {
@@ -312,7 +312,7 @@ pub fn pace(
         // It only spins.
         let _ = thread.join();
     }
-    let taped = taped.ok_or("a loop of palpate failed; this is a bug in palpate")?;
+    let taped = taped.ok_or("the haptic loop failed; report this bug in palpate")?;
     let hash = taped.device.last().snapshot.sum();
     let recorded = taped.recorder.map(|recorder| recorder.finish(hash));
     Ok(LoopMeasurement {
@@ -383,8 +383,8 @@ pub fn check_feedback(
             sigma: Newtons(1.0),
         });
         let found = fit(&record.collect::<Vec<_>>(), &FitOptions::default());
-        let found =
-            found.map_err(|err| refusals.push(format!("no fit of the {which} force: {err}")));
+        let found = found
+            .map_err(|err| refusals.push(format!("the {which} force cannot be fitted: {err}")));
         found.ok()
     };
     let fit = fitted(|one| one.measured, "measured");

@@ -140,7 +140,7 @@ pub fn replay(
 ) -> Result<ReplayResult, String> {
     if !is_tape(folder)? {
         return Err(format!(
-            "{} has no columns of a master and slave's recording; give the folder of a recorded run",
+            "{} lacks the columns of a master-slave recording; give the folder of a recorded run",
             folder.display()
         ));
     }

@@ -23,7 +23,7 @@ pub enum ImportFailure {
     Keep(#[from] StoreImportError),
     #[error(transparent)]
     Library(#[from] FolderError),
-    #[error("{} is there already or would be made twice; choose another folder", .0.display())]
+    #[error("{} exists already, or two parts of the import would be stored in it; choose another folder", .0.display())]
     Taken(PathBuf),
     #[error("cancelled")]
     Cancelled,

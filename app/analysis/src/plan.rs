@@ -51,9 +51,9 @@ pub struct PlanRequest<'a> {
 
 #[derive(Debug, Error)]
 pub enum PlanFailure {
-    #[error("a speed of {} mm/s is more than the {most} of rig {rig}", wanted.0)]
+    #[error("a speed of {} mm/s is above {most}, the maximum of rig {rig}; choose a lower speed", wanted.0)]
     TooFast { wanted: MmPerS, most: MmPerS, rig: String },
-    #[error("a force of {} N is more than the {most} at which the interlock stops a run", wanted.0)]
+    #[error("a force of {} N is above {most}, the force at which the interlock stops a run; choose a lower force", wanted.0)]
     TooStrong { wanted: Newtons, most: Newtons },
     #[error(transparent)]
     Expected(#[from] ExpectedError),

@@ -26,17 +26,17 @@ const LOG: &str = "mcap";
 pub enum RecordingsError {
     #[error(transparent)]
     Missing(ReadError),
-    #[error("cannot look into {} ({reason}); check its permissions", path.display())]
+    #[error("cannot read the folder {} ({reason}); check its permissions", path.display())]
     Folder { path: PathBuf, reason: String },
     #[error("{} contains neither a session nor a table (.csv or .tsv); name a folder that contains one", .0.display())]
     Nothing(PathBuf),
-    #[error("{} is a table and no session", .0.display())]
+    #[error("{} is a table, not a session", .0.display())]
     Table(PathBuf),
-    #[error("{} is given twice; taken together it would count as two recordings", .0.display())]
+    #[error("{} is given twice and would count as two recordings; give it once", .0.display())]
     Twice(PathBuf),
     #[error("{}: {reason}", path.display())]
     Source { path: PathBuf, reason: Box<SourceError> },
-    #[error("{0} sources, all of them rejected: nothing is left")]
+    #[error("every source is rejected ({0} in total), so no source is left")]
     Rejected(usize),
 }
 
@@ -230,7 +230,7 @@ pub fn read(paths: &[PathBuf], how: RecordingOptions<'_>) -> Result<Recordings, 
         };
         let mut source = match source::read_stretch(path, how.columns, how.wanted) {
             Err(SourceError::Rejected { reason }) => {
-                let note = format!("{name}: rejected, left out: {reason}");
+                let note = format!("{name}: left out, because the session was rejected: {reason}");
                 read.notes.push(note);
                 continue;
             }

@@ -67,8 +67,7 @@ pub fn play_scene(
     record: Option<&Path>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<SceneRun, String> {
-    let nodes =
-        file.nodes.ok_or("a scene without nodes was played; this is a mistake in palpate")?;
+    let nodes = file.nodes.ok_or("the scene has no number of nodes; report this bug in palpate")?;
     let scene = file.scene(nodes)?;
     let settings = *scene.settings();
     let recorder = record.map(|folder| SceneRecorder::start(folder, &file.text(), COLUMNS));
@@ -89,7 +88,7 @@ pub fn play_scene(
         }
         progress(settings.period.time_of(tick.tick).seconds().0 / whole);
     }
-    let end = live.stop().ok_or("the scene's loop failed; this is a mistake in palpate")?;
+    let end = live.stop().ok_or("the loop of the scene failed; report this bug in palpate")?;
     let recorded = end.recorded.transpose()?;
     seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let frames = seen.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
@@ -158,16 +157,16 @@ pub fn replay(
     let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
     if !has_columns(folder, &columns.0, &columns.1)? {
         return Err(format!(
-            "{} has no columns of a scene's recording; give the folder of a recorded scene",
+            "{} lacks the columns of a scene recording; give the folder of a recorded scene",
             folder.display()
         ));
     }
     let found = TickRecording::read(folder, columns)?;
     let called = folder.join(SETTINGS_FILE).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;
-    let nodes = file
-        .nodes
-        .ok_or_else(|| format!("{called} leaves its mesh open; a recording names its nodes"))?;
+    let nodes = file.nodes.ok_or_else(|| {
+        format!("{called} does not state the number of nodes; use a complete recording")
+    })?;
     let mut scene = file.scene(nodes)?;
     let name = format!("scene '{}'", file.name);
     if is_sensed {

@@ -38,7 +38,9 @@ pub struct SelectionReport {
 pub enum ModelSelectionError {
     #[error(transparent)]
     Sources(#[from] RecordingsError),
-    #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
+    #[error(
+        "{names} specimen names are given for {sources} sources; give one name for each source"
+    )]
     Specimens { names: usize, sources: usize },
     #[error(transparent)]
     Select(#[from] SelectError),

@@ -152,7 +152,7 @@ impl BundleWriter<'_> {
             if entry.file_type().is_file() {
                 let inside = entry.path().strip_prefix(base).unwrap_or(entry.path());
                 let name = format!("sessions/{}", inside.display());
-                self.file(&name, "of a session, with what was measured", entry.path())?;
+                self.file(&name, "a file of a session, with its measurements", entry.path())?;
             }
         }
         Ok(())

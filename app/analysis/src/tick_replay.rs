@@ -67,13 +67,13 @@ impl ReplayResult {
     pub fn words(&self) -> String {
         let how = match (self.is_identical, self.is_whole) {
             (true, true) => "every number bit for bit as recorded",
-            (true, false) => "every number that is left bit for bit as recorded",
+            (true, false) => "every remaining number bit for bit as recorded",
             (false, _) => "not as recorded",
         };
         let mut lines = vec![format!("{}: {} ticks replayed, {how}", self.name, self.ticks)];
         if !self.is_whole {
             lines.push(
-                "the recording was cut off; the replay compared it up to its last whole tick"
+                "the recording was cut off; the replay compared it up to its last complete tick"
                     .to_owned(),
             );
         }
@@ -92,7 +92,7 @@ impl ReplayResult {
         };
         let why = match self.lost {
             0 => "the program, its settings or the recording changed".to_owned(),
-            lost => format!("{lost} ticks were lost when it was recorded"),
+            lost => format!("the recording lost {lost} ticks"),
         };
         Some(format!(
             "tick {}: {} is {} and was recorded as {}; {why}",
@@ -137,7 +137,7 @@ pub fn replay_ticks<const W: usize, const R: usize>(
             break;
         }
         if index.is_multiple_of(1000) && !is_going(index as f64 / found.rows.len() as f64) {
-            return Err("ended before it was done".to_owned());
+            return Err("the replay was cancelled".to_owned());
         }
     }
     let hash = replay.state_hash();

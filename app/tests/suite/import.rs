@@ -97,11 +97,11 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
         assert!(!at.join("in").exists(), "{args:?}");
     };
     check(&["import", "good.csv", "bad.csv", "--into", "in"], "decimal sign");
-    check(&["import", "good.csv", "good.csv", "--into", "in"], "made twice");
+    check(&["import", "good.csv", "good.csv", "--into", "in"], "two parts of the import");
     check(&["import", "good.csv", "--unit", "force=stone"], "give one of N, mN");
     check(&["import", "good.csv", "--column", "colour=x"], "time, depth, force, signal");
     check(&["import", "."], "not a file");
     succeeded(&palpate(at, &["import", "good.csv", "--into", "in"]));
     let again = palpate(at, &["import", "good.csv", "--into", "in"]);
-    assert_refused(&again, 2, "is there already");
+    assert_refused(&again, 2, "exists already");
 }

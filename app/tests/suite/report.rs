@@ -121,7 +121,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
         "Measurement",
         "suspect, says",
         "accepted by",
-        "as it was seen",
+        "nothing has changed since",
         "tau_eps",
         "95 % interval",
         "systematic",
@@ -287,7 +287,7 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
     let session = session.display().to_string();
     succeeded(&palpate(at, &["report", &session, "--html", "page.html"]));
     let texts = strict(&fs::read_to_string(at.join("page.html")).unwrap()).join("\n");
-    for words in ["imported from", "of its file", "tau_eps", "no decisions"] {
+    for words in ["imported from", "in its file", "tau_eps", "no decisions"] {
         assert!(texts.contains(words), "no '{words}'");
     }
     let refused = palpate(at, &["report", &session, "--figure", "c.svg", "--of", "calibration"]);

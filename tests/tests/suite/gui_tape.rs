@@ -130,14 +130,14 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let scene = scene.join("../protocols/tests/recordings/scene-poke");
     flow.type_into("replay", &scene.display().to_string());
     flow.click("Replay recording");
-    flow.wait_for_words("has no columns of a master and slave's recording");
+    flow.wait_for_words("lacks the columns of a master-slave recording");
     drop_on(&mut flow, &scene);
     assert!(flow.says("Start the scene"));
     flow.click("Replay recording");
     flow.wait_for_words("every number bit for bit as recorded");
     flow.type_into("replay", &folder.display().to_string());
     flow.click("Replay recording");
-    flow.wait_for_words("has no columns of a scene's recording");
+    flow.wait_for_words("lacks the columns of a scene recording");
     drop_on(&mut flow, &folder);
     assert!(flow.says("Start the loop"));
     flow.click("Replay recording");

@@ -23,9 +23,9 @@ const DEFAULT_FAMILY: &str = "series-3";
 
 #[derive(Debug, Error)]
 pub enum KnownFitError {
-    #[error("this is not a fit: {reason}, {}", path.display())]
+    #[error("{} is not a fit ({reason})", path.display())]
     NotAFit { path: PathBuf, reason: String },
-    #[error("the remembered fit is not as it was written; fit again, {}", .0.display())]
+    #[error("the remembered fit {} was changed after it was written; fit again", .0.display())]
     Changed(PathBuf),
     #[error("the fit has no parameter {0}")]
     Parameter(&'static str),

@@ -75,9 +75,9 @@ pub enum SourceFitError {
     Source(#[from] SourceError),
     #[error(transparent)]
     Fit(#[from] FitError),
-    #[error("not begun; the batch was asked to end")]
+    #[error("the fit was not begun, because the batch was cancelled")]
     NotBegun,
-    #[error("the fit ended unexpectedly; report this with the source")]
+    #[error("the fit ended unexpectedly; report this with the session or table that was fitted")]
     Died,
 }
 

@@ -64,7 +64,7 @@ impl CalibrationEntry {
             (Some(by), _, _) => format!("superseded by {by}"),
             (None, true, _) => "expired".to_owned(),
             (None, false, true) => "in force".to_owned(),
-            (None, false, false) => "older than the one in use".to_owned(),
+            (None, false, false) => "older than the calibration in force".to_owned(),
         }
     }
 }
@@ -250,7 +250,9 @@ fn spread(quality: &CalibrationQuality) -> String {
         (Some(volts), Some(newtons)) => {
             format!("zero shift: {:+.2} mV or {newtons:+.3} N", volts * 1e3)
         }
-        _ => "zero shift: not measured; read the empty cell before and after".to_owned(),
+        _ => {
+            "zero shift: not measured; read the empty cell before and after the weights".to_owned()
+        }
     };
     [hysteresis, repeatability, zero_shift].join("\n")
 }

@@ -133,7 +133,7 @@ fn by_time_and_step(rows: &[&ExtremesRow]) -> String {
     }
     let steps: Vec<i32> =
         cells.values().next().map_or(Vec::new(), |row| row.keys().copied().collect());
-    let mut table = "Worst error of any family, relative to the peak force, by relaxation time (down) and step\n(across). The path enters, is held, goes half back, leaves and comes again in 20 steps.\n\n".to_owned();
+    let mut table = "Worst error of any family, relative to the peak force, by relaxation time (rows) and step\n(columns). The path loads, holds, unloads halfway, leaves the surface and loads again in 20 steps.\n\n".to_owned();
     table += &header("tau \\ step", steps.iter().map(|step| format!("1e{step} s")));
     for (tau, row) in &cells {
         let line = row.values().map(|rows| cell(rows)).collect();
@@ -151,7 +151,7 @@ fn by_ratio(rows: &[&ExtremesRow]) -> String {
             cells.entry(step - tau).or_default().entry(&row.subject).or_default().push(row);
         }
     }
-    let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();
+    let mut table = "Worst error, relative to the peak force, by the ratio of step to relaxation time. The path loads to\n20 mm, holds and unloads halfway, in 20 steps each. Unstable integrators are refused.\n\n".to_owned();
     table += &header("step / tau", subjects.iter().map(|(name, _)| (*name).to_owned()));
     for (ratio, row) in &cells {
         let own = |name: &&str| row.get(name).map_or(String::new(), |rows| cell(rows));

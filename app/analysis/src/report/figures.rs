@@ -153,7 +153,9 @@ impl Traces {
     /// A sentence on the interlock's limit if it is too far above the force to be drawn; else empty.
     pub fn limit_above(&self) -> String {
         match (self.limit, limit_in_reach(self)) {
-            (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),
+            (Some(limit), None) => {
+                format!(" The interlock limit of {:.1} N is above the figure.", limit.0)
+            }
             _ => String::new(),
         }
     }

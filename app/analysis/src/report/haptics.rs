@@ -42,17 +42,17 @@ pub fn tried_text(tried: &SimulatedTrial) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
     let buzz = match (tried.buzz, tried.buzz_until_s) {
         (Some((frequency, amplitude)), Some(until)) => format!(
-            "it buzzes in {:.0} % of the hold, last {until:.2} s after the hand arrived, up to {amplitude:.3} mm at {frequency:.0} Hz",
+            "the device buzzes in {:.0} % of the hold, until {until:.2} s after the hand arrived, by up to {amplitude:.3} mm at {frequency:.0} Hz",
             100.0 * tried.buzz_share
         ),
         _ => "no buzz".to_owned(),
     };
     let returned = match tried.energy_min_mj < 0.0 {
-        true => format!("energy returned {:.3} mJ", -tried.energy_min_mj),
-        false => "no energy returned".to_owned(),
+        true => format!("the rendered force returns {:.3} mJ", -tried.energy_min_mj),
+        false => "the rendered force returns no energy".to_owned(),
     };
     format!(
-        "{guards} guards: {buzz}; the position varies by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
+        "{guards} guards: {buzz}; the position varies by {:.3} mm in the last second, the force reaches {:.2} N, the added damping reaches {:.1} N s/m, {returned}",
         tried.swing_mm, tried.force_max_n, tried.damping_added_max
     )
 }
@@ -67,8 +67,7 @@ pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
         causes.flat_map(|flags| flags.sentences().map(str::to_owned)).collect();
     if missed > 0 {
         let ticks = if missed == 1 { "tick" } else { "ticks" };
-        causes
-            .push(format!("the loop was late: {missed} {ticks} passed without it; the force held"));
+        causes.push(format!("the loop was late and missed {missed} {ticks}; the force was held"));
     }
     causes
 }
@@ -78,14 +77,14 @@ pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
 pub fn margin_text(margin: &Margin) -> String {
     let depth = margin.depth;
     match margin.ratio() {
-        None => format!("At {depth:.2} the body brings all the damping it needs."),
+        None => format!("At a depth of {depth:.2} the body brings all the damping it needs."),
         Some(ratio) if margin.is_enough() => {
             format!(
                 "At a depth of {depth:.2} the device has {ratio:.1} times the damping that it needs."
             )
         }
         Some(ratio) => format!(
-            "At {depth:.2} the device has {ratio:.2} of the damping needed; the guard adds the rest."
+            "At a depth of {depth:.2} the device has {ratio:.2} times the damping it needs; the guard adds the rest."
         ),
     }
 }
@@ -102,40 +101,40 @@ pub fn slave_text(slaved: &SlaveReport) -> String {
         |one: &ForceDifference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
     let mut lines = vec![
         format!(
-            "slave: down to {:.3} mm; contact changed {} times",
+            "slave: greatest depth {:.3} mm; contact changed {} times",
             slaved.depth_max_mm, slaved.contact_changes
         ),
         format!(
-            "greatest force: {:.3} N at the handle, {:.3} N of the model where the slave is, {:.3} N of its cell",
+            "greatest force: {:.3} N at the handle, {:.3} N of the model at the slave's position, {:.3} N at the load cell",
             slaved.handle_max_n, slaved.model_max_n, slaved.cell_max_n
         ),
         format!(
-            "model force at the slave's position minus load-cell force: {} (the model is not that of the specimen)",
+            "model force at the slave's position minus load-cell force: {} (the model differs from the specimen)",
             less(&slaved.model_less_cell)
         ),
         format!(
-            "the handle less the cell: {} (that, the guard and the lag)",
+            "handle force minus load-cell force: {} (model, guard and lag)",
             less(&slaved.handle_less_cell)
         ),
     ];
     let behind = slaved.lag_mm;
     let late = slaved.lag_ms.map_or(String::new(), |lag| {
-        format!(", {:.0} ms, {:.0} ms at worst", lag.median, lag.worst)
+        format!("; median {:.0} ms, worst {:.0} ms", lag.median, lag.worst)
     });
     lines.push(format!(
-        "lag of the slave: {:.3} mm, {:.3} mm at worst{late}",
+        "lag of the slave: median {:.3} mm, worst {:.3} mm{late}",
         behind.median, behind.worst
     ));
     if let Some(through) = slaved.damping_through_slave {
         lines.push(format!(
-            "damping: the device has {:.1} N s/m and needs {:.1} at that depth; with its force through the slave it would need {through:.1}, so the force is that of the model at the handle",
+            "damping: at the greatest depth the device has {:.1} N s/m and needs {:.1} N s/m; with the force through the slave it would need {through:.1} N s/m, so the handle renders the force of the model at the master's position",
             slaved.damping_has,
             slaved.damping_needed.max(0.0)
         ));
     }
     if let Some(MasterLoop { priority, timing }) = &slaved.master_loop {
         lines.push(format!(
-            "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
+            "the master's loop: {} ticks, 99.9 % of them at most {:.1} ms late, {} missed; priority {priority}",
             timing.late.count,
             1e3 * timing.late.p99_9.0,
             timing.missed
@@ -185,18 +184,18 @@ pub fn follow_text(followed: &FeedbackCheck) -> String {
             followed.peak_commanded_n, followed.peak_measured_n
         ),
         format!(
-            "while loading, the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
+            "while loading, the measured force minus the commanded force is {:+.3} N on average, with a scatter of {:.3} N rms",
             followed.offset_n, followed.scatter_n
         ),
     ];
     if let Some(found) = &followed.calibration {
         lines.push(format!(
-            "bias       {:.4} ± {:.4} N/V at the rack, a line from {:.3} to {:.3}",
+            "bias       {:.4} ± {:.4} N/V at the rack, a straight line from {:.3} to {:.3}",
             found.slope, found.slope_error, found.rising.line[0], found.rising.line[1]
         ));
     }
     lines.push(format!(
-        "of that, friction of motor and rack is {:.3} N and the drag of the drive at this speed {:.3} N",
+        "the difference of the forces includes {:.3} N of friction in motor and rack, and {:.3} N of drag from the drive at this speed",
         followed.friction_n, followed.drag_n
     ));
     lines.push(String::new());
@@ -251,7 +250,7 @@ pub fn follow_plot(source: &str, followed: &FeedbackCheck) -> String {
     let torque = series(|one| [one.t.0, one.torque]);
     let last = followed.samples.last().map_or(1.0, |one| one.t.0);
     let line = format!(
-        "a slider pushes the rack while a cell measures; peak commanded {:.3} N, measured {:.3} N",
+        "a slider pushes the rack and a load cell measures the force; peak commanded {:.3} N, measured {:.3} N",
         followed.peak_commanded_n, followed.peak_measured_n
     );
     let mut svg = titled(source, &line);
@@ -314,6 +313,6 @@ mod tests {
         };
         assert!(margin_text(&margin(-0.1, 0.0)).contains("all the damping"));
         assert!(margin_text(&margin(0.002, 0.008)).contains("4.0 times"));
-        assert!(margin_text(&margin(0.002, 0.001)).contains("0.50 of"));
+        assert!(margin_text(&margin(0.002, 0.001)).contains("0.50 times"));
     }
 }

@@ -78,10 +78,10 @@ impl RunPlots {
         let of_each = trace.samples_per_bucket();
         let remark = match () {
             () if is_time_cut || is_depth_cut => {
-                Some("too many gaps to draw; the session has all samples".to_owned())
+                Some("the trace has too many gaps to draw; the session has all samples".to_owned())
             }
             () if cycles.len() > LOOPS_MAX => {
-                Some(format!("over depth the newest {LOOPS_MAX} cycles are drawn"))
+                Some(format!("only the newest {LOOPS_MAX} cycles are drawn over depth"))
             }
             () => (of_each > 1).then(|| format!("thinned to min/max of {of_each} samples")),
         };

@@ -60,7 +60,7 @@ fn level(at: f64) -> PlotLevel {
     PlotLevel { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
-pub const PLAN_CAPTION: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
+pub const PLAN_CAPTION: &str = "expected for the pig stomach of the source thesis; the band spans the softest to the stiffest specimen; on a base, the rig compliance is 30 µm/N";
 
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
@@ -100,8 +100,10 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
             phases.push(*phase);
         }
     }
-    let mut svg =
-        titled(name, "expected: moves and waits are known, searches and people take their time");
+    let mut svg = titled(
+        name,
+        "expected durations: moves and waits are known, searches and operator actions vary",
+    );
     let (top, look): (f64, AxisColours) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;
     // The rows are drawn here; the panel has the time.

@@ -8,7 +8,7 @@ use palpate_haptics::surface::ScenePlan;
 #[must_use]
 pub fn played_text(played: &SceneRun) -> String {
     let mut lines = vec![format!(
-        "scene '{}', {} x {} nodes, path {}: {} ticks, as deep as {:.2} mm, up to {:.2} N",
+        "scene '{}', {} x {} nodes, path {}: {} ticks, depth up to {:.2} mm, force up to {:.2} N",
         played.name,
         played.nodes,
         played.nodes,
@@ -29,7 +29,7 @@ pub fn played_text(played: &SceneRun) -> String {
         )
     } else {
         format!(
-            "one tick in a thousand takes more than {work:.0} us, and the budget is {} us; take fewer nodes, or end other programs",
+            "one tick in a thousand takes more than {work:.0} us, but the budget is {} us; use fewer nodes, or end other programs",
             played.tick_us
         )
     });
@@ -56,7 +56,7 @@ pub fn plan_text(plan: &ScenePlan) -> String {
         ));
     }
     for (part, why) in plan.inert {
-        lines.push(format!("without effect: {part}, as {why}"));
+        lines.push(format!("without effect: {part}, because {why}"));
     }
     lines.join("\n")
 }
@@ -79,7 +79,7 @@ pub fn bench_text(bench: &SceneBench) -> String {
             1e6 / mesh.cost_us
         ));
     }
-    lines.push("cut: largest error of shape, share of a mesh's time".to_owned());
+    lines.push("cut: largest error of shape, time in percent of the time without a cut".to_owned());
     for cut in &bench.curves.cuts {
         let words = match (cut.range, cut.threshold_mm > 0.0) {
             (None, false) => "none".to_owned(),

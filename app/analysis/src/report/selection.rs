@@ -103,7 +103,7 @@ pub fn tested(selection: &ModelSelection) -> String {
         |prediction| {
             let has = |unseen: HeldOutKind| prediction.records.iter().any(|one| one.unseen == unseen);
             if has(HeldOutKind::Rest) {
-                return "One record: the body of its ramp and a third of what follows predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
+                return "One record: the body fitted to the ramp and to the first third of the record after it predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
             }
             let kinds = [HeldOutKind::Speed, HeldOutKind::Depth, HeldOutKind::SpeedAndDepth, HeldOutKind::Specimen];
             let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {
@@ -112,7 +112,7 @@ pub fn tested(selection: &ModelSelection) -> String {
             });
             let kinds: Vec<String> = kinds.collect();
             format!(
-                "Held out: each of {} records is predicted by the body of others ({}); its own sensor offset is found on it, in 'scaled' one factor on the body as well.",
+                "Held out: each of {} records is predicted by the body fitted to other records ({}). The sensor offset is fitted to the predicted record; in 'scaled', a factor on the body is fitted as well.",
                 prediction.records.len(),
                 kinds.join(", ")
             )
@@ -122,7 +122,7 @@ pub fn tested(selection: &ModelSelection) -> String {
         .tolerance_n
         .map_or(String::new(), |tolerance| format!(" Tolerance: {} mN.", digits(1e3 * tolerance)));
     format!(
-        "{what}{tolerance} Criteria count {:.0} independent of {} samples.",
+        "{what}{tolerance} The criteria count {:.0} independent samples among {} samples.",
         selection.effective_samples, selection.samples
     )
 }

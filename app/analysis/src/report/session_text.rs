@@ -32,8 +32,11 @@ pub(crate) fn tags(add: &[String], remove: &[String]) -> String {
 #[must_use]
 pub fn describe_review(review: &Review) -> String {
     let stands = match review.changed.as_slice() {
-        [] => "everything is as it was seen".to_owned(),
-        changed => format!("but {} changed since; it is to be reviewed again", changed.join(", ")),
+        [] => "and nothing has changed since".to_owned(),
+        changed => format!(
+            "but {} changed since, so the session must be reviewed again",
+            changed.join(", ")
+        ),
     };
     let decision = review.decision.name();
     format!("{decision} by {}, {stands}", review.by)
@@ -49,9 +52,9 @@ pub fn describe_health(health: &HealthSummary) -> Vec<(&'static str, String)> {
             format!("queue at most {:.1} % full", worst.queue_share * 100.0),
         ];
         let sync = worst.sync_s.map(|secs| secs * 1e3);
-        parts.extend(sync.map(|millis| format!("synchronised in at most {millis:.1} ms")));
+        parts.extend(sync.map(|millis| format!("disk synchronisation at most {millis:.1} ms")));
         let free = worst.free_bytes.map(|bytes| bytes as f64 / 1e9);
-        parts.extend(free.map(|gigabytes| format!("{gigabytes:.1} GB of disk free at least")));
+        parts.extend(free.map(|gigabytes| format!("at least {gigabytes:.1} GB of disk free")));
         parts.push(format!("{} readings missing", worst.missed_readings));
         lines.push(("computer", parts.join(", ")));
     }

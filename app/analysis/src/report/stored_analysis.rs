@@ -30,7 +30,7 @@ pub fn sentences(results: &Value) -> Vec<String> {
 pub fn describe_force_change(change: &ForceChange) -> String {
     let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
     format!(
-        "{} forces, changed by {:.4} N rms and at most {:.4} N; peak {} instead of {}",
+        "{} forces change by {:.4} N rms and at most {:.4} N; the peak is {} instead of {}",
         change.samples,
         change.rms_n,
         change.max_n,
@@ -121,6 +121,6 @@ mod tests {
         };
         let words = describe_analysis(&other);
         assert!(words.starts_with("calibration June: 7 forces"), "{words}");
-        assert!(words.ends_with("peak 2.000 N instead of -"), "{words}");
+        assert!(words.ends_with("peak is 2.000 N instead of -"), "{words}");
     }
 }

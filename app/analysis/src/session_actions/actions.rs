@@ -29,15 +29,15 @@ pub enum SessionActionError {
     Say(#[from] EditFailure),
     #[error(transparent)]
     Calibration(#[from] LibraryError),
-    #[error("the session has no force in these intervals, so the mask would leave out nothing")]
-    NothingLeftOut,
     #[error(
-        "the session found no contact, so no depth counts from one; there is nothing to correct"
+        "the session has no force in these intervals, so the mask would exclude nothing; choose other intervals"
     )]
+    NothingLeftOut,
+    #[error("the session found no contact, so it has no contact to correct")]
     NoContact,
-    #[error("the session found contact {0} times; give the number of one")]
+    #[error("the session found contact {0} times; give the number of one contact")]
     WhichContact(usize),
-    #[error("the session has no contact {number}; it found contact {found} times")]
+    #[error("the session has no contact {number}; its contacts are numbered from 1 to {found}")]
     NoSuchContact { number: u32, found: usize },
     #[error(
         "contact at {position} is outside the rig's travel of {travel}; give the position from home"

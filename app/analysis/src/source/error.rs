@@ -15,16 +15,14 @@ pub enum SourceError {
     Analysis(#[from] AnalysisError),
     #[error("the session was rejected ({reason}) and is not used")]
     Rejected { reason: String },
-    #[error("a table has no analyses, so there is no '{name}'; name a session")]
+    #[error("a table has no analyses, so it has no analysis '{name}'; name a session")]
     TableAnalysis { name: String },
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error(
-        "the session was imported from {file} and has no decisions; there is nothing to report"
-    )]
+    #[error("the session was imported from {file}, so it has no decisions and nothing to report")]
     Imported { file: String },
     #[error(
-        "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; import the file again with other units if they are wrong"
+        "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; if the forces are wrong, import the file again with other units"
     )]
     NoSignal { file: String },
     #[error("the session has no ramp and hold with known force and depth to fit")]
@@ -32,11 +30,11 @@ pub enum SourceError {
     #[error("the session has no loading and no sine with known force and depth to analyse")]
     NoCycles,
     #[error(
-        "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"
+        "a recorded decision cannot be understood ({detail}); read the session with the version of palpate that wrote it, or replay the session to find the entry"
     )]
     Decision { detail: String },
     #[error(
-        "the session's plan cannot be understood ({detail}); read the session with the version that wrote it"
+        "the session's plan cannot be understood ({detail}); read the session with the version of palpate that wrote it"
     )]
     Plan { detail: String },
     #[error(transparent)]

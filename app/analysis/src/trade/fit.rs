@@ -33,7 +33,7 @@ pub(super) fn rows(
         for recording in &recordings {
             let reduced = thin(recording, keep);
             let found = fit(&reduced, &FitOptions::default()).map_err(|err| err.to_string())?;
-            let body = found.kelvin().ok_or("the fit is of another family")?;
+            let body = found.kelvin().ok_or("the fit is not a modified Kelvin model")?;
             tau_square += (body.tau_eps / ModifiedKelvin::THESIS.tau_eps - 1.0).powi(2);
             force_square += difference(&along(&body, paths), paths.ramp_hold.exact()).powi(2);
             samples = reduced.len();

@@ -67,7 +67,7 @@ pub fn svg(curves: &TradeCurves) -> String {
     let heading = TextInk { size: 16.0, ..TextInk::plain(LIGHT.text) };
     let title = format!("Error against time on {}", curves.machine.words());
     svg.text([LEFT, 28.0], heading, &title);
-    let legend = "line: nothing is cheaper and more exact; blue: f64, orange: f32";
+    let legend = "line: no other point is both cheaper and more exact; blue: f64, orange: f32";
     svg.text([LEFT, 48.0], TextInk::plain(LIGHT.text_quiet), legend);
     let force = "error of the peak force";
     let tables = [

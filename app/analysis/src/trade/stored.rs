@@ -13,13 +13,13 @@ use thiserror::Error;
 
 #[derive(Debug, Error)]
 pub enum TradeFileError {
-    #[error("the curves cannot be {what}: {source}, {}", path.display())]
+    #[error("the curves {} cannot be {what} ({source}); check the permissions and the disk", path.display())]
     Io { what: &'static str, path: PathBuf, source: io::Error },
-    #[error("this file holds no curves ({reason}); measure again, {}", path.display())]
+    #[error("{} holds no curves ({reason}); measure again", path.display())]
     NotCurves { path: PathBuf, reason: String },
-    #[error("these curves were changed after they were measured; measure again, {}", path.display())]
+    #[error("the curves {} were changed after they were measured; measure again", path.display())]
     Checksum { path: PathBuf },
-    #[error("{source}, {}", path.display())]
+    #[error("{}: {source}", path.display())]
     Curves { path: PathBuf, source: CurveError },
 }
 

@@ -17,7 +17,7 @@ pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
     );
     let _ = writeln!(
         out,
-        "times: the least of all rounds; spread: the middle round above it; even and odd rounds differ by {} at most; *: nothing is cheaper and more exact",
+        "time: the fastest round; spread: the median round above the fastest; even and odd rounds differ by {} at most; *: no other row is both cheaper and more exact",
         percent(curves.worst_halves())
     );
     integrators(&mut out, curves);
@@ -108,7 +108,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
 fn families(out: &mut String, curves: &TradeCurves) {
     let _ = writeln!(
         out,
-        "\nfamilies: a step at any rate, and the largest error in percent of the peak force of what they stand for\n{:34}{:>10}  {:>7} {:>10}",
+        "\nfamilies: time of a step at any rate, and largest error in percent of the peak force of the body approximated\n{:34}{:>10}  {:>7} {:>10}",
         "", "a step", "spread", "error"
     );
     let mut target = "";
@@ -182,7 +182,7 @@ pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
                 .share_of_period
                 .map_or(String::new(), |share| format!(", {} of each period", percent(share)));
             format!(
-                "{}: errs by {} of the peak force{share}",
+                "{}: error {} of the peak force{share}",
                 choice.setting,
                 percent(choice.error_of_peak)
             )

@@ -79,9 +79,12 @@ fn steady(report: &CycleReport) -> String {
     match (report.steadiness.steady_from, report.cycles.len()) {
         (Some(cycle), _) => format!("steady from cycle {cycle} on: {criterion}"),
         (None, count) if count <= row => {
-            format!("too few cycles to call them steady: {} are needed", row + 1)
+            format!(
+                "too few cycles to judge whether they are steady: at least {} are needed",
+                row + 1
+            )
         }
-        (None, _) => format!("not steady: never to the end of the record did {criterion}"),
+        (None, _) => format!("not steady by the end of the record; the criterion is: {criterion}"),
     }
 }
 

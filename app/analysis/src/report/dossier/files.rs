@@ -48,7 +48,7 @@ fn own_hash(page: &str) -> String {
 
 /// Files that a page lists, and whether the page itself is unchanged.
 pub fn claims(page: &str) -> Result<(Vec<FileClaim>, bool), String> {
-    let no_page = "the file is not the page of a report; name a report page";
+    let no_page = "the file is not a report page; name a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
     let stated = seal.strip_suffix(SEAL_END).unwrap_or_default();
     let rows = page.split(ROW).skip(1).map(|row| {
@@ -97,15 +97,15 @@ pub fn compare(claims: &[&FileClaim], session: &Path) -> Result<FileComparison, 
     for claim in claims {
         match now.iter().find(|one| one.what == claim.file) {
             Some(one) if one.sha256 == claim.sha256 => compared.same += 1,
-            Some(_) => {
-                compared.differences.push(format!("{} is not as the page describes it", claim.file))
-            }
+            Some(_) => compared
+                .differences
+                .push(format!("{} differs from what the page describes", claim.file)),
             None => compared.differences.push(format!("{} is missing", claim.file)),
         }
     }
     for one in &now {
         if claims.iter().all(|claim| claim.file != one.what) {
-            let sentence = format!("{} is newer than the page", one.what);
+            let sentence = format!("{} is not listed on the page", one.what);
             compared.differences.push(sentence);
         }
     }
@@ -136,7 +136,7 @@ mod tests {
         assert!(claims(&page.replace(">now<", ">then<")).unwrap().1);
         assert!(!claims(&page.replace("beef", "feed")).unwrap().1);
         for other in ["", "<html></html>", SEAL, &sealed("no rows\n")] {
-            assert!(claims(other).unwrap_err().contains("page of a report"));
+            assert!(claims(other).unwrap_err().contains("not a report page"));
         }
     }
 }

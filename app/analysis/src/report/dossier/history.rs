@@ -109,7 +109,7 @@ pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8
         };
         let rows: Vec<Vec<String>> = edits.iter().map(row).collect();
         let heads = ["when (UTC)", "by", "what", "why"];
-        body.table("Edits, in the order made", &heads, &rows);
+        body.table("Edits in order of creation", &heads, &rows);
     }
     let analyses = &subject.analyses;
     let made: Vec<_> =
@@ -133,7 +133,7 @@ pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8
     };
     let rows: Vec<Vec<String>> = made.iter().map(row).collect();
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
-    body.table("Analyses, in the order made", &heads, &rows);
+    body.table("Analyses in order of creation", &heads, &rows);
     for one in made {
         let lines = stored_analysis::fit_lines(one);
         if !lines.is_empty() {

@@ -136,7 +136,7 @@ fn measured(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     let thinning = capital(&traces.thinning());
     body.figure(
         &figures::force_time(traces).svg(),
-        &format!("Force over time, phases shaded. {thinning}.{}", traces.limit_above()),
+        &format!("Force over time, with shaded phases. {thinning}.{}", traces.limit_above()),
     );
     body.figure(
         &figures::force_depth(traces).svg(),
@@ -157,10 +157,10 @@ fn fit_part(body: &mut HtmlBody, part: &FitPart) {
     body.paragraph(&format!("{}; {}.", capital(&report.model), quality(report)));
     let heads = ["parameter", "value ± standard error", "unit", "95 % interval", "systematic"];
     let rows: Vec<Vec<String>> = report.parameters.iter().map(cells).collect();
-    let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty that calibration and compliance add, the same in every repeat.";
+    let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty from calibration and compliance, which is the same in every repeat.";
     body.table(caption, &heads, &rows);
     body.list(report.sentences().chain(part.remarks.iter().map(String::as_str)));
-    let caption = "Measured and fitted force, with twice the standard uncertainty of the calibration around it where that is stated, and the residual. The figure shows the lowest and the highest sample of each pixel column.";
+    let caption = "Measured force, fitted force and the residual. The band around the fitted force is twice the standard uncertainty of the calibration, where the calibration states it. The figure shows the lowest and the highest sample of each pixel column.";
     body.figure(&part.figure.svg(), caption);
 }
 
@@ -182,13 +182,13 @@ pub(super) fn cells(parameter: &FittedParameter) -> Vec<String> {
 fn calibration(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     body.heading(level, "Calibration");
     match &subject.calibration {
-        None => body.paragraph("The session has no calibration: its forces are those of its file."),
+        None => body.paragraph("The session has no calibration; its forces are those in its file."),
         Some((calibration, Err(reason))) => {
             body.paragraph(&format!("{}: {reason}.", calibration.name));
         }
         Some((calibration, Ok(details))) => {
             body.pre(&calibrations::calibration_page(calibration, None, details, &[]));
-            let caption = "The curve with its readings, its residuals, its slope, and the standard uncertainty of a force with every term that is stated.";
+            let caption = "The calibration curve with its readings, residuals and slope, and the standard uncertainty of a force with every stated term.";
             body.figure(&calibration_plot::picture(calibration, details), caption);
         }
     }
@@ -197,7 +197,7 @@ fn calibration(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
 fn files(body: &mut HtmlBody, subjects: &[ReportSubject]) {
     body.heading(2, "Files that this page describes");
     body.paragraph(
-        "The table has the SHA-256 (FIPS 180-4) of each file. 'palpate report --check' compares this page with the present files, and so can any program that computes SHA-256.",
+        "The table lists the SHA-256 (FIPS 180-4) of each file. 'palpate report --check' or any program that computes SHA-256 can compare this page with the present files.",
     );
     let mut rows = Vec::new();
     let mut marks = Vec::new();

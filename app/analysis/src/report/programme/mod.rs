@@ -198,7 +198,7 @@ impl ProgrammePage {
             .collect();
         (!loss.is_empty()).then(|| {
             format!(
-                "of the finished sessions {}, so the page leaves it out; restore it from a backup and run the same command, or begin in a new folder",
+                "finished sessions are lost, so the page leaves them out ({}); restore them from a backup and run the same command, or begin in a new folder",
                 loss.join(", ")
             )
         })
