@@ -220,7 +220,7 @@ impl EditPanel {
             }
         }
         if self.undo.is_empty() && self.redo.is_empty() && self.task.answer().is_none() {
-            let text = "Tags and verdicts can be undone, and the undoing is itself recorded; notes and reviews cannot.";
+            let text = "Tags and verdicts can be undone, and each undo is recorded; notes and reviews cannot be undone.";
             quiet_ui(ui, text);
         }
     }
