@@ -58,7 +58,7 @@ pub(super) fn run(
     output.answer("replay", &object, || sessions.iter().map(text).collect::<Vec<_>>().join("\n"));
     if differing > 0 {
         return Err(Failure::failed(format!(
-            "{differing} of {} sessions differ from what the engine decides now",
+            "the engine now decides otherwise in {differing} of {} sessions",
             sessions.len()
         )));
     }

@@ -198,7 +198,7 @@ fn check(args: &RigCheckArgs, output: &Output) -> Result<(), Failure> {
                 about.mm_per_pulse, about.travel, about.speed_max, about.acceleration.0
             ),
             format!(
-                "samples    at most {:.2} ms apart, within {:.2} ms of the command",
+                "samples    at most {:.2} ms apart, position within {:.2} ms of the command",
                 about.tick().0 * about.ticks_per_sample * 1e3,
                 about.pulse_lag.0 * 1e3
             ),

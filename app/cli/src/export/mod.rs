@@ -81,7 +81,7 @@ fn delimiter(text: &str) -> Result<u8, String> {
     match text.as_bytes() {
         b"tab" => Ok(b'\t'),
         [one @ (b',' | b';' | b'|' | b'\t' | b':')] => Ok(*one),
-        _ => Err("give one of , ; | : or tab".into()),
+        _ => Err("give one of these: , ; | : tab".into()),
     }
 }
 

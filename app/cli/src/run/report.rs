@@ -56,7 +56,7 @@ pub(super) fn report(
     }
     let no_verdict = view.data_quality_error.as_ref().map(|reason| {
         let folder = view.folder.display();
-        format!("the recording is complete, but its verdict could not be saved: {reason}; set it with 'palpate verdict {folder}'")
+        format!("the recording is complete, but its verdict cannot be saved: {reason}; set the verdict with 'palpate verdict {folder}'")
     });
     if outcome.ending == EndingKind::Finish {
         return no_verdict.map_or(Ok(()), |sentence| Err(Failure::failed(sentence)));

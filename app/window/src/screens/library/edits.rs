@@ -96,7 +96,7 @@ impl EditPanel {
     fn may(&self, chosen: usize) -> Result<(), String> {
         require(!self.task.is_busy(), "an edit is being written")?;
         require(chosen > 0, "choose sessions first")?;
-        require(!self.by.trim().is_empty(), "type your name into 'by'")
+        require(!self.by.trim().is_empty(), "type your name into the field 'by'")
     }
 
     fn start(&mut self, ctx: &Context, sessions: &[PathBuf], edit: SessionEdit) {

@@ -180,7 +180,7 @@ impl TradeScreen {
                 "the tolerance, shape or budget is invalid; correct the entry on the left",
             ),
             Some(Ok(plan)) => {
-                ui.label(RichText::new("the cheapest plan that meets both").strong());
+                ui.label(RichText::new("the cheapest plan that meets both tolerances").strong());
                 plan_lines(&plan).iter().for_each(|line| sentence_ui(ui, line));
             }
             Some(Err(none)) => {

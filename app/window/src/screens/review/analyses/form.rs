@@ -92,7 +92,7 @@ impl AnalysisForm {
     }
 
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
-        self.model.ui(ui, "model", "even if the session is rejected");
+        self.model.ui(ui, "model", "fit a rejected session too");
         if self.model.family.is_some() {
             tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
         }
