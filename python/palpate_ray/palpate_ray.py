@@ -84,7 +84,7 @@ def main(words=None):
         ended = args.shards - len(waiting)
         left = (time.monotonic() - start) / ended * len(waiting)
         print(f"{ended} of {args.shards} shards, about {left:.0f} s left", file=sys.stderr, flush=True)
-    print(f"{totals['made']} fits made, {totals['were_there']} were there, {totals['rejected']} sessions rejected, "
+    print(f"{totals['made']} fits made, {totals['were_there']} already present, {totals['rejected']} sessions rejected, "
           f"{len(failed)} of {args.shards} shards failed")
     for shard, reasons in sorted(failed.items(), key=lambda one: int(one[0].partition("/")[0])):
         for reason in reasons:

@@ -40,13 +40,15 @@ pub struct AnalyseArgs {
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("this is not a positive number; write it like 0.75".into()),
+        _ => Err("this is not a positive number; give a number such as 0.75".into()),
     }
 }
 
 pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     if args.plot.is_some() && args.sources.len() > 1 {
-        return Err(Failure::usage("a plot shows one source; give one, or leave out --plot"));
+        return Err(Failure::usage(
+            "--plot draws one source; name one source, or leave out --plot",
+        ));
     }
     new_file::check("plot", args.plot.as_deref())?;
     let columns = parse_columns(args.columns.as_deref())?;

@@ -14,7 +14,7 @@ pub(super) fn choice<T: Clone + Send + Sync + 'static>(
     let words = table.iter().map(|(word, _, help)| PossibleValue::new(*word).help(*help));
     PossibleValuesParser::new(words).try_map(|text| {
         let row = table.iter().find(|(word, ..)| *word == text);
-        row.map(|(_, value, _)| value.clone()).ok_or("this is not one of the allowed words")
+        row.map(|(_, value, _)| value.clone()).ok_or("this is not one of the allowed values")
     })
 }
 
@@ -22,7 +22,7 @@ pub(super) fn choice<T: Clone + Send + Sync + 'static>(
 pub(super) fn parse_number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err("this is not a finite number; write it like 0.75".into()),
+        _ => Err("this is not a finite number; give a number such as 0.75".into()),
     }
 }
 
@@ -32,7 +32,7 @@ pub(super) fn above_zero(flag: &str, value: f64, max: f64, unit: &str) -> Result
         return Ok(value);
     }
     Err(Failure::usage(format!(
-        "--{flag} {value} is not possible; give a number above 0 and up to {max} {unit}"
+        "--{flag} {value} is out of range; give a number above 0 and up to {max} {unit}"
     )))
 }
 

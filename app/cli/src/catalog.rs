@@ -48,7 +48,7 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
     let object = serde_json::json!({ "file": file, "unreadable": unreadable, "seconds": seconds });
     note_all(&changes.remarks, output);
     output.answer("catalog rebuild", &merged(object, &changes), || {
-        let head = format!("{} sessions read in {seconds:.2} s, {file}", changes.sessions);
+        let head = format!("{} sessions read in {seconds:.2} s; catalog {file}", changes.sessions);
         let bad = unreadable.iter().map(|one| format!("{}: {}", one.folder, one.reason));
         [head].into_iter().chain(bad).collect::<Vec<_>>().join("\n")
     });
@@ -65,7 +65,7 @@ fn check(library: &Path, output: &Output) -> Result<(), Failure> {
     let file = library.join(CATALOG_FILE).display().to_string();
     let object = serde_json::json!({ "file": file, "sessions": sessions, "doubts": doubts });
     output.answer("catalog check", &object, || match doubts.as_slice() {
-        [] => format!("the catalog agrees with its {sessions} sessions"),
+        [] => format!("the catalog agrees with all {sessions} sessions of the library"),
         doubts => {
             let line = |one: &CatalogMismatch| format!("{}: {}", one.folder, one.sentence);
             doubts.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -74,7 +74,7 @@ fn check(library: &Path, output: &Output) -> Result<(), Failure> {
     match doubts.len() {
         0 => Ok(()),
         count => Err(Failure::failed(format!(
-            "the catalog is out of date for {count} sessions; 'palpate find' reads what changed, 'palpate catalog rebuild' reads all"
+            "the catalog is out of date for {count} sessions; 'palpate find' reads the changed sessions again, 'palpate catalog rebuild' reads all sessions again"
         ))),
     }
 }

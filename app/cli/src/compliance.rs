@@ -33,14 +33,14 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
         && !(seating > 0.0 && seating.is_finite())
     {
         return Err(Failure::usage(format!(
-            "a seating force of {seating} N is not possible; give one above 0 N"
+            "a seating force of {seating} N is out of range; give a force above 0 N"
         )));
     }
     let edited = edited_session::open(&args.session).map_err(super::source_failure)?;
     edited.session.notes.iter().for_each(|note| output.note(note));
     if let Some(reason) = edited.rejection() {
         return Err(Failure::usage(format!(
-            "the session was rejected ({reason}), so it gives no compliance; 'palpate verdict' changes the verdict"
+            "the session was rejected ({reason}), so it gives no compliance; change the verdict with 'palpate verdict'"
         )));
     }
     let found =
@@ -92,13 +92,13 @@ fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
             um(found.std_error_mm_per_n)
         ),
         format!(
-            "  surface at {:.4} ± {:.4} mm from home; forces {:.1} mN rms about the line",
+            "  surface at {:.4} ± {:.4} mm from home; residual about the fitted line {:.1} mN rms",
             found.surface_mm,
             found.surface_std_error_mm,
             1e3 * found.rmse_n
         ),
         format!(
-            "  {} samples of {:.2} to {:.2} N while loading, {} presses",
+            "  {} loading samples from {:.2} to {:.2} N, in {} presses",
             found.samples,
             found.seating_n,
             found.force_max_n,
@@ -116,7 +116,8 @@ fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
     }));
     lines.push(match saved {
         Some(saved) => format!("saved as {}, {}", saved.id, saved.path.display()),
-        None => "not saved; add --save to store it for 'palpate fit --compliance last'".into(),
+        None => "not saved; add --save to store the compliance for 'palpate fit --compliance last'"
+            .into(),
     });
     lines.join("\n")
 }

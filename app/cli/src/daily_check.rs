@@ -68,13 +68,15 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     };
     let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {
-        return Err(Failure::failed("the runner ended without a run"));
+        return Err(Failure::failed(
+            "the thread that runs protocols ended without a run; start the check again",
+        ));
     };
     let ended = view.outcome.as_ref();
     let is_stopped = |ending| matches!(ending, EndingKind::Stop | EndingKind::Halt);
     if let Some(outcome) = ended.filter(|outcome| is_stopped(outcome.ending)) {
         return Err(Failure::failed(format!(
-            "the check ended early ({}), so no result is saved for today; run it again",
+            "the check ended early ({}), so no result is saved for today; run the check again",
             outcome.reason
         )));
     }
@@ -109,7 +111,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
 fn plan(mass_g: f64, labels: &SessionLabels) -> Result<Plan, Failure> {
     let values = BTreeMap::from([("mass".to_owned(), format!("{mass_g} g"))]);
     let Some(protocol) = built_in(DAILY_CHECK) else {
-        return Err(Failure::failed("this palpate has no daily check built in"));
+        return Err(Failure::failed("this build of palpate has no daily check"));
     };
     let planned = protocol.and_then(|protocol| Ok((protocol.plan(&values)?, protocol)));
     let (plan, protocol) = planned.map_err(|problems| {

@@ -38,7 +38,7 @@ pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
     output.answer("doctor", &report, || report.text());
     if report.unwell > 0 {
         return Err(Failure::failed(format!(
-            "{} of {} cannot be used as they are",
+            "{} of {} sessions cannot be used as they are",
             report.unwell,
             report.sessions.len()
         )));
@@ -68,13 +68,13 @@ impl DoctorReport {
         let mut lines: Vec<String> = self.sessions.iter().map(session_text).collect();
         lines.extend(self.leftovers.iter().map(|path| {
             format!(
-                "{}: an unfinished file of a program that was killed; delete it, or the next export there deletes it",
+                "{} is unfinished, because its program was killed; delete the file, or the next export into this folder deletes it",
                 path.display()
             )
         }));
         lines.push(match unwell {
-            0 => format!("{count} examined, all usable"),
-            _ => format!("{count} examined, {unwell} cannot be used as they are"),
+            0 => format!("sessions examined: {count}; all are usable"),
+            _ => format!("sessions examined: {count}; {unwell} cannot be used as they are"),
         });
         lines.join("\n")
     }
@@ -147,7 +147,10 @@ fn all_sessions(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     let items = std::fs::read_dir(&folder)
         .and_then(|items| items.map(|item| Ok(item?.path())).collect::<Result<Vec<_>, _>>());
     let mut paths = items.map_err(|err| {
-        Failure::failed(format!("cannot read {} ({err}); check its permissions", folder.display()))
+        Failure::failed(format!(
+            "{} cannot be read ({err}); check its permissions",
+            folder.display()
+        ))
     })?;
     paths.retain(|path| path.is_dir());
     paths.sort_unstable();

@@ -160,8 +160,10 @@ impl Announcement {
             object["cell_at"] = cell_at.into();
         }
         output.answer("emulate", &object, || match &self.cell {
-            Some(cell) => format!("{} at {at}, {cell} at {cell_at}; Ctrl-C ends it", self.label),
-            None => format!("{} at {at}; Ctrl-C ends it", self.label),
+            Some(cell) => {
+                format!("{} at {at}, {cell} at {cell_at}; Ctrl-C ends the emulation", self.label)
+            }
+            None => format!("{} at {at}; Ctrl-C ends the emulation", self.label),
         });
     }
 }
@@ -200,7 +202,7 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
     for (number, value) in &args.setting {
         eeprom.set(*number, *value).map_err(|code| {
             Failure::usage(format!(
-                "the board would refuse --setting {number}={value} with error:{code}"
+                "the emulated board refuses --setting {number}={value} with error:{code}; give another setting"
             ))
         })?;
     }

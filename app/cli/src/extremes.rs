@@ -49,13 +49,16 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     output.answer("extremes", &object, || text(&rows));
     match own_page {
         Some(file) => replace(file, page(&rows).as_bytes()).map_err(|err| {
-            Failure::failed(format!("cannot replace the page {} ({err})", file.display()))
+            Failure::failed(format!(
+                "the page {} cannot be replaced ({err}); check its permissions",
+                file.display()
+            ))
         })?,
         None => new_file::write("page", args.page.as_deref(), || page(&rows))?,
     }
     if wrong > 0 {
         return Err(Failure::failed(format!(
-            "{wrong} of {} rows are wrong; they are marked WRONG above, please report them",
+            "{wrong} of {} rows are wrong; report the rows marked WRONG above",
             rows.len()
         )));
     }

@@ -76,7 +76,7 @@ impl DeviceArgs {
     fn setting(&self) -> Result<HapticSettings, Failure> {
         let not_negative = |name: &str, value: f64| {
             (value >= 0.0).then_some(value).ok_or_else(|| {
-                Failure::usage(format!("--{name} {value} is not possible; give 0 or more"))
+                Failure::usage(format!("--{name} {value} is out of range; give 0 or more"))
             })
         };
         let friction = self.friction.map(|friction| not_negative("friction", friction));

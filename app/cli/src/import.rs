@@ -131,7 +131,7 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Keep(_) => Failure::failed(err),
         ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
         ImportFailure::Foreign(_) => {
-            Failure::usage(format!("{err}; 'palpate import --help' lists the options for it"))
+            Failure::usage(format!("{err}; 'palpate import --help' lists the options"))
         }
         _ => Failure::usage(err),
     }

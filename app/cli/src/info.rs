@@ -169,7 +169,7 @@ fn recording_lines(session: &Session) -> Vec<String> {
     }
     let count = session.auxiliary.raw_bytes;
     if count > 0 {
-        lines.push(format!("raw        {count} bytes as exchanged with devices"));
+        lines.push(format!("raw        {count} bytes exchanged with the devices"));
     }
     let health = health(session).map(session_text::describe_health).unwrap_or_default();
     lines.extend(health.iter().map(|(name, text)| format!("{name:<10} {text}")));

@@ -213,8 +213,7 @@ fn outlive_file_limits() {
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-const NO_WINDOW: &str =
-    "this palpate was built without its window; 'palpate --help' lists the commands that need none";
+const NO_WINDOW: &str = "this palpate was built without its window; 'palpate --help' lists the commands that need no window";
 
 /// Runs the command of the arguments; `windows` opens windows, if this program has any.
 pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
@@ -272,7 +271,7 @@ fn sources_failure(err: RecordingsError) -> Failure {
             Failure::usage(format!("{err}; add --include-rejected to include them"))
         }
         RecordingsError::Table(_) => {
-            Failure::usage(format!("{err}; 'palpate import' makes one of a table"))
+            Failure::usage(format!("{err}; 'palpate import' makes a session of a table"))
         }
         err => Failure::usage(err),
     }
@@ -282,9 +281,11 @@ fn sources_failure(err: RecordingsError) -> Failure {
 fn known_fit_failure(err: KnownFitError) -> Failure {
     match err {
         KnownFitError::NotAFit { .. } => {
-            Failure::usage(format!("{err}; 'palpate fit --json' writes one"))
+            Failure::usage(format!("{err}; 'palpate fit --json' writes a fit"))
         }
-        KnownFitError::Changed(_) => Failure::failed(format!("{err}; or name another with --like")),
+        KnownFitError::Changed(_) => {
+            Failure::failed(format!("{err}; or name another record with --like"))
+        }
         KnownFitError::Source(err) => source_failure(err),
         KnownFitError::Fit { .. } => Failure::failed(err),
         err => Failure::usage(err),
@@ -295,7 +296,7 @@ fn source_failure(err: SourceError) -> Failure {
     let with = |way_out: &str| Failure::Usage(format!("{err}; {way_out}"));
     match err {
         SourceError::Rejected { .. } => with(
-            "--include-rejected of fit and select includes it, and 'palpate verdict' changes the verdict",
+            "use the session with --include-rejected of fit or select, or change the verdict with 'palpate verdict'",
         ),
         SourceError::Imported { .. } => with("'palpate info' shows its content"),
         // The error of tables has no variant for it.
@@ -303,10 +304,10 @@ fn source_failure(err: SourceError) -> Failure {
             with("--columns names them")
         }
         SourceError::NoCycles => {
-            Failure::Failed(format!("{err}; 'palpate report' shows what happened in it"))
+            Failure::Failed(format!("{err}; 'palpate report' shows what happened in the session"))
         }
         SourceError::Correction(ComplianceCorrectionError::NoneInForce { .. }) => {
-            with("'palpate compliance SESSION --save' does so")
+            with("'palpate compliance SESSION --save' stores the compliance")
         }
         SourceError::Session(err) => read_failure(err),
         SourceError::Analysis(err) => recalibrate::analysis_failure(err),

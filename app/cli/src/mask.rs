@@ -53,7 +53,10 @@ pub(super) fn run(args: &MaskArgs, output: &Output) -> Result<(), Failure> {
         "session": session, "analysis": name, "by": author.by, "left_out": left_out, "of": of,
     });
     output.answer("mask", &object, || {
-        format!("{}: analysis '{name}' excludes {left_out} of {of} forces", session.display())
+        format!(
+            "{}: analysis '{name}' excludes {left_out} of {of} force samples",
+            session.display()
+        )
     });
     Ok(())
 }

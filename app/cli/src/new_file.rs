@@ -18,7 +18,7 @@ pub(super) fn check(what: &str, to: Option<&Path>) -> Result<(), Failure> {
     let folder = to.parent().filter(|folder| !folder.as_os_str().is_empty());
     match folder.filter(|folder| !folder.is_dir()) {
         Some(folder) => Err(Failure::usage(format!(
-            "there is no folder {} for the {what}; make it or choose another",
+            "the folder {} for the {what} does not exist; create the folder or choose another",
             folder.display()
         ))),
         None => Ok(()),
@@ -38,7 +38,7 @@ pub(super) fn write(
 pub(super) fn write_bytes(what: &str, to: &Path, bytes: &[u8]) -> Result<(), Failure> {
     atomic::create(to, bytes).map_err(|err| {
         Failure::failed(format!(
-            "cannot write the {what} {} ({err}); choose a folder that may be written",
+            "the {what} {} cannot be written ({err}); choose a folder that may be written",
             to.display()
         ))
     })

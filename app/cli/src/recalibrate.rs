@@ -98,9 +98,9 @@ pub(super) fn analysis_edit_failure(err: SessionActionError) -> Failure {
         SessionActionError::Source(err) => super::source_failure(err),
         SessionActionError::Say(err) => super::review::session_edit_failure(err),
         SessionActionError::Calibration(err) => super::calibration::source::failure(err),
-        SessionActionError::NothingLeftOut => {
-            Failure::usage(format!("{err}; see t_s of 'palpate export'"))
-        }
+        SessionActionError::NothingLeftOut => Failure::usage(format!(
+            "{err}; 'palpate export' writes the time of every sample in column t_s"
+        )),
         SessionActionError::WhichContact(several) => {
             Failure::usage(format!("{err} with --contact 1 to {several}"))
         }
@@ -113,7 +113,7 @@ pub(super) fn analysis_edit_failure(err: SessionActionError) -> Failure {
 pub(super) fn analysis_failure(err: AnalysisError) -> Failure {
     match err {
         AnalysisError::None { .. } => {
-            Failure::usage(format!("{err}; 'palpate info' shows those there are"))
+            Failure::usage(format!("{err}; 'palpate info' lists the analyses"))
         }
         AnalysisError::Chain(_) | AnalysisError::Input { .. } | AnalysisError::Lock(_) => {
             Failure::failed(err)

@@ -77,7 +77,10 @@ pub(super) fn run(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
 
 fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     find_unfinished_sessions(library).map_err(|err| {
-        Failure::failed(format!("cannot read {} ({err}); check its permissions", library.display()))
+        Failure::failed(format!(
+            "{} cannot be read ({err}); check its permissions",
+            library.display()
+        ))
     })
 }
 

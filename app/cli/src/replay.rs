@@ -58,7 +58,7 @@ pub(super) fn run(
     output.answer("replay", &object, || sessions.iter().map(text).collect::<Vec<_>>().join("\n"));
     if differing > 0 {
         return Err(Failure::failed(format!(
-            "{differing} of {} sessions differ from what the engine decides now",
+            "the engine now decides otherwise in {differing} of {} sessions",
             sessions.len()
         )));
     }
@@ -73,7 +73,7 @@ fn show(
 ) -> Result<(), Failure> {
     let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
     let [path] = args.sessions.as_slice() else {
-        return Err(Failure::usage("--window shows one session; name one"));
+        return Err(Failure::usage("--window shows one session; name one session"));
     };
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
@@ -130,10 +130,15 @@ fn text(replayed: &Replayed) -> String {
         );
     }
     let decisions = match (report.is_same_engine, report.blessed) {
-        (false, _) => "decisions not compared, another engine version made them".to_string(),
+        (false, _) => {
+            "decisions not compared, because another engine version made them".to_string()
+        }
         (true, 0) => format!("{} decisions identical", report.decisions),
         (true, blessed) => {
-            format!("{} decisions, {blessed} of them differ as blessed", report.decisions)
+            format!(
+                "{} decisions, {blessed} of them different as blessed.json allows",
+                report.decisions
+            )
         }
     };
     format!(

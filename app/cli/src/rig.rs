@@ -152,7 +152,9 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
 /// Opens the rig that a file describes.
 fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     if args.time_scale != TimeScale::Factor(1.0) {
-        return Err(Failure::usage("--time-scale is for simulated rigs; leave it out"));
+        return Err(Failure::usage(
+            "--time-scale applies only to simulated rigs; leave out --time-scale",
+        ));
     }
     // A wrong name is refused before anything is opened.
     let source = args.calibration.as_deref().map(CalibrationSource::find).transpose()?;
@@ -211,7 +213,7 @@ fn travel(args: &RigArgs, rigs: Position) -> Result<Position, Failure> {
         None => Ok(rigs),
         Some(end) if end > 0.0 && end <= rigs.0 => Ok(Position(end)),
         Some(end) => Err(Failure::usage(format!(
-            "--travel-max {end} is not within the travel of the rig; give more than 0 and at most {} mm",
+            "--travel-max {end} is outside the rig's travel; give a number above 0 and up to {} mm",
             rigs.0
         ))),
     }

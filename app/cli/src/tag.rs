@@ -35,7 +35,7 @@ pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
         match word.as_bytes() {
             [b'-', b'-', ..] => {
                 return Err(Failure::usage(format!(
-                    "{word} stands among the tags; options come before the sessions, as in 'palpate tag --by Ada demo +good'"
+                    "the option {word} is among the tags; write options before the sessions, as in 'palpate tag --by Ada demo +good'"
                 )));
             }
             [b'+', ..] => add.push(word[1..].to_owned()),

@@ -27,7 +27,7 @@ pub(super) fn read_lines(thread: &str) -> Result<Receiver<String>, Failure> {
 /// Calls `handler` at every Ctrl-C.
 pub(super) fn on_ctrl_c(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
     ctrlc::set_handler(handler)
-        .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
+        .map_err(|err| Failure::failed(format!("the handler of Ctrl-C cannot be installed: {err}")))
 }
 
 /// A flag that Ctrl-C sets.

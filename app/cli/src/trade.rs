@@ -87,7 +87,7 @@ pub(super) fn with_bar<T>(
 ) -> Result<T, Failure> {
     let curves = work(&output.count_bar(0));
     let curves = curves.map_err(Failure::failed)?;
-    curves.ok_or_else(|| Failure::failed("the measurement ended before it was done"))
+    curves.ok_or_else(|| Failure::failed("the measurement ended early; start it again"))
 }
 
 /// The curves of this machine, or else any there are.
@@ -97,7 +97,7 @@ fn stored(library: &Path) -> Result<(TradeCurves, PathBuf), Failure> {
     let own = own.into_iter().find(|file| file.exists());
     let file = own.or_else(|| trade_files(library).into_iter().next()).ok_or_else(|| {
         Failure::usage(format!(
-            "no curves are stored in {}; measure with 'palpate trade'",
+            "no curves are stored in {}; measure the curves with 'palpate trade'",
             library.display()
         ))
     })?;

@@ -194,11 +194,11 @@ fn check(args: &RigCheckArgs, output: &Output) -> Result<(), Failure> {
             format!("rig        {}", about.name),
             format!("is         {}", about.identity),
             format!(
-                "axis       {} mm a pulse, travel {}, at most {}, {} mm/s2",
+                "axis       {} mm per pulse, travel {}, speed up to {}, acceleration {} mm/s2",
                 about.mm_per_pulse, about.travel, about.speed_max, about.acceleration.0
             ),
             format!(
-                "samples    one in {:.2} ms or less, within {:.2} ms of the command",
+                "samples    at most {:.2} ms apart, position within {:.2} ms of the command",
                 about.tick().0 * about.ticks_per_sample * 1e3,
                 about.pulse_lag.0 * 1e3
             ),
@@ -316,7 +316,7 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
     });
     output.answer("rig monitor", &object, || {
         let mut lines = vec![format!(
-            "samples    {} in {:.1} s, {:.1} a second, at most {:.2} ms apart",
+            "samples    {} in {:.1} s, {:.1} per second, at most {:.2} ms apart",
             whole.samples,
             end.seconds().0,
             whole.samples as f64 / end.seconds().0,
@@ -353,7 +353,7 @@ fn monitor_line(
         named.into_iter().filter(|(bit, _)| reading.status.has(*bit)).map(|(_, name)| name);
     let states = states.collect::<Vec<&str>>().join(", ");
     format!(
-        "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old within {:.2}  {states}",
+        "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ± {:.2} ms old  {states}",
         recent.min_v,
         recent.max_v,
         position_mm(rig, reading),

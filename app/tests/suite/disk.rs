@@ -71,7 +71,7 @@ fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
     let (report, message) = run_on_a_disk_that_fills_up(at, spare);
     assert_eq!(report["samples_lost"], 0, "{message}");
     assert!(message.contains("without loss"), "{message}");
-    for wrong in ["log cannot be written", "not as it was recorded"] {
+    for wrong in ["log cannot be written", "differs from what was recorded"] {
         assert!(!message.contains(wrong), "{message}");
     }
     assert!(message.contains("verdict") && message.contains("palpate verdict"), "{message}");

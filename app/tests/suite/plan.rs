@@ -119,7 +119,7 @@ fn a_fit_that_cannot_be_remembered_is_a_fit() {
     std::fs::write(at.join("library"), "").unwrap();
     let fit = palpate(at, &["fit", "press.csv"]);
     succeeded(&fit);
-    assert!(stderr(&fit).contains("remembered"));
+    assert!(stderr(&fit).contains("cannot use this fit later"));
 }
 
 #[test]

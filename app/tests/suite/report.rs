@@ -259,7 +259,7 @@ fn figures_are_drawn_and_wrong_use_is_reported() {
             "apply only to force-time",
         ),
         (&["report", "press", "--html", "p.html", "--analysis", "none"], "has no analysis"),
-        (&["report", "press", "--analysis", "none"], "--analysis is for"),
+        (&["report", "press", "--analysis", "none"], "--analysis applies only to"),
         (&["report", "nowhere", "--html", "p.html"], "nowhere"),
     ] {
         let refused = palpate(at, words);

@@ -114,7 +114,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
         "{}",
         text("versions.txt")
     );
-    assert!(text("findings.txt").contains("1 examined, all usable"));
+    assert!(text("findings.txt").contains("sessions examined: 1; all are usable"));
     assert!(text("log/palpate.log").contains("session closed"));
     assert_eq!(text("window.json"), "{\"is_dark\": true}\n");
     let rig = text("rigs/bench.toml");

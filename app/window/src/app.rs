@@ -286,7 +286,8 @@ impl eframe::App for WorkbenchApp {
         self.screens.close();
         self.update_settings();
         let report = self.meter.write_report();
-        let report = report.map_err(|err| format!("the frame report cannot be written: {err}"));
+        let report =
+            report.map_err(|err| format!("the report of frame times cannot be written: {err}"));
         for err in [self.settings.store(), report].into_iter().filter_map(Result::err) {
             // The window is gone; standard error is the last place to say it.
             let _ = writeln!(std::io::stderr(), "{err}");

@@ -79,7 +79,7 @@ impl WindowSettings {
 
 fn unreadable(path: &Path, reason: &str) -> String {
     format!(
-        "the window's settings in {} cannot be read ({reason}); it opens with the usual settings, and the file stays as it is until you correct or delete it",
+        "the window's settings in {} cannot be read ({reason}); the window opens with the default settings, and the file stays unchanged until you correct or delete it",
         path.display()
     )
 }

@@ -181,7 +181,7 @@ impl Workbench {
     /// Whether times may be measured now, or why not.
     pub fn measure_verdict(&self) -> Result<(), String> {
         let has_run = run_in_progress(&self.snapshot).is_some();
-        require(!has_run, "a run is in progress and would disturb the times")?;
+        require(!has_run, "a run is in progress and would disturb the timing measurement")?;
         let is_busy = self.occupation.is_busy;
         require(!is_busy, "other work is in progress and would disturb the timing measurement")
     }
@@ -299,7 +299,10 @@ impl Workbench {
                 }
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => {
-                    self.refusal = Some("the runner ended; close palpate and check the rig".into());
+                    self.refusal = Some(
+                        "the thread that runs protocols ended; close palpate and check the rig"
+                            .into(),
+                    );
                     self.start = Start::None;
                 }
             },

@@ -130,7 +130,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
         ("3 mm", "\"3 mm\" is a length"),
         ("0.7501", "cannot make 0.7501 mm/s"),
         ("900", "outside the range of rig sim"),
-        ("", "a number is missing"),
+        ("", "type a number here"),
     ] {
         flow.type_into("speed", text);
         assert!(flow.says(sentence), "'{text}' must say '{sentence}'");

@@ -53,7 +53,7 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
     wait_for(&mut flow, "the first cycle", |run| run.cycle == 1);
     assert!(flow.says("cycle 1 of 2"));
     flow.window.check_accessibility();
-    assert!(!flow.is_enabled("Resume  F9") && flow.says("Pause first to resume"));
+    assert!(!flow.is_enabled("Resume  F9") && flow.says("Pause the run to enable Resume"));
     flow.click("Pause after cycle 1  F4");
     flow.window.run_steps(2);
     wait_for(&mut flow, "the pause", is_paused);

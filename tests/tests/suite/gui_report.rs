@@ -151,7 +151,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     );
     // A name is used once.
     panel.type_into("name", "all of it");
-    assert!(!panel.is_enabled("Make analysis") && panel.says("used only once"));
+    assert!(!panel.is_enabled("Make analysis") && panel.says("never used twice"));
     // Taking back needs a reason, and is a record.
     assert!(!panel.is_enabled("Withdraw analysis") && panel.says("type a reason above"));
     panel.type_into("reason", "the probe slipped");
@@ -160,7 +160,7 @@ fn a_fit_is_made_compared_and_taken_back() {
     assert_eq!(panel.chosen(), None);
     assert_eq!(panel.analyses().all.len(), 2);
     assert_eq!(panel.analyses().active().count(), 0);
-    assert!(panel.says("there is no analysis to withdraw"));
+    assert!(panel.says("the session has no analysis to withdraw"));
 }
 
 #[test]
@@ -220,7 +220,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
 #[test]
 fn sessions_shown_together_are_fitted_as_one_body() {
     let mut panel = Panel::open();
-    panel.click("one material for this and the other session shown");
+    panel.click("one material for this session and the other one shown");
     panel.type_into("name", "together");
     panel.click("Make analysis");
     panel.wait_for("saved as 'together'");

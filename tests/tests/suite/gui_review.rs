@@ -98,7 +98,7 @@ fn one_session_is_looked_at_closely() {
     flow.click("Over depth");
     flow.wait("the loop", |window| {
         use egui_kittest::kittest::Queryable;
-        let mut found = window.query_all_by_label_contains("none is more than half a pixel");
+        let mut found = window.query_all_by_label_contains("every sample is within half a pixel");
         found.next().is_some()
     });
     flow.click("Zoom in");
@@ -114,7 +114,7 @@ fn sessions_are_fitted_compared_and_predicted() {
     let mut flow = review();
     let path = show(&mut flow, "ramp-hold-lab");
     flow.click("Parameters");
-    assert!(flow.says("no session shown has been fitted here yet"));
+    assert!(flow.says("none of the sessions shown is fitted yet"));
     flow.click("Prediction");
     assert!(!flow.is_enabled("Predict second session"));
     assert!(flow.says("show two sessions"));
@@ -144,7 +144,7 @@ fn sessions_are_fitted_compared_and_predicted() {
     flow.click("Predict second session");
     flow.wait("the prediction", |window| {
         use egui_kittest::kittest::Queryable;
-        window.query_all_by_label_contains("mN RMSE").next().is_some()
+        window.query_all_by_label_contains("with an RMSE of").next().is_some()
     });
     flow.window.run_steps(3);
     flow.window.check_accessibility();

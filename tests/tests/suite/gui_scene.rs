@@ -180,7 +180,7 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     let text = "name = \"loose\"\n[tolerances]\nforce_percent = 1000.0\nshape_mm = 5.0\ntick_us = 100000.0\n";
     read(&mut flow, &path, text, "loose");
     assert!(!flow.is_enabled("Use plan"));
-    assert!(flow.says("measure the cost of a scene on the screen Trade first"));
+    assert!(flow.says("measure the cost of a scene on the Trade screen first"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num7);
     flow.window.run_steps(3);
     flow.click("Scene: mesh");

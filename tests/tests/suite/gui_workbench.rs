@@ -48,7 +48,8 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     flow.window.key_press(Key::Enter);
     flow.window.run_steps(3);
     assert!(
-        !flow.says("a few letters of its name") && flow.window.query_by_label("command").is_none()
+        !flow.says("a few letters of the command's name")
+            && flow.window.query_by_label("command").is_none()
     );
     let button = flow.window.get_by_label(SCREENS[3].name);
     assert!(button.accesskit_node().toggled().is_some());

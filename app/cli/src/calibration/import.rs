@@ -90,7 +90,7 @@ impl std::str::FromStr for CurveChoice {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
-            || "give best, monotone, segments=N or polynomial=N, as in segments=4".to_owned();
+            || "give best, monotone, segments=N or polynomial=N, for example segments=4".to_owned();
         match text.split_once('=') {
             None if text == "best" => Ok(Self::Best),
             None if text == "monotone" => Ok(Self::Monotone),
@@ -177,7 +177,7 @@ fn choose_curve(calibration: &Calibration, choice: CurveChoice) -> Result<CurveK
         CurveChoice::Polynomial(degree) => Ok(CurveKind::Polynomial { degree }),
         CurveChoice::Segments(count) => CurveKind::best_segments(&points, count).ok_or_else(|| {
             Failure::usage(format!(
-                "{count} straight segments are not possible through {} weights; give 1 to {}",
+                "{count} straight segments cannot be fitted through {} weights; give 1 to {} segments",
                 points.len(),
                 points.len() - 1
             ))

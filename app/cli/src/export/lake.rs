@@ -35,7 +35,7 @@ pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(),
     match failed.len() {
         0 => Ok(()),
         count => Err(Failure::failed(format!(
-            "{count} of {} sessions were not added; the notes state the reasons",
+            "{count} of {} sessions were not added; the notes above state the reasons",
             found.len()
         ))),
     }

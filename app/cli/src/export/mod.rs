@@ -81,7 +81,7 @@ fn delimiter(text: &str) -> Result<u8, String> {
     match text.as_bytes() {
         b"tab" => Ok(b'\t'),
         [one @ (b',' | b';' | b'|' | b'\t' | b':')] => Ok(*one),
-        _ => Err("choose , ; | : or tab, which no number contains".into()),
+        _ => Err("give one of these: , ; | : tab".into()),
     }
 }
 
@@ -119,7 +119,7 @@ impl ExportArgs {
             && from > until
         {
             return Err(Failure::usage(format!(
-                "--from {from} is after --until {until}; give the earlier time first"
+                "--from {from} is after --until {until}; give the earlier time with --from"
             )));
         }
         Ok(SampleSelection {
@@ -139,7 +139,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     }
     let [session] = args.sessions.as_slice() else {
         return Err(Failure::usage(
-            "a table holds one session; name one, or add several to a lake with --lake FOLDER",
+            "a table holds one session; name one session, or add several sessions to a lake with --lake FOLDER",
         ));
     };
     let selection = args.selection()?;
@@ -187,10 +187,10 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     output.answer("export", &object, || {
         let corrected = compliance
             .as_ref()
-            .map_or(String::new(), |id| format!(", with depths corrected by {id} and raw ones"));
+            .map_or(String::new(), |id| format!(", with raw depths and depths corrected by {id}"));
         let every = selection
             .every
-            .map_or(String::new(), |every| format!(", every {every}th of those selected"));
+            .map_or(String::new(), |every| format!(", one of every {every} selected samples"));
         let what = args.mcap_full.as_ref().map_or("rows", |_| "messages");
         format!("{} {what} written to {}{every}{corrected}", written.rows, written.path.display())
     });

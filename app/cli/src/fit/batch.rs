@@ -56,7 +56,7 @@ pub(super) fn run(
         WorkEvent::Done(count) => {
             bar.set_position(count as u64);
             if is_ending.load(Ordering::Relaxed) {
-                bar.set_message("ending after unfitted under way");
+                bar.set_message("ending after the fits in progress");
             }
         }
         WorkEvent::Next(answer) => {
@@ -91,12 +91,14 @@ pub(super) fn run(
             rows.push(result);
         }
     })
-    .map_err(|err| Failure::failed(format!("no thread can be started ({err}); try again")))?;
+    .map_err(|err| {
+        Failure::failed(format!("no thread can be started for the fits ({err}); try again"))
+    })?;
     drop(bar);
     output.text_only(|| table(sources, &rows));
     if rejected > 0 {
         output.note(&format!(
-            "{} sources, {rejected} of them rejected; --include-rejected fits them too",
+            "{} sources, {rejected} of them rejected; --include-rejected fits the rejected sources too",
             sources.len()
         ));
     }
@@ -105,9 +107,9 @@ pub(super) fn run(
     }
     let unfitted = format!("{failed} of {} sources", sources.len());
     Err(Failure::failed(if is_ending.load(Ordering::Relaxed) {
-        format!("{unfitted} were not fitted, because the batch was ended")
+        format!("{unfitted} were not fitted, because the batch was interrupted")
     } else {
-        format!("{unfitted} were not fitted; each states its reason")
+        format!("{unfitted} were not fitted; the output states the reasons")
     }))
 }
 

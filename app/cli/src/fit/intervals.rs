@@ -12,10 +12,10 @@ const REPEATS_MIN: usize = 40;
 pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     match args.bootstrap {
         Some(repeats) if repeats < REPEATS_MIN => Err(Failure::usage(format!(
-            "--bootstrap {repeats} is too few for a 95 % interval; ask for at least {REPEATS_MIN}"
+            "--bootstrap {repeats} is too few for a 95 % interval; give at least {REPEATS_MIN} repeats"
         ))),
         None if args.seed.is_some() => {
-            Err(Failure::usage("--seed is for --bootstrap; ask for that too, or leave it out"))
+            Err(Failure::usage("--seed needs --bootstrap; add --bootstrap, or leave out --seed"))
         }
         _ => Ok(()),
     }

@@ -56,7 +56,7 @@ pub(super) fn run(
     object["failed"] = json!(failed);
     output.answer("fit", &object, || {
         format!(
-            "{} fits made, {} were there, {} sessions rejected, {} not fitted",
+            "{} fits made, {} already present, {} sessions rejected, {} not fitted",
             tally.made,
             tally.were_there,
             tally.rejected,
@@ -70,10 +70,10 @@ pub(super) fn run(
     Err(Failure::failed(match is_ending.load(Ordering::Relaxed) {
         true => {
             format!(
-                "{unfitted} were not fitted, because the command was ended; run it again to continue"
+                "{unfitted} were not fitted, because the command was interrupted; run the command again to continue"
             )
         }
-        false => format!("{unfitted} were not fitted; the notes state the reasons"),
+        false => format!("{unfitted} were not fitted; the notes above state the reasons"),
     }))
 }
 
@@ -90,7 +90,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
     ];
     match others.iter().find(|(_, is_given)| *is_given) {
         Some((name, _)) => Err(Failure::usage(format!(
-            "{name} is not for a lake; name a single session, or leave it out"
+            "{name} does not apply to a lake; name a single session, or leave out {name}"
         ))),
         None => Ok(()),
     }
@@ -100,7 +100,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
 fn hash_file(file: &str) -> Result<String, Failure> {
     sha256_of_file(Path::new(file)).map_err(|err| {
         Failure::usage(format!(
-            "--compliance {file} cannot be read as a file ({err}); a lake is fitted the same everywhere, so name the compliance's file"
+            "--compliance {file} is not a readable file ({err}); name a file, so that every machine fits the lake with the same compliance"
         ))
     })
 }

@@ -132,7 +132,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         return lake::run(lake, args, &recipe, output);
     }
     if args.shard.is_some() {
-        return Err(Failure::usage("--shard is for a lake; name one lake"));
+        return Err(Failure::usage("--shard needs a lake; name one lake, or leave out --shard"));
     }
     if let Some(shared) = &args.share {
         return joint::run(args, Some(shared), &recipe, output);
@@ -144,7 +144,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.picture.is_some() || args.save.is_some() || args.analysis.is_some() {
         return Err(Failure::usage(
-            "--picture, --save and --analysis are for one record; name a single session or table",
+            "--picture, --save and --analysis apply to one record; name a single session or table",
         ));
     }
     if args.family.is_some() && !args.each {
@@ -186,7 +186,7 @@ fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Re
     })?;
     if let Err((file, err)) = remember(report, source) {
         output.note(&format!(
-            "this fit will not be remembered for 'palpate plan': {err}, {}",
+            "'palpate plan' cannot use this fit later, because {} cannot be written ({err})",
             file.display()
         ));
     }
@@ -235,7 +235,7 @@ fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
         });
         let Some((name, value)) = parsed else {
             return Err(Failure::usage(format!(
-                "--fixed {pair} is not NAME=VALUE, as in --fixed f_offset=0"
+                "--fixed {pair} is not NAME=VALUE; give for example --fixed f_offset=0"
             )));
         };
         options.fix(name, value).map_err(Failure::usage)?;

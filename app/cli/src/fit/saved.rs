@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) fn check(args: &FitArgs, source: &Path) -> Result<(), Failure> {
     match (&args.save, source.is_dir()) {
         (Some(name), false) => Err(Failure::usage(format!(
-            "'{name}' cannot be saved: {} is not a session folder, and only those keep analyses",
+            "analysis '{name}' cannot be saved, because {} is not a session folder; name a session folder",
             source.display()
         ))),
         _ => Ok(()),

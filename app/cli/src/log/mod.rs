@@ -27,7 +27,7 @@ pub(super) fn begin(is_verbose: bool) -> Option<Queue> {
         Ok(filter) if !wanted.trim().is_empty() => filter,
         Ok(_) => usual(),
         Err(err) => {
-            queue.line(format!("RUST_LOG is not understood ({err}) and ignored\n"));
+            queue.line(format!("RUST_LOG is ignored, because its filter is invalid ({err})\n"));
             usual()
         }
     };

@@ -106,7 +106,7 @@ impl Writer {
             let _ = io::stderr().write_all(&line);
         }
         let Some(folder) = self.folder.clone() else {
-            return self.report_missing_log("there is no library folder");
+            return self.report_missing_log("palpate has no library folder");
         };
         match self.append(&folder, &line) {
             Ok(()) => self.is_begun = true,

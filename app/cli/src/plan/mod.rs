@@ -50,7 +50,8 @@ pub struct PlanArgs {
     picture: Option<PathBuf>,
 }
 
-const GUESS: &str = "tau_eps of that fit is poorly determined, so a plan from it is a guess; name a better record with --like";
+const GUESS: &str =
+    "the fit determines tau_eps poorly, so the plan is uncertain; name a better record with --like";
 
 pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     let request = PlanRequest {
@@ -80,7 +81,10 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     if let Some(file) = &args.picture {
         palpate_sessions::atomic::replace(file, plan_plot::picture(&report).as_bytes()).map_err(
             |err| {
-                Failure::failed(format!("the picture cannot be written: {err}, {}", file.display()))
+                Failure::failed(format!(
+                    "the picture {} cannot be written ({err}); choose a folder that may be written",
+                    file.display()
+                ))
             },
         )?;
     }
@@ -108,7 +112,7 @@ fn targets(within: &[String]) -> Result<Vec<PrecisionTarget>, Failure> {
         });
         let Some((name, percent)) = parsed else {
             return Err(Failure::usage(format!(
-                "--within {pair} is not NAME=PERCENT, as in --within tau=1%"
+                "--within {pair} is not NAME=PERCENT; give for example --within tau=1%"
             )));
         };
         let target = PrecisionTarget::new(name, percent).map_err(Failure::usage)?;
@@ -131,7 +135,7 @@ fn unknowns(known: &[String]) -> Result<FreeOffsets, Failure> {
             "f_offset" => unknowns.f_offset = false,
             other => {
                 return Err(Failure::usage(format!(
-                    "--known {other} is not possible; f0 and f_offset can be known beforehand"
+                    "--known {other} is not allowed; give f0 or f_offset"
                 )));
             }
         }
@@ -145,7 +149,7 @@ fn memory(text: &str) -> Result<CorrelatedNoise, Failure> {
         .and_then(|(sd, time)| Some((sd.trim().parse().ok()?, time.trim().parse().ok()?)));
     let Some((sd_mn, secs)) = parsed else {
         return Err(Failure::usage(format!(
-            "--memory {text} is not a standard deviation in mN and a time in seconds with a comma between them, as in --memory 10,0.5"
+            "--memory {text} is not SD,TIME; give a standard deviation in mN and a time in s, for example --memory 10,0.5"
         )));
     };
     let sd_mn: f64 = sd_mn;

@@ -49,7 +49,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
             plain(report.rig.sample_rate_hz)
         ),
         format!(
-            "limits  {} mm deep, at most {} N and {} mm/s",
+            "limits  depth {} mm, force {} N, speed {} mm/s",
             plain(report.rig.depth.0),
             digits(report.rig.force_max.0, 3),
             plain(report.rig.speed_max.0)
@@ -98,13 +98,13 @@ pub(super) fn command(press: &RampHold) -> String {
 
 fn run_instructions(offer: &PlanOffer) -> Vec<String> {
     let Some(secs) = offer.run_s else {
-        return vec!["   there is no command for this yet".into()];
+        return vec!["   palpate has no command for this protocol yet".into()];
     };
     let mut lines: Vec<String> =
         offer.commands.iter().map(|command| format!("   {command}")).collect();
     let acknowledgements = offer.acknowledgements.iter();
     lines.extend(acknowledgements.map(|reason| format!("   with --acknowledge, because {reason}")));
-    lines.push(format!("   about {secs:.0} s in all, with homing and finding contact"));
+    lines.push(format!("   about {secs:.0} s in all, including homing and the contact search"));
     lines
 }
 
@@ -138,17 +138,17 @@ fn tables(report: &PlanReport) -> Vec<String> {
         all.filter(|i| SHOWN.contains(&(i % 10))).collect()
     };
     let counts = |_: &PrecisionCurve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
-    let mut lines = vec![format!("{wanted} in % (95 % interval), ramp and hold, against the hold")];
+    let mut lines = vec![format!("95 % interval of {wanted} in %, ramp and hold, by hold time")];
     lines.extend(table("hold s", &curves.hold, k, easy));
     let [top, bottom] = curves.between;
     lines.push(format!(
-        "{wanted} in %, cycles from {} to {} mm, against their number",
+        "95 % interval of {wanted} in %, cycles from {} to {} mm, by number of cycles",
         plain(top.0),
         plain(bottom.0)
     ));
     lines.extend(table("cycles", &curves.cycles, k, counts));
     lines.push(format!(
-        "{wanted} in %, ramp and hold of {} s, against samples per second",
+        "95 % interval of {wanted} in %, ramp and hold of {} s, by samples per second",
         plain(curves.rate_hold.0)
     ));
     let rate = std::slice::from_ref(&curves.rate);

@@ -44,7 +44,9 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     if !values.is_empty() {
-        return Err(Failure::usage("a programme sets its values itself; change them in its file"));
+        return Err(Failure::usage(
+            "a programme takes its values from its file; change the values there",
+        ));
     }
     let text = read(file).map_err(Failure::usage)?;
     let mut programme = parse(file, &text).map_err(|err| parse_failure(file, &err))?;
@@ -77,9 +79,9 @@ pub(super) fn run(
             // The file accepts forces, not a rig that failed its check.
             reasons if options.acknowledge => Ok(reasons),
             reasons => match reasons.first() {
-                Some(reason) => {
-                    Err(format!("{reason}; or add --acknowledge to run anyway, which is recorded"))
-                }
+                Some(reason) => Err(format!(
+                    "{reason}; or run anyway with --acknowledge, which the session records"
+                )),
                 None => Ok(reasons),
             },
         }

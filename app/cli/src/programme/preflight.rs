@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How to supply missing labels.
-const SUPPLY_HINT: &str = "write it into [about] of the file, or into [specimen.N] for one specimen, or add --operator, --specimen or --about KEY=VALUE";
+const SUPPLY_HINT: &str = "write each label into [about] of the file, or into [specimen.N] for one specimen, or add --operator, --specimen or --about KEY=VALUE";
 
 /// The programme of a file; protocols that are not built in are files in its folder.
 pub(super) fn parse(file: &Path, text: &str) -> Result<Programme, ProgrammeError> {
@@ -37,7 +37,7 @@ pub(super) fn parse_failure(file: &Path, err: &ProgrammeError) -> Failure {
     let name = file.display();
     let more = match rest {
         0 => String::new(),
-        count => format!("; and {count} more: see 'palpate protocol check {name}'"),
+        count => format!("; 'palpate protocol check {name}' lists {count} more"),
     };
     Failure::usage(format!("{name}, {first}{more}"))
 }

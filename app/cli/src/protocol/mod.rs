@@ -107,7 +107,7 @@ pub(super) fn parse_pair(text: &str) -> Result<(String, String), String> {
         Some((name, value)) if !name.trim().is_empty() => {
             Ok((name.trim().to_owned(), value.trim().to_owned()))
         }
-        _ => Err("this gives no value to a name; write it like depth=20mm".into()),
+        _ => Err("this is not NAME=VALUE; give for example depth=20mm".into()),
     }
 }
 
@@ -121,10 +121,10 @@ pub(super) fn read_text(name: &str) -> Result<String, Failure> {
         Ok(None) => {
             let hint = match nearest_built_in(name) {
                 Some(near) => format!("did you mean '{near}'?"),
-                None => "'palpate protocol list' lists the built-in ones".into(),
+                None => "'palpate protocol list' lists the built-in protocols".into(),
             };
             Err(Failure::usage(format!(
-                "there is no built-in protocol and no file '{name}'; {hint}"
+                "'{name}' is neither a built-in protocol nor a file; {hint}"
             )))
         }
         Err(err) => Err(Failure::usage(format!(
@@ -137,7 +137,7 @@ pub(super) fn read_text(name: &str) -> Result<String, Failure> {
 fn read_protocol_text(name: &str) -> Result<String, Failure> {
     if programme::is_programme(name) {
         return Err(Failure::usage(format!(
-            "{name} is a programme, not a protocol; 'palpate run {name} --preview' shows what it will do"
+            "{name} is a programme, not a protocol; 'palpate run {name} --preview' shows its runs"
         )));
     }
     read_text(name)
@@ -157,7 +157,7 @@ pub(super) fn load_checked(
     if let Some(first) = errors.first() {
         let more = match errors.len() {
             1 => String::new(),
-            count => format!("; and {} more: see 'palpate protocol check {name}'", count - 1),
+            count => format!("; 'palpate protocol check {name}' lists {} more", count - 1),
         };
         return Err(Failure::usage(format!("{name}, {first}{more}")));
     }
@@ -169,7 +169,9 @@ pub(super) fn load_checked(
         }
         output.note(&format!("{name}, {problem}"));
     }
-    plan.ok_or_else(|| Failure::failed(format!("{name} could not be written out")))
+    plan.ok_or_else(|| {
+        Failure::failed(format!("the protocol {name} cannot be expanded into a plan"))
+    })
 }
 
 fn check_on(
@@ -243,9 +245,9 @@ fn run_check(args: &ProtocolCheckArgs, output: &Output) -> Result<(), Failure> {
     output.answer("protocol check", &object, || text::check(&files));
     match wrong {
         0 => Ok(()),
-        1 => Err(Failure::usage("one file cannot run as it is; correct what is listed")),
+        1 => Err(Failure::usage("1 file cannot run; correct the errors listed above")),
         _ => Err(Failure::usage(format!(
-            "{wrong} files cannot run as they are; correct what is listed"
+            "{wrong} files cannot run; correct the errors listed above"
         ))),
     }
 }

@@ -91,13 +91,13 @@ pub(super) fn preview(
     }
     lines.push(String::new());
     lines.push(format!(
-        "total {}, at most {}; of it {:.3} s are known to the sample",
+        "total {}, at most {}; {:.3} s of the total are exact",
         clock(preview.expected.0),
         clock(preview.longest.0),
         preview.steps.iter().filter(|step| step.is_exact).map(|step| step.expected.0).sum::<f64>()
     ));
     lines.push(format!(
-        "peak force {:.1} to {:.1}; up to {:.1} MB",
+        "peak force {:.1} to {:.1}; up to {:.1} MB on disk",
         preview.force_band[0],
         preview.force_band[1],
         preview.storage_bytes as f64 * 1e-6
@@ -109,7 +109,7 @@ pub(super) fn preview(
     lines.extend(preview.notes.iter().map(|line| format!("note: {line}")));
     if !protocol.parameters.is_empty() {
         lines.push(String::new());
-        lines.push("may be changed with --set:".into());
+        lines.push("parameters that --set changes:".into());
         let values = written.plan.source.as_ref().map(|source| &source.values);
         lines.extend(protocol.parameters.iter().map(|parameter| {
             let value = values.and_then(|values| values.get(&parameter.name));

@@ -33,7 +33,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
         named.iter().find(|(_, id)| by_session.keys().all(|(known, _)| known != id))
     {
         return Err(Failure::usage(format!(
-            "the page does not describe {}, which is session {id}; name those that it describes",
+            "the page does not describe {} (session {id}); name only sessions that the page describes",
             path.display()
         )));
     }
@@ -60,7 +60,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
     });
     output.answer("report", &object, || {
         let mut lines = vec![match is_whole {
-            true => format!("{}: the page is as it was made", page.display()),
+            true => format!("{}: the page is unchanged", page.display()),
             false => format!("{}: the page was changed after it was made", page.display()),
         }];
         for one in &checked {
@@ -76,7 +76,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
             "the page was changed after it was made; make a new page from the sessions",
         )),
         (_, count) => Err(Failure::failed(format!(
-            "{} not as the page describes them; make a new page, or restore the files from a backup",
+            "{} not as the page describes; make a new page, or restore the files from a backup",
             match count {
                 1 => "1 file is".to_owned(),
                 _ => format!("{count} files are"),
@@ -114,7 +114,7 @@ fn find_near_page(page: &Path, folder: &str, id: &str) -> Result<PathBuf, Failur
     });
     found.ok_or_else(|| {
         Failure::usage(format!(
-            "session {id} is not in the folder of the page; name its folder after the page"
+            "session {id} is not in the page's folder; give the path of the session after --check FILE.html"
         ))
     })
 }

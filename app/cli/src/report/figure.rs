@@ -36,7 +36,7 @@ fn window(args: &ReportArgs) -> Result<TimeWindow, Failure> {
     };
     if window.from >= window.until {
         return Err(Failure::usage(
-            "--from is not before --until, so there is nothing to draw; give two times in s, the earlier with --from",
+            "--from is not before --until; give two times in s, the earlier with --from",
         ));
     }
     let is_over_samples = matches!(args.of, SessionFigure::ForceTime | SessionFigure::ForceDepth);

@@ -72,7 +72,7 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
         return Err(Failure::usage(match args.sessions.len() {
             0 => "name a session, or a page with --check",
             _ => {
-                "a report covers one session; name one, or compare several on a page with --html FILE"
+                "a report covers one session; name one session, or compare several on a page with --html FILE"
             }
         }));
     };
@@ -81,7 +81,7 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.analysis.is_some() {
         return Err(Failure::usage(
-            "--analysis is for --html and --figure: what happened in a run is the same in every analysis",
+            "--analysis applies only to --html and --figure; add one of them, or leave out --analysis",
         ));
     }
     fidelity(session, output)
@@ -141,7 +141,7 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
     });
     output.answer("report", &object, || {
         format!(
-            "{}: {} of {} described by their hashes; 'palpate report --check {}' compares them",
+            "{} holds the hashes of {} of {}; 'palpate report --check {}' compares the files",
             to.display(),
             counted(claims.len(), "file"),
             counted(args.sessions.len(), "session"),

@@ -48,12 +48,12 @@ pub struct RunArgs {
     session: SessionArgs,
 }
 
-const SHORT: &str = "Short for --set, of ramp-hold and every protocol with such a parameter";
+const SHORT: &str = "Short for --set, for ramp-hold and every protocol with the same parameter";
 
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
 #[derive(Debug, Args)]
 #[command(
-    next_help_heading = "Short for --set, of ramp-hold and every protocol with such a parameter"
+    next_help_heading = "Short for --set, for ramp-hold and every protocol with the same parameter"
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s
@@ -90,7 +90,7 @@ impl RunArgs {
             let Some(value) = value else { continue };
             if values.insert(name.to_owned(), value).is_some() {
                 return Err(Failure::usage(format!(
-                    "--{flag} is short for --set {name}=...; give one of them"
+                    "--{flag} and --set {name}=... set the same parameter; give only one of them"
                 )));
             }
         }
@@ -141,7 +141,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let labels = labels(options)?;
     if written.plan.name == DAILY_CHECK {
         output.note(&format!(
-            "this run does not count as the daily check; only '{DAILY_CHECK_COMMAND}' evaluates and saves one"
+            "this run does not count as the daily check; only '{DAILY_CHECK_COMMAND}' evaluates and saves a daily check"
         ));
     }
     if !options.preview {
@@ -207,7 +207,7 @@ pub(super) fn run_plan(
     match &gate {
         DailyCheckGate::Acknowledge(reason) if !options.acknowledge => {
             return Err(Failure::usage(format!(
-                "{reason}; or add --acknowledge to run anyway, which is recorded"
+                "{reason}; or run anyway with --acknowledge, which the session records"
             )));
         }
         DailyCheckGate::Note(note) => output.note(note),
@@ -216,7 +216,9 @@ pub(super) fn run_plan(
     preview.notes.iter().for_each(|note| output.note(note));
     let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {
-        return Err(Failure::failed("the runner ended without a run"));
+        return Err(Failure::failed(
+            "the thread that runs protocols ended without a run; start the run again",
+        ));
     };
     report(view, leader.as_ref(), output)
 }
@@ -255,7 +257,11 @@ pub(super) fn execute(
         Ok(Ok(())) => {}
         Ok(Err(StartError::Refused(reason))) => return Err(Failure::Usage(reason)),
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
-        Err(_) => return Err(Failure::failed("the runner ended before the run began")),
+        Err(_) => {
+            return Err(Failure::failed(
+                "the thread that runs protocols ended before the run began; start the run again",
+            ));
+        }
     }
     let prompts = has_operator.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
     watch(&runner, &woken, prompts.transpose()?, output)
@@ -313,7 +319,7 @@ fn watch(
         }
         if !is_alive && !runner.is_alive() {
             return Err(Failure::failed(
-                "the runner ended unexpectedly; the session is incomplete",
+                "the thread that runs protocols ended unexpectedly; the session is incomplete",
             ));
         }
     }

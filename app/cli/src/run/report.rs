@@ -56,7 +56,7 @@ pub(super) fn report(
     }
     let no_verdict = view.data_quality_error.as_ref().map(|reason| {
         let folder = view.folder.display();
-        format!("the recording is complete, but its verdict could not be saved: {reason}; set it with 'palpate verdict {folder}'")
+        format!("the recording is complete, but its verdict cannot be saved: {reason}; set the verdict with 'palpate verdict {folder}'")
     });
     if outcome.ending == EndingKind::Finish {
         return no_verdict.map_or(Ok(()), |sentence| Err(Failure::failed(sentence)));
@@ -80,12 +80,12 @@ fn log_failure(reason: &str, session: &SessionExamination, missing: u64) -> Stri
     };
     let remedy = match session.health {
         SessionHealth::Healthy => {
-            format!("check it with 'palpate doctor {folder}' before you use it")
+            format!("check the session with 'palpate doctor {folder}' before use")
         }
         SessionHealth::Foreign | SessionHealth::Lost => "measure again".to_owned(),
         _ => format!("'palpate recover {folder}' keeps the intact part"),
     };
-    format!("the session log is not as it was recorded: {reason}; {loss}; {remedy}")
+    format!("the session log on disk differs from what was recorded: {reason}; {loss}; {remedy}")
 }
 
 fn run_text(view: &RunView, ending: &str, samples: u64, slave: Option<String>) -> String {
@@ -107,7 +107,7 @@ fn run_text(view: &RunView, ending: &str, samples: u64, slave: Option<String>) -
         .extend(view.data_quality.as_ref().map(|(verdict, reason)| format!("{verdict}: {reason}")));
     if let Some(live) = &view.live {
         lines.push(format!(
-            "live fit, statistical component only ('palpate fit {folder}' adds that of the calibration):"
+            "live fit, with the statistical uncertainty only ('palpate fit {folder}' adds the uncertainty of the calibration):"
         ));
         lines.extend(parameter_lines(&live.parameters));
         let reasons = live.verdicts.iter().filter_map(|verdict| verdict.reason.as_ref());
@@ -130,7 +130,7 @@ pub(super) fn preview_text(preview: &Preview) -> String {
         })
         .collect();
     lines.push(format!(
-        "total      {:>8.1} s, at most {:.1} s; peak force {:.1} to {:.1}; up to {:.1} MB",
+        "total      {:>8.1} s, at most {:.1} s; peak force {:.1} to {:.1}; up to {:.1} MB on disk",
         preview.expected.0,
         preview.longest.0,
         preview.force_band[0],

@@ -123,12 +123,12 @@ impl DepthLines {
         let points: usize = found.lines.iter().map(|line| line.points).sum();
         if self.texture.is_some() {
             return Some(format!(
-                "over depth the pixels that {samples} samples cross are drawn, to a quarter of a pixel"
+                "the plot fills the pixels that {samples} samples cross, to a quarter of a pixel"
             ));
         }
         (samples > points as u64).then(|| {
             format!(
-                "over depth {points} points stand for {samples} samples; none is more than half a pixel from the line"
+                "the plot draws {points} points for {samples} samples; every sample is within half a pixel of the line"
             )
         })
     }

@@ -69,7 +69,7 @@ impl Screen for ChecksScreen {
         section_ui(ui, &format!("Daily checks of {}", self.rig));
         quiet_ui(
             ui,
-            "A check reads the empty cell and one known weight, and touches the home switch twice. It opens the rig for the day.",
+            "A check reads the empty cell and one known weight, and touches the home switch twice. A run in tissue needs a check that passed on the same day, or an acknowledgement.",
         );
         ui.add_space(8.0);
         work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);

@@ -13,7 +13,7 @@ use palpate_rheology::extremes::{ExtremesExtent, ExtremesRow, ExtremesVerdict};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
-    purpose: "which cases at the ends of every range are right or refused",
+    purpose: "results of every family, integrator and fit at the ends of every range",
     key: Key::Num8,
     open: |_| Box::new(ExtremesScreen::default()),
 };
@@ -110,7 +110,10 @@ impl Screen for ExtremesScreen {
         };
         let wrong: usize = found.groups.iter().map(|one| one.counts[3]).sum();
         let (text, ink) = match wrong {
-            0 => ("every case is right or refused with its reason".to_owned(), tokens.text),
+            0 => (
+                "every case gives the right number or a refusal with its reason".to_owned(),
+                tokens.text,
+            ),
             1 => ("1 case is wrong".to_owned(), tokens.alarm_text),
             many => (format!("{many} cases are wrong"), tokens.alarm_text),
         };
@@ -139,7 +142,7 @@ impl Screen for ExtremesScreen {
         let extent = self.extent;
         self.task.start("extremes", ctx, move |progress| {
             let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
-            let rows = rows.ok_or("cancelled before it was done")?;
+            let rows = rows.ok_or("the test was cancelled")?;
             Ok(ExtremesResult { groups: summary(&rows), rows })
         });
     }

@@ -58,7 +58,9 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
 fn quality_words(live: &LiveEstimate) -> [String; 2] {
     let residual =
         format!("weighted residual {:.1} mN, {} samples", live.rmse_weighted_n * 1e3, live.samples);
-    let alone = "± is statistical; the exact fit adds the calibration's".to_owned();
+    let alone =
+        "± is the statistical uncertainty; the exact fit adds the uncertainty of the calibration"
+            .to_owned();
     [residual, alone]
 }
 

@@ -9,7 +9,7 @@ use palpate_protocols::preview::Preview;
 /// Draws durations, forces and storage, then refusals and notes.
 pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let Some(checked) = form.checked() else {
-        placeholder_ui(ui, "No preview until the protocol and its values are right");
+        placeholder_ui(ui, "The preview appears when the protocol and its values are correct");
         for problem in form.problems() {
             alarm_ui(ui, problem.to_string());
         }

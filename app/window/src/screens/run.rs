@@ -226,7 +226,7 @@ impl Screen for RunScreen {
             .into_iter()
             .map(|(view, name)| {
                 let is_offered = is_offered(view, workbench.run());
-                let verdict = require(is_offered, "the run has no such view");
+                let verdict = require(is_offered, "the run does not have this view");
                 PaletteAction::new(name, "", UiCommand::View(view)).if_ok(verdict)
             })
             .collect();

@@ -113,7 +113,7 @@ impl Chooser {
             let name = path.display();
             let text = match read_if_present(&path) {
                 Ok(Some(text)) => Ok(text),
-                Ok(None) => Err(format!("there is no file {name}; choose another")),
+                Ok(None) => Err(format!("the file {name} does not exist; choose another")),
                 Err(err) => Err(format!("{name} cannot be read ({err}); choose a text file")),
             };
             (path, text)
@@ -202,7 +202,10 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
 pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLimits) {
     match checked {
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
-            placeholder_ui(ui, "this protocol does not indent; there is no depth or force to draw");
+            placeholder_ui(
+                ui,
+                "this protocol does not indent, so it has no depth or force to draw",
+            );
         }
         Some(checked) => course_ui(ui, &checked.outline, limits),
         None => placeholder_ui(ui, "correct the protocol and its values to see the course"),

@@ -135,7 +135,7 @@ impl TapePanel {
     pub fn ui(&mut self, ui: &mut Ui, is_running: bool, replay: Replay) {
         section_ui(ui, "Recording");
         ui.add_enabled_ui(!is_running, |ui| {
-            let hint = "a new folder; empty for no recording";
+            let hint = "a new folder; leave empty for no recording";
             text_row(ui, "record to", hint, &mut self.to);
         });
         match &self.message {

@@ -116,12 +116,12 @@ fn steady_words(settling: &SettleProgress) -> String {
     match &settling.last {
         None => format!("watching for {:.1} s; {left:.0} s left", settling.waited.0),
         Some(last) if last.noise.0 > settling.noise_max.0 => format!(
-            "noise of {:.2} mV, steady at {:.2} mV; {left:.0} s left",
+            "noise {:.2} mV, limit {:.2} mV; {left:.0} s left",
             last.noise.0 * 1e3,
             settling.noise_max.0 * 1e3
         ),
         Some(last) => format!(
-            "drift of {:+.2} mV/s, steady at {:.2} mV/s; {left:.0} s left",
+            "drift {:+.2} mV/s, limit {:.2} mV/s; {left:.0} s left",
             last.slope_v_per_s * 1e3,
             settling.slope_max_v_per_s * 1e3
         ),
@@ -182,7 +182,8 @@ impl WeightDeviation {
 }
 
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
-    let words = format!("Force by the calibration in use ({}) - weight", bench.calibration.name);
+    let words =
+        format!("Force by the calibration in use ({}) minus weight", bench.calibration.name);
     ui.label(RichText::new(words).strong());
     let plot = weighing_plot(run, &bench.curve);
     legend_ui(ui, &[&plot]);
@@ -214,9 +215,9 @@ mod tests {
             waited: Seconds(2.5),
         };
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("noise of 20.00 mV, steady at 5.00 mV"));
+        assert!(steady_words(&settling).starts_with("noise 20.00 mV, limit 5.00 mV"));
         steady.noise = Volts(0.001);
         settling.last = Some(steady);
-        assert!(steady_words(&settling).starts_with("drift of +4.00 mV/s"));
+        assert!(steady_words(&settling).starts_with("drift +4.00 mV/s"));
     }
 }

@@ -92,7 +92,7 @@ impl Palette {
             let input = TextEdit::singleline(&mut self.typed)
                 .desired_width(ui.available_width() - 90.0)
                 .char_limit(100)
-                .hint_text("a few letters of its name");
+                .hint_text("a few letters of the command's name");
             let response = ui.add(input).labelled_by(label.id);
             if std::mem::take(&mut self.is_fresh) {
                 response.request_focus();

@@ -141,21 +141,24 @@ fn control_ui(
 fn pause_words(run: &RunView) -> String {
     match run.pause {
         PauseView::Paused { no_resume: None } => {
-            "Paused. Resume continues; finish early skips the rest and retracts.".into()
+            "Paused. Resume continues; Finish early skips the rest and retracts.".into()
         }
         PauseView::Paused { no_resume: Some(why) } => {
-            format!("Paused. No resume: {why}. Finish early keeps the data and retracts.")
+            format!(
+                "Paused. The run cannot resume: {why}. Finish early keeps the data and retracts."
+            )
         }
         PauseView::Pending { step_index } => match &run.next_checkpoint {
             Some((index, name)) if *index == step_index => {
-                format!("Will pause {name}; resume cancels that.")
+                format!("The run pauses at checkpoint '{name}'; Resume cancels the pause.")
             }
-            _ => format!("Will pause after step {}; resume cancels that.", step_index + 1),
+            _ => format!("The run pauses after step {}; Resume cancels the pause.", step_index + 1),
         },
         PauseView::None if run.next_checkpoint.is_none() => {
-            "Running. No checkpoints remain. Pause first to resume or finish early.".into()
+            "Running. No checkpoints remain. Pause the run to enable Resume and Finish early."
+                .into()
         }
-        PauseView::None => "Running. Pause first to resume or finish early.".into(),
+        PauseView::None => "Running. Pause the run to enable Resume and Finish early.".into(),
     }
 }
 

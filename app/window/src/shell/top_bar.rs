@@ -101,7 +101,7 @@ fn run_line(run: &RunView) -> String {
     };
     match (&run.outcome, &run.holding) {
         (Some(outcome), _) => format!("{} after {}", outcome.ending, clock(run.now.seconds().0)),
-        (None, Some(_)) => format!("{step}, waits for retract or close"),
+        (None, Some(_)) => format!("{step}, waiting for Retract or Close session"),
         (None, None) => format!("{step}, {}, {} left", run.phase, clock(run.time_left.0)),
     }
 }

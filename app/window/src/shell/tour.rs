@@ -17,7 +17,7 @@ const STOPS: [(&str, &str); 7] = [
     ),
     (
         run::SCREEN.name,
-        "The left panel has the protocol and its values; Expected course draws it before anything moves. While Start is closed, the reason is shown below it.",
+        "The left panel has the protocol and its values; Expected course draws it before anything moves. While Start is disabled, the reason is shown below the button.",
     ),
     (
         rig::SCREEN.name,
@@ -33,7 +33,7 @@ const STOPS: [(&str, &str); 7] = [
     ),
     (
         review::SCREEN.name,
-        "One session in detail or several next to each other: cursors, phases, fits, other calibrations, a report.",
+        "One session in detail, or several side by side: cursors, phases, fits, other calibrations, a report.",
     ),
     (
         run::SCREEN.name,

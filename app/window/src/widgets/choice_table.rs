@@ -134,7 +134,7 @@ impl ChoiceTable<'_> {
                 glyph_at(ui.painter(), glyph, place, GLYPH_RADIUS, tokens.text_quiet);
             }
             let head = head.accessible_name(format!("sort by {}", column.head));
-            if head.on_hover_text("sort; press again to reverse").clicked() {
+            if head.on_hover_text("click to sort; click again to reverse").clicked() {
                 acts.push(TableAction::Sort(index));
             }
         });

@@ -51,14 +51,14 @@ pub fn check_rate(rate: f64) -> Result<(), String> {
 fn parse(text: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
-        return Err("a number is missing here; write it like 0.75".into());
+        return Err("type a number here, such as 0.75".into());
     }
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ if text.contains(',') => {
-            Err(format!("'{text}' is not a number; write it with a point, like 0.75"))
+            Err(format!("'{text}' is not a number; type a point instead of the comma, as in 0.75"))
         }
-        _ => Err(format!("'{text}' is not a finite number; write it like 0.75")),
+        _ => Err(format!("'{text}' is not a finite number; type a number such as 0.75")),
     }
 }
 
@@ -193,8 +193,8 @@ mod tests {
             ("0.75", Ok(0.75)),
             (" 30 ", Ok(30.0)),
             ("1e1", Ok(10.0)),
-            ("", Err("missing")),
-            ("0,75", Err("with a point")),
+            ("", Err("type a number here")),
+            ("0,75", Err("a point instead of the comma")),
             ("fast", Err("'fast' is not a finite number")),
             ("nan", Err("not a finite number")),
             ("inf", Err("not a finite number")),

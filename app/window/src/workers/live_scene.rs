@@ -124,7 +124,7 @@ pub fn compute_path(
             deepest.heights.copy_from_slice(now);
         }
         if !is_going(tick as f64 / ticks as f64) {
-            return Err("cancelled before it was done".into());
+            return Err("the computation was cancelled".into());
         }
     }
     Ok(ComputedPath { settings, path, deepest, trail })
@@ -265,6 +265,6 @@ mod tests {
         assert_eq!(one.trail, again.trail);
         assert_eq!(one.deepest.heights, again.deepest.heights);
         let cut = compute_path(settings, ScenePath::Poke, &mut |share| share < 0.5);
-        assert!(cut.unwrap_err().contains("before it was done"));
+        assert!(cut.unwrap_err().contains("was cancelled"));
     }
 }

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
-    purpose: "volts to newtons: calibrations of the library",
+    purpose: "calibrations of the library, from volts to newtons",
     key: Key::Num2,
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),
 };
@@ -39,10 +39,10 @@ pub struct CalibrationScreen {
 pub fn calibration_session(run: Option<&RunView>) -> Result<&Path, String> {
     let has_weighed = |run: &&RunView| run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh);
     let Some(run) = run.filter(has_weighed) else {
-        return Err("the last run weighed nothing; measure first".into());
+        return Err("the last run measured no calibration; measure a calibration first".into());
     };
     match &run.outcome {
-        None => Err("the run is not over".into()),
+        None => Err("the run is still in progress".into()),
         Some(outcome) if outcome.ending != EndingKind::Finish => {
             Err("the last run did not finish; a calibration must be complete".into())
         }

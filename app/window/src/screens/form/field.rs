@@ -45,10 +45,7 @@ impl ParamField {
             return match (&self.parameter.default.content, self.parameter.kind) {
                 (ValueContent::None, _) => Ok("none".into()),
                 (_, QuantityKind::Text) => Err("type a text here".into()),
-                _ => Err(format!(
-                    "a number is missing here; write it like {}",
-                    self.parameter.default.text
-                )),
+                _ => Err(format!("type a number here, such as {}", self.parameter.default.text)),
             };
         }
         let value = match self.parameter.is_list {
@@ -166,7 +163,7 @@ mod tests {
         let speeds = of("validation-series", "speeds");
         for (field, text, words) in [
             (&speeds, "0.75, 900", "outside the range of rig sim"),
-            (&rest, "", "a number is missing"),
+            (&rest, "", "type a number here"),
             (&rest, "soon", "\"soon\" is not a time"),
             (&rest, "0,5", "write a point, not a comma"),
         ] {

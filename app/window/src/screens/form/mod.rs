@@ -191,13 +191,13 @@ impl ProtocolForm {
             problems.first().map_or_else(String::new, ToString::to_string)
         };
         let protocol =
-            built_in(manual.protocol).ok_or("this is not one of the built-in protocols")?;
+            built_in(manual.protocol).ok_or("the protocol of this move is not built in")?;
         let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // A button of a manual move acknowledges nothing.
         if let (true, Some(reason)) = (needs_daily_check(&plan), bench.to_acknowledge.first()) {
             return Err(format!(
-                "{reason}; make the daily check, or accept it on the run screen with the protocol {}",
+                "{reason}; run the daily check, or accept this on the Run screen with the protocol {}",
                 manual.protocol
             ));
         }

@@ -234,7 +234,7 @@ impl Screen for HapticsScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let can_stop = require(self.is_running(), "the loop does not run");
+        let can_stop = require(self.is_running(), "the loop is not running");
         let can_start = workbench.loop_verdict(SCREEN.name);
         vec![
             PaletteAction::new("Start the haptic loop", "", UiCommand::LoopStart).if_ok(can_start),

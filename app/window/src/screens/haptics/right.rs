@@ -33,7 +33,7 @@ fn force_ui(ui: &mut Ui, live_loop: &HapticLoop) {
     fact_ui(ui, "winding", format!("{:.0} °C", seen.winding_c));
     section_ui(ui, "Why no force?");
     if !live_loop.is_running() {
-        ui.label("the loop does not run");
+        ui.label("the loop is not running");
         return;
     }
     let causes = force_loss_reasons(live_loop.flags(), live_loop.missed());
@@ -55,7 +55,7 @@ fn loop_ui(ui: &mut Ui, live_loop: &HapticLoop) {
     match &seen.buzz {
         Some(buzz) => {
             let words = format!(
-                "limit cycle at {:.0} Hz with {:.3} mm",
+                "limit cycle at {:.0} Hz, amplitude {:.3} mm",
                 buzz.frequency_hz, buzz.amplitude_mm
             );
             ui.label(RichText::new(words).strong().color(tokens.alarm_text));

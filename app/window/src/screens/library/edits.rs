@@ -96,7 +96,7 @@ impl EditPanel {
     fn may(&self, chosen: usize) -> Result<(), String> {
         require(!self.task.is_busy(), "an edit is being written")?;
         require(chosen > 0, "choose sessions first")?;
-        require(!self.by.trim().is_empty(), "type your name into 'by'")
+        require(!self.by.trim().is_empty(), "type your name into the field 'by'")
     }
 
     fn start(&mut self, ctx: &Context, sessions: &[PathBuf], edit: SessionEdit) {
@@ -220,7 +220,7 @@ impl EditPanel {
             }
         }
         if self.undo.is_empty() && self.redo.is_empty() && self.task.answer().is_none() {
-            let text = "Tags and verdicts can be undone, and the undoing is itself recorded; notes and reviews cannot.";
+            let text = "Tags and verdicts can be undone, and each undo is recorded; notes and reviews cannot be undone.";
             quiet_ui(ui, text);
         }
     }

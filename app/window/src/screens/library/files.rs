@@ -56,7 +56,7 @@ impl FilesPanel {
         section_ui(ui, "Export chosen sessions");
         let kinds = Kind::ALL.map(|kind| (kind, kind.name()));
         choice_ui(ui, "as", &mut self.kind, &kinds);
-        text_row(ui, "to folder", "created if there is none", &mut self.to);
+        text_row(ui, "to folder", "a folder; created if missing", &mut self.to);
         self.dialog.button_ui(ui, "Choose folder...", |dialog| {
             dialog.set_title("Folder for exports").pick_folder()
         });

@@ -99,7 +99,7 @@ impl SearchForm {
         for (text, read) in [(&self.since, parse_start as fn(&str) -> _), (&self.until, parse_end)]
         {
             if let Err(err) = day(text, read) {
-                small_alarm_ui(ui, format!("'{text}' is not a day: {err}"));
+                small_alarm_ui(ui, format!("'{text}' is not a date: {err}"));
             }
         }
     }

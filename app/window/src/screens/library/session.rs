@@ -59,7 +59,7 @@ pub(super) fn session_ui(
         match entry.origin {
             SessionOrigin::Recorded => "recorded here",
             SessionOrigin::Imported => "imported from another program's file",
-            SessionOrigin::Recovered => "recovered from a damaged or interrupted one",
+            SessionOrigin::Recovered => "recovered from a damaged or interrupted session",
         },
     );
     let ending = entry.ending.as_deref().unwrap_or_default();

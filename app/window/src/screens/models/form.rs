@@ -133,7 +133,7 @@ impl ModelsForm {
             }
         });
         if last_run.is_none() {
-            quiet_ui(ui, "no run has ended on the run screen yet");
+            quiet_ui(ui, "no run has ended on the Run screen yet");
         }
     }
 

@@ -13,7 +13,7 @@ use palpate_analysis::select::{SelectionReport, select_sources};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
-    purpose: "how much model a recording needs",
+    purpose: "which model family a recording needs",
     key: Key::Num6,
     open: |_| Box::new(ModelsScreen::default()),
 };
@@ -45,7 +45,7 @@ impl Screen for ModelsScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let before = "Add recordings on the left and compare them. Two speeds or depths of one specimen are better than one: each fit then predicts the recordings that are held out.";
+        let before = "Add recordings on the left and compare them. Recordings at two speeds or depths of one specimen are best, because each fit then predicts the recordings that are held out.";
         if let Some(selected) = answer_ui(ui, &self.task, before) {
             answer::families_ui(ui, &selected.selection);
         }

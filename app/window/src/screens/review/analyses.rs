@@ -178,7 +178,7 @@ impl AnalysesPanel {
 
     fn free(&self) -> Result<(), String> {
         require(!self.work.is_busy(), "other work is in progress")?;
-        require(!self.by.trim().is_empty(), "type your name into 'by'")
+        require(!self.by.trim().is_empty(), "type your name into the field 'by'")
     }
 
     /// Whether something can be done that needs a reason.

@@ -96,7 +96,7 @@ impl ReviewScreen {
     pub(super) fn cycles_ui(&mut self, ui: &mut Ui) {
         self.cycle_rows.update(&self.subjects);
         if self.cycle_rows.rows.is_empty() {
-            quiet_ui(ui, "No session shown has cycles.");
+            quiet_ui(ui, "None of the sessions shown has cycles.");
             return;
         }
         self.moves_ui(ui);

@@ -49,7 +49,9 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
             });
             return pressed;
         }
-        Stage::Cancelled => quiet_ui(ui, format!("only {:.0} % of it is read", 100.0 * share)),
+        Stage::Cancelled => {
+            quiet_ui(ui, format!("only {:.0} % of the session is read", 100.0 * share))
+        }
         Stage::Failed(reason) => alarm_ui(ui, reason),
     }
     let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
@@ -86,7 +88,7 @@ impl ReviewScreen {
             tick_box(ui, &mut self.has_residuals, "Residuals of the fit")
         });
         if !has_fit {
-            quiet_ui(ui, "fit the sessions shown first");
+            quiet_ui(ui, "fit the sessions shown to see their residuals");
         }
         section_ui(ui, "Fit");
         self.model.ui(ui, "fit with", "include rejected sessions");
@@ -102,7 +104,7 @@ impl ReviewScreen {
     fn sessions_ui(&mut self, ui: &mut Ui) {
         let tokens = tokens_of(ui);
         if self.subjects.is_empty() {
-            quiet_ui(ui, "none yet: choose sessions in the library, or type the path of one");
+            quiet_ui(ui, "none yet: choose sessions in the library, or type the path of a session");
         }
         let mut pressed = None;
         for (index, subject) in self.subjects.iter().enumerate() {
@@ -158,7 +160,7 @@ impl ReviewScreen {
         for subject in &self.subjects {
             if subject.is_settled() && subject.moment(self.time_origin).is_none() {
                 let words = format!(
-                    "{} has no {}; its time is counted from its start",
+                    "{} has no {}; its time counts from its start",
                     subject.name,
                     self.time_origin.name()
                 );

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
-    purpose: "one session in detail, several next to each other",
+    purpose: "one session in detail, or several side by side",
     key: Key::Num5,
     open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),
 };

@@ -28,7 +28,7 @@ impl ReviewScreen {
         let Some(first) = first else {
             quiet_ui(
                 ui,
-                "no session shown has been fitted here yet: press 'Fit the sessions shown'",
+                "none of the sessions shown is fitted yet; press 'Fit the sessions shown'",
             );
             refusals_ui(ui, &self.subjects);
             return;

@@ -93,7 +93,7 @@ impl ReviewScreen {
 fn sentence(found: &SessionPrediction, known: &str, other: &str) -> String {
     let share = |part: f64| 100.0 * part / found.peak_n;
     format!(
-        "The fit of {known} predicts {other} to {:.1} mN RMSE, {:.2} % of its peak force of {:.3} N, over {} samples; the predicted peak is {:.3} N, {:+.2} % off.",
+        "The fit of {known} predicts the force of {other} with an RMSE of {:.1} mN ({:.2} % of the peak force of {:.3} N) over {} samples; the predicted peak is {:.3} N ({:+.2} %).",
         found.rms_n * 1e3,
         share(found.rms_n),
         found.peak_n,

@@ -35,7 +35,7 @@ impl ReviewScreen {
         }
         match &front.recording.facts {
             Some(facts) => facts_ui(ui, facts),
-            None => quiet_ui(ui, "more facts follow when the session is read to its end"),
+            None => quiet_ui(ui, "more facts follow when the whole session is read"),
         }
         let moved = events_ui(ui, front);
         match &front.fit {
@@ -125,7 +125,7 @@ fn events_ui(ui: &mut Ui, front: &ReviewSubject) -> Option<f64> {
                 };
                 let words = RichText::new(format!("{at}{}", event.text)).color(ink).small();
                 let label = Label::new(words).truncate().sense(Sense::click());
-                let hint = format!("{}\npress to set cursor A there", event.text);
+                let hint = format!("{}\nclick to set cursor A here", event.text);
                 if ui.add(label).on_hover_text(hint).clicked() {
                     chosen = t;
                 }

@@ -75,7 +75,7 @@ impl RigScreen {
             quantity_ui(ui, "jog speed", "mm/s", &mut self.speed);
         });
         self.distance.check(|mm| {
-            let words = format!("type a distance of at most {furthest:.0} mm, and not 0");
+            let words = format!("type a distance other than 0, up to {furthest:.0} mm either way");
             require(mm != 0.0 && mm.abs() <= furthest, words)
         });
         self.speed.check(|speed| {
@@ -107,7 +107,7 @@ impl RigScreen {
                 }
             }
         });
-        let words = "Plus moves towards the tissue. Every move is a run of its own: it is recorded and has all interlocks, and Stop motion stops it.";
+        let words = "Plus moves towards the tissue. Every move is a run of its own: it is recorded, all interlocks apply, and Stop motion stops it.";
         placeholder_ui(ui, words);
         ui.add_space(6.0);
         ui.horizontal_wrapped(|ui| {
@@ -157,7 +157,7 @@ fn values_ui(ui: &mut Ui, rig: &RigView, curve: &CalibrationCurve) {
     let age = rig.reading.and_then(|reading| reading.age);
     if let Some(age) = age {
         ui.label(format!(
-            "newest sample: taken {:.1} ms before it came, within {:.1} ms",
+            "newest sample: {:.1} ± {:.1} ms old on arrival",
             age.by.seconds().0 * 1e3,
             age.within.seconds().0 * 1e3
         ));

@@ -65,7 +65,7 @@ impl SceneForm {
     /// Takes what was read of a file.
     pub fn fill(&mut self, read: SceneFile, mut notes: Vec<String>) {
         if read.nodes.is_none() {
-            notes.push("The file has no mesh size: plan the mesh on the screen Trade.".into());
+            notes.push("The file has no mesh size; plan the mesh on the Trade screen.".into());
         }
         self.notes = notes;
         self.take(read);
@@ -118,7 +118,8 @@ impl SceneForm {
     pub fn ui(&mut self, ui: &mut Ui) -> Option<FileAction> {
         let mut action = None;
         section_ui(ui, "Scene");
-        if text_row(ui, "file", "a scene file; empty for the built-in one", &mut self.file) {
+        if text_row(ui, "file", "a scene file; leave empty for the built-in scene", &mut self.file)
+        {
             action = Some(FileAction::Read);
         }
         ui.horizontal_wrapped(|ui| {
@@ -159,7 +160,7 @@ impl SceneForm {
         quiet_ui(ui, words);
         let recovery = self.read.recovery_s.unwrap_or(self.read.body.tau_eps);
         let cut = match self.read.cut_mm > 0.0 {
-            true => format!("; displacements below {} mm are cut", self.read.cut_mm),
+            true => format!("; displacements of {} mm or less are ignored", self.read.cut_mm),
             false => String::new(),
         };
         quiet_ui(ui, format!("surface recovery with a time constant of {recovery:.3} s{cut}"));

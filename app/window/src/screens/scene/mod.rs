@@ -194,7 +194,7 @@ impl Screen for SceneScreen {
         let both = [UiCommand::SceneStart, UiCommand::SceneStop];
         loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
         let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
-            true => "The path leads the hand, and then the pointer and the keys do.",
+            true => "The path leads the hand; at its end the pointer and the keys take over.",
             false => {
                 "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
                  button to rotate, turn the wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift \
@@ -294,7 +294,7 @@ impl Screen for SceneScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let can_stop = require(self.is_running(), "the scene does not run");
+        let can_stop = require(self.is_running(), "the scene is not running");
         let can_start = self.verdict(workbench);
         vec![
             PaletteAction::new("Start the scene", "", UiCommand::SceneStart).if_ok(can_start),

@@ -51,7 +51,7 @@ impl SceneScreen {
             fact_ui(ui, "tick", format!("{} µs", one.tick_us));
         }
         let verdict = match &self.planned {
-            None => Err("measure the cost of a scene on the screen Trade first".to_owned()),
+            None => Err("measure the cost of a scene on the Trade screen first".to_owned()),
             Some(PlannedScene { plan: Err(none), .. }) => Err(none.reason.clone()),
             Some(_) if is_running => Err("the scene runs".to_owned()),
             Some(PlannedScene { plan: Ok(_), .. }) => Ok(()),

@@ -175,9 +175,12 @@ impl TradeScreen {
     fn plan_ui(&self, ui: &mut Ui) {
         match self.planned() {
             None if self.scene_curves().is_none() => placeholder_ui(ui, "measure first"),
-            None => placeholder_ui(ui, "the tolerance, shape or budget cannot be read"),
+            None => placeholder_ui(
+                ui,
+                "the tolerance, shape or budget is invalid; correct the entry on the left",
+            ),
             Some(Ok(plan)) => {
-                ui.label(RichText::new("the cheapest that meets both").strong());
+                ui.label(RichText::new("the cheapest plan that meets both tolerances").strong());
                 plan_lines(&plan).iter().for_each(|line| sentence_ui(ui, line));
             }
             Some(Err(none)) => {
@@ -263,7 +266,7 @@ impl Screen for TradeScreen {
         }
         let Some(recommendation) = self.recommendation() else {
             let text = match self.wanted() {
-                Err(_) => "the tolerance, rate or share cannot be read",
+                Err(_) => "the tolerance, rate or share is invalid; correct the entry on the left",
                 Ok(_) => "measure first",
             };
             return placeholder_ui(ui, text);
@@ -323,13 +326,14 @@ impl Screen for TradeScreen {
         if self.view.is_scene() {
             self.scene.start("scene-curves", ctx, move |progress| {
                 let curves = trade::measure_scene(extent, progress)?;
-                curves.map(Arc::new).ok_or_else(|| "cancelled before it was done".to_owned())
+                curves.map(Arc::new).ok_or_else(|| "the measurement was cancelled".to_owned())
             });
             return;
         }
         let library = self.library.clone();
         self.task.start("trade", ctx, move |progress| {
-            let curves = trade::measure(extent, progress)?.ok_or("cancelled before it was done")?;
+            let curves =
+                trade::measure(extent, progress)?.ok_or("the measurement was cancelled")?;
             let stored = library
                 .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
             Ok(TradeMeasurement {

@@ -60,7 +60,7 @@ impl TradeTable {
 
 pub(super) fn integrators(curves: &TradeCurves) -> TradeTable {
     let mut shown = TradeTable::new(
-        ["ns a second of simulated time", "error (% of peak force)"],
+        ["ns per second of simulated time", "error (% of peak force)"],
         &["integrator", "step (ms)", "a step", "error (%)"],
     );
     for row in &curves.integrators {

@@ -68,7 +68,7 @@ impl SessionFacts {
         let manifest = &outline.manifest;
         let mut notes = outline.notes.clone();
         let hashes = read_session_inputs(path).unwrap_or_else(|err| {
-            notes.push(format!("the hashes of its files cannot be computed: {err}"));
+            notes.push(format!("the hashes of the session's files cannot be computed: {err}"));
             Vec::new()
         });
         let verdict = edits.verdict();
@@ -100,7 +100,7 @@ impl SessionFacts {
         let late = worst.lateness_s * 1e3;
         let is_well = missed == 0 && self.health.clock_jumps == 0;
         let words = match (is_well, missed) {
-            (true, _) => format!("nothing missing, at most {late:.1} ms late"),
+            (true, _) => format!("no reading missing; readings at most {late:.1} ms late"),
             (false, 0) => format!("the wall clock was set {} times", self.health.clock_jumps),
             (false, missed) => {
                 format!("{missed} readings missing; the others at most {late:.1} ms late")

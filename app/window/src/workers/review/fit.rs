@@ -142,7 +142,9 @@ pub fn predict(
     let pairs = || samples.iter().zip(&modelled).filter(|(one, _)| one.is_measured());
     let count = pairs().count();
     if count == 0 {
-        return Err("no force of the second session counts, so there is nothing to compare".into());
+        return Err(
+            "the second session has no measured force to compare with the prediction".into()
+        );
     }
     let squares: f64 = pairs().map(|(one, fit)| (one.force.0 - fit.0).powi(2)).sum();
     let highest = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::NEG_INFINITY, f64::max);

@@ -135,8 +135,9 @@ impl ReviewRecording {
                 self.stage = Stage::Reading;
             }
             Err(err) => {
-                self.stage =
-                    Stage::Failed(format!("the thread that reads it cannot be started: {err}"))
+                self.stage = Stage::Failed(format!(
+                    "the thread that reads the session cannot be started: {err}"
+                ))
             }
         }
     }

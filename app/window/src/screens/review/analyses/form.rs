@@ -92,15 +92,15 @@ impl AnalysisForm {
     }
 
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
-        self.model.ui(ui, "model", "even if the session is rejected");
+        self.model.ui(ui, "model", "fit a rejected session too");
         if self.model.family.is_some() {
             tick_box(ui, &mut self.with_unload, "unloading too, where recorded");
         }
         tick_box(ui, &mut self.with_profile, "profile intervals too");
         if others > 0 {
             let words = match others {
-                1 => "one material for this and the other session shown".to_owned(),
-                _ => format!("one material for this and the {others} other sessions shown"),
+                1 => "one material for this session and the other one shown".to_owned(),
+                _ => format!("one material for this session and the {others} others shown"),
             };
             tick_box(ui, &mut self.is_together, &words);
         }
@@ -124,7 +124,7 @@ impl AnalysisForm {
         require(!name.is_empty(), "give the new analysis a name")?;
         let is_used = known.analyses.all.iter().any(|one| one.name == name);
         let taken = format!(
-            "there is an analysis '{name}' already, and a name is used only once; type another"
+            "the session already has an analysis '{name}', and a name is never used twice; type another"
         );
         require(!is_used, taken)?;
         match self.kind {

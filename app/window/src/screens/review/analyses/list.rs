@@ -101,14 +101,15 @@ pub(super) fn withdraw_ui(
 ) -> Option<SessionAction> {
     ui.add_space(4.0);
     let chosen = source.analysis.clone();
-    let own = require(chosen.is_some(), "choose the analysis to withdraw in the list");
+    let own = require(chosen.is_some(), "choose an analysis in the list first");
     let own = own.and(verdict.clone());
     let size = vec2(170.0, 26.0);
     if reason_button(ui, "Withdraw analysis", size, &own) {
         return chosen.map(|name| SessionAction::Withdraw { name });
     }
     let last = known.analyses.active().last();
-    let own = require(last.is_some(), "there is no analysis to withdraw").and(verdict.clone());
+    let own =
+        require(last.is_some(), "the session has no analysis to withdraw").and(verdict.clone());
     let is_pressed = reason_button(ui, "Withdraw last analysis", size, &own);
     let last = last?;
     quiet_ui(ui, format!("the last is '{}', by {}", last.name, last.by));

@@ -67,7 +67,7 @@ impl QualityForm {
             choice_ui(ui, "which", &mut self.contact, &contacts);
         }
         let found = known.contacts[self.contact].0;
-        quiet_ui(ui, format!("it is at {found:.3} mm from home"));
+        quiet_ui(ui, format!("the contact point is at {found:.3} mm from home"));
         if quantity_ui(ui, "correct to", "mm from home", &mut self.position) {
             self.position.check(|_| Ok(()));
         }
