@@ -90,17 +90,19 @@ pub enum AnalysisError {
     Session(#[from] ReadError),
     #[error("{} cannot be read ({source}); check its permissions", path.display())]
     Input { path: PathBuf, source: std::io::Error },
-    #[error("'{name}' cannot be the name of an analysis; give 1 to {NAME_MAX} letters on one line")]
+    #[error(
+        "'{name}' cannot be the name of an analysis; give 1 to {NAME_MAX} characters on one line"
+    )]
     Name { name: String },
     #[error(
-        "the session already has an analysis '{name}', and a name is never used twice; choose another"
+        "the session already has an analysis '{name}', and a name is never used twice; choose another name"
     )]
     Taken { name: String },
     #[error("the session has no analysis '{name}'{known}")]
     None { name: String, known: String },
-    #[error("a withdrawal needs a reason; give one in a few words")]
+    #[error("a withdrawal needs a reason; give the reason in a few words")]
     NoReason,
-    #[error("{} is not a session folder; name the folder", path.display())]
+    #[error("{} is not a session folder; choose a session folder", path.display())]
     NotAFolder { path: PathBuf },
 }
 
@@ -164,8 +166,8 @@ impl Analyses {
         self.active().find(|one| one.name == name).ok_or_else(|| AnalysisError::None {
             name: name.to_owned(),
             known: match self.withdrawal(name) {
-                Some(by) => format!(" any more, {} withdrew it: {}", by.by, by.reason),
-                None if self.all.is_empty() => ", it has none".to_owned(),
+                Some(by) => format!(" any more, because {} withdrew it: {}", by.by, by.reason),
+                None if self.all.is_empty() => " or any other".to_owned(),
                 None => String::new(),
             },
         })

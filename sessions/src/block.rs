@@ -227,7 +227,9 @@ impl SampleBlock {
             return Err("the columns of a sample block differ in length".into());
         }
         if count > BLOCK_ROWS_MAX {
-            return Err(format!("a sample block holds {count} samples"));
+            return Err(format!(
+                "a sample block holds {count} samples, more than {BLOCK_ROWS_MAX}"
+            ));
         }
         if derived.first_sample != daq.first_sample {
             return Err("raw and derived samples are numbered differently".into());

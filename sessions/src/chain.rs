@@ -29,17 +29,17 @@ pub enum ChainError {
         path: PathBuf,
         source: io::Error,
     },
-    #[error("line {line} of {} was changed; restore the file from a backup, or move it elsewhere to use the recording without it", path.display())]
+    #[error("line {line} of {} was changed; restore the file from a backup, or move the file elsewhere to use the recording without it", path.display())]
     Changed {
         path: PathBuf,
         /// Which line, from 1.
         line: usize,
     },
-    #[error("{} is incomplete: {}; restore the file from a backup, or move it, its head and the library's catalog away to return to the recording without it", path.display(), missing(*found, *written))]
+    #[error("{} is incomplete: {}; restore the file from a backup or, to use the recording without this file, move it, {} and the library's catalog elsewhere", path.display(), missing(*found, *written), ChainHead::file_of(path).display())]
     Shortened { path: PathBuf, found: u64, written: u64 },
-    #[error("{} is damaged ({reason}); restore it from a backup, or move it away: then lines missing at the end cannot be noticed", path.display())]
+    #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere; missing last lines then go unnoticed", path.display())]
     BadHead { path: PathBuf, reason: String },
-    #[error("line {line} of {} is {what} of a kind unknown to this version ({detail}); update palpate", path.display())]
+    #[error("line {line} of {} is {what} of an unknown kind ({detail}); update palpate", path.display())]
     Unknown {
         /// What every line is, with its article.
         what: &'static str,
@@ -54,10 +54,10 @@ pub enum ChainError {
 
 fn missing(found: u64, written: u64) -> String {
     match written.checked_sub(found) {
-        None | Some(0) => "its lines do not match its head".to_owned(),
-        Some(1) => format!("its last line is missing, {found} of {written} are there"),
+        None | Some(0) => "its lines differ from the lines that were written".to_owned(),
+        Some(1) => format!("its last line is missing ({found} of {written} are present)"),
         Some(count) => {
-            format!("its last {count} lines are missing, {found} of {written} are there")
+            format!("its last {count} lines are missing ({found} of {written} are present)")
         }
     }
 }
@@ -108,7 +108,7 @@ impl ChainHead {
             serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
         match file.head_version {
             HEAD_VERSION => Ok(file.head),
-            version => Err(bad(format!("it is of version {version}; update palpate"))),
+            version => Err(bad(format!("its version {version} is unknown; update palpate"))),
         }
     }
 

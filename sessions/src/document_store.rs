@@ -36,7 +36,7 @@ pub trait Document: Clone + Serialize + DeserializeOwned {
 
 #[derive(Debug, Error)]
 pub enum LibraryError {
-    #[error("the {kind} cannot be {what} ({source}), {}", path.display())]
+    #[error("the {kind} at {} cannot be {what} ({source}); check the path, its permissions and the disk", path.display())]
     Io {
         kind: &'static str,
         /// `stored` or `read`.
@@ -44,9 +44,9 @@ pub enum LibraryError {
         path: PathBuf,
         source: io::Error,
     },
-    #[error("{} holds no {kind} ({reason}); name another file", path.display())]
+    #[error("{} holds no {kind} ({reason}); choose another file", path.display())]
     NotOne { kind: &'static str, path: PathBuf, reason: String },
-    #[error("{} was changed after it was stored, but a stored {kind} is never edited; {renew} to supersede it", path.display())]
+    #[error("{} was changed after it was stored, but a stored {kind} must not change; {renew} to supersede it", path.display())]
     Changed { kind: &'static str, renew: &'static str, path: PathBuf },
     #[error("{what}: {reason}")]
     Unsound { what: String, reason: String },
@@ -60,9 +60,9 @@ pub enum LibraryError {
         "the library has no {kind} \"{name}\"{known}; look in its folder {folder}, or give a file"
     )]
     Unknown { kind: &'static str, name: String, known: String, folder: &'static str },
-    #[error("\"{name}\" names several: {}; give the id of one", ids.join(", "))]
+    #[error("several documents have the name \"{name}\": {}; give the id of one of them", ids.join(", "))]
     Ambiguous { name: String, ids: Vec<String> },
-    #[error("{id} is already superseded by {by}; supersede that one")]
+    #[error("{id} is already superseded by {by}; supersede {by} instead")]
     Superseded { id: String, by: String },
 }
 
@@ -140,7 +140,7 @@ impl<D: Document> DocumentStore<D> {
                 name: name.to_owned(),
                 folder: D::FOLDER,
                 known: match self.documents.len() {
-                    0 => ", it holds none".to_owned(),
+                    0 => " or any other".to_owned(),
                     count => format!(" among its {count}"),
                 },
             }),

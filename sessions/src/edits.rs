@@ -110,7 +110,7 @@ pub enum EditError {
     NoReason,
     #[error("'{tag}' cannot be a tag; give one word of at most {TAG_MAX} letters, as in +pilot")]
     Tag { tag: String },
-    #[error("{} is not a session folder; name the folder", path.display())]
+    #[error("{} is not a session folder; choose a session folder", path.display())]
     NotAFolder { path: PathBuf },
 }
 
@@ -347,7 +347,7 @@ mod tests {
         let none = add_edit(at, "id", &edit(" ", verdict(DataQuality::Valid))).unwrap_err();
         assert!(none.to_string().contains("needs a reason"));
         let no_folder = add_edit(&at.join("x"), "id", &edit("why", verdict(DataQuality::Valid)));
-        assert!(no_folder.unwrap_err().to_string().contains("name the folder"));
+        assert!(no_folder.unwrap_err().to_string().contains("choose a session folder"));
         let held = HolderLock::acquire(&at.join(LOCK_FILE)).unwrap();
         let busy = add_edit(at, "id", &edit("why", verdict(DataQuality::Valid))).unwrap_err();
         let id = std::process::id().to_string();

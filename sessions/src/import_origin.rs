@@ -54,8 +54,10 @@ impl ImportOrigin {
     }
 
     pub(crate) fn notes(&self) -> impl Iterator<Item = String> + '_ {
-        let first =
-            format!("imported from {}: rig, calibration and noise are unknown", self.source());
+        let first = format!(
+            "the session was imported from {}; its rig, calibration and noise are unknown",
+            self.source()
+        );
         std::iter::once(first).chain(self.remarks.iter().cloned())
     }
 }

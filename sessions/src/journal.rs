@@ -20,7 +20,7 @@ pub enum JournalError {
     #[error("the journal {} cannot be {what} ({source}); check its permissions and the disk", path.display())]
     Io { what: &'static str, path: PathBuf, source: io::Error },
     #[error(
-        "line {line} of the journal {} is damaged ({reason}); restore it from a backup or begin in a new folder",
+        "line {line} of the journal {} is damaged ({reason}); restore the journal from a backup, or begin in a new folder",
         path.display()
     )]
     Line {

@@ -9,13 +9,13 @@ use thiserror::Error;
 
 #[derive(Debug, Error)]
 pub enum LockError {
-    #[error("{} is in use by process {holder}; wait for it to end, or close it", path.display())]
+    #[error("{} is in use by process {holder}; wait for that process to end, or close it", path.display())]
     Held {
         path: PathBuf,
         /// Process number of the holder, `unknown` if it has not written it yet.
         holder: String,
     },
-    #[error("cannot lock {} ({source}); choose a folder that may be written", path.display())]
+    #[error("cannot lock {} ({source}); choose a writable folder", path.display())]
     Io { path: PathBuf, source: std::io::Error },
 }
 
@@ -37,7 +37,7 @@ fn retry<T>(mut attempt: impl FnMut() -> Option<T>) -> Option<T> {
 
 /// Another program held a lock for longer than palpate ever does.
 #[derive(Debug, PartialEq, Eq, Error)]
-#[error("{} is locked by {} for more than {} s; wait for that program to end, or close it", path.display(), holder_name(*holder), PATIENCE.as_secs())]
+#[error("{} has been locked by {} for more than {} s; wait for that program to end, or close it", path.display(), holder_name(*holder), PATIENCE.as_secs())]
 pub struct LockTimeout {
     pub path: PathBuf,
     /// Process number of the holder, if the system shows it.

@@ -136,7 +136,7 @@ impl<'a> RawBlock<'a> {
                     .map_err(|_| "the device's name is not UTF-8".to_owned())?;
             }
             (3..=5, Field::Bytes(bytes)) if is_long(bytes) => {
-                return Err(format!("it has more pieces than {BLOCK_PIECES_MAX}"));
+                return Err(format!("it has more than {BLOCK_PIECES_MAX} pieces"));
             }
             (3, Field::Bytes(bytes)) => extend_numbers(&mut self.at_ns, bytes, zigzag)?,
             (4, Field::Bytes(bytes)) => extend_numbers(&mut self.is_sent, bytes, |it| it != 0)?,
@@ -249,6 +249,6 @@ mod tests {
         }
         let mut greedy = vec![0x2a, 0xff, 0xff, 0x7f];
         greedy.resize(4 + 0x001f_ffff, 1);
-        assert!(RawBlock::read(&greedy).unwrap_err().contains("more pieces"));
+        assert!(RawBlock::read(&greedy).unwrap_err().contains("65536 pieces"));
     }
 }

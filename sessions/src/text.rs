@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 
 /// The error is a sentence that names the file.
 pub fn read(path: &Path) -> Result<String, String> {
-    fs::read_to_string(path).map_err(|err| format!("cannot read {} ({err})", path.display()))
+    fs::read_to_string(path)
+        .map_err(|err| format!("cannot read {} ({err}); check the path", path.display()))
 }
 
 /// Writes or replaces a file atomically.
 pub fn write(path: &Path, text: &str) -> Result<(), String> {
     atomic::replace(path, text.as_bytes())
-        .map_err(|err| format!("cannot write {} ({err})", path.display()))
+        .map_err(|err| format!("cannot write {} ({err}); choose a writable folder", path.display()))
 }
 
 /// The JSON files of a folder, hidden ones excepted, sorted by name; a missing folder has none.

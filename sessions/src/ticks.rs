@@ -239,7 +239,7 @@ impl<const W: usize, const R: usize> TickRecording<W, R> {
         let all = read_text(&file)?;
         let damaged = |line: usize, what: &str| {
             format!(
-                "{}, line {line}: {what}; the recording is damaged, use an undamaged copy",
+                "{}, line {line}: {what}; the recording is damaged, so use an undamaged copy",
                 file.display()
             )
         };
@@ -266,7 +266,9 @@ impl<const W: usize, const R: usize> TickRecording<W, R> {
                 return Ok(Self { settings, rows, end });
             }
             hash = extend_hash(hash, line.as_bytes());
-            rows.push(TickRow::of(content).ok_or_else(|| damaged(number, "it is not a tick"))?);
+            rows.push(
+                TickRow::of(content).ok_or_else(|| damaged(number, "the line is not a tick"))?,
+            );
         }
         Ok(Self { settings, rows, end: TickEnd::CutOff })
     }

@@ -53,7 +53,7 @@ fn a_library_is_searched_tagged_reviewed_and_reported_over_time() {
     // A condition that can never hold differs from one that matches no session.
     for (condition, word) in [
         ("ramp.dept>=1mm", "ramp.dept"),
-        ("depth>=1kg", "have it in mm"),
+        ("depth>=1kg", "have depth in mm"),
         ("ramp.depth>=100mm", ""),
     ] {
         let none = palpate(at, &["find", "--where", condition]);

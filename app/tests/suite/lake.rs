@@ -44,7 +44,7 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
     assert_eq!(found[1..], expected);
     let dictionary =
         fs::read_to_string(printed["dictionary"].as_str().map(|name| at.join(name)).unwrap());
-    assert!(dictionary.unwrap().contains("every 10th"));
+    assert!(dictionary.unwrap().contains("one of every 10 "));
 
     succeeded(&palpate(at, &["export", "demo", "--format", "arrow"]));
     for (args, says) in [

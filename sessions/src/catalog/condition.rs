@@ -73,12 +73,14 @@ struct Comparison {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ConditionError {
     #[error(
-        "'{text}' is not a condition; write a name, one of = != < <= > >= and a value, as in depth>=2mm"
+        "'{text}' is not a condition; write a name, a sign (= != < <= > >=) and a value, as in depth>=2mm"
     )]
     Form { text: String },
-    #[error("'{value}' in '{text}' is not a number; compare it with = or !=")]
+    #[error("'{value}' in '{text}' is not a number; compare a text with = or !=")]
     Words { text: String, value: String },
-    #[error("'{text}' has two units, {name} and {value}; give one")]
+    #[error(
+        "'{text}' has the unit {name} in its name and {value} in its value; give only one unit"
+    )]
     Units { text: String, name: String, value: String },
 }
 

@@ -192,7 +192,7 @@ fn parse_head(row: &Row<'_>) -> rusqlite::Result<RecordedHead> {
     let one = RecordedHead { file: row.get(0)?, name: row.get(1)?, head, stamp: row.get(4)? };
     match sum(&one.file, &one.name, head) == row.get::<_, String>(5)? {
         true => Ok(one),
-        false => Err(bad_text("a recorded head has a wrong checksum")),
+        false => Err(bad_text("the recorded line count of a file has a wrong checksum")),
     }
 }
 

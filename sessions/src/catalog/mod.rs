@@ -45,7 +45,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// The catalog could not be made or read.
 #[derive(Debug, Error)]
 pub enum CatalogError {
-    #[error("the catalog cannot be {what} ({source}), {}; check the permissions of its folder", path.display())]
+    #[error("the catalog {} cannot be {what} ({source}); check the permissions of its folder", path.display())]
     Io {
         /// `opened` or `replaced`.
         what: &'static str,
@@ -54,7 +54,7 @@ pub enum CatalogError {
     },
     #[error("the catalog cannot be used: {0}")]
     LockTimeout(LockTimeout),
-    #[error("the catalog cannot be used ({source}), {}; delete the file, and it is rebuilt from the sessions", path.display())]
+    #[error("the catalog {} cannot be used ({source}); delete the file, and palpate rebuilds the catalog from the sessions", path.display())]
     Sql { path: PathBuf, source: rusqlite::Error },
 }
 
@@ -121,7 +121,7 @@ impl Catalog {
                 db: open_new(Path::new(IN_MEMORY))?,
                 library: library.to_owned(),
                 remarks: vec![format!(
-                    "{} is not writable, so every search reads every session",
+                    "the library {} is not writable, so every search reads every session",
                     library.display()
                 )],
             }),

@@ -106,7 +106,9 @@ impl FromStr for ReviewFilter {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|one| one.word() == text);
         found.ok_or_else(|| {
-            format!("'{text}' is not a review; give accepted, rejected, repeat, outdated or none")
+            format!(
+                "'{text}' is not a review state; give accepted, rejected, repeat, outdated or none"
+            )
         })
     }
 }
@@ -298,11 +300,11 @@ impl Catalog {
             };
             if present.is_empty() {
                 doubts.push(format!(
-                    "no session has a value called {name}; give the name of a parameter, a fact about the specimen, or a fitted parameter"
+                    "no session has a value named {name}; give the name of a parameter, a fact about the specimen, or a fitted parameter"
                 ));
             } else if !present.iter().any(is_fit) {
                 doubts.push(format!(
-                    "no session has {name} in {}; the sessions have it in {}",
+                    "no session has {name} in {}; the sessions have {name} in {}",
                     units.join(" or "),
                     present.join(" or ")
                 ));

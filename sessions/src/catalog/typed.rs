@@ -7,9 +7,11 @@ use thiserror::Error;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum DayError {
-    #[error("write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z")]
+    #[error(
+        "this is neither a day nor a time; write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z"
+    )]
     Form,
-    #[error("the day is too late to be represented; give an earlier one")]
+    #[error("the day is too far in the future; give an earlier day")]
     Late,
 }
 

@@ -176,7 +176,7 @@ impl Catalog {
 pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<CatalogEntry> {
     let text: String = row.get(0)?;
     if checksum(&text) != row.get::<_, String>(1)? {
-        return Err(bad_text("an entry has a wrong checksum"));
+        return Err(bad_text("an entry of the catalog has a wrong checksum"));
     }
     serde_json::from_str(&text).map_err(bad_text)
 }

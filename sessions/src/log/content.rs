@@ -197,13 +197,13 @@ impl<'v> Content<'v> {
                 self.has_raw &= channel == Channel::Derived;
             }
         } else if sequence != expected && !is_repeated {
-            return Err(format!("message {expected} of {} is missing", channel.name()));
+            return Err(format!("message {expected} of channel {} is missing", channel.name()));
         }
         if !is_repeated {
             *next = Some(sequence.wrapping_add(1));
         }
         if self.end.is_some() && !is_bookkeeping {
-            return Err("something was recorded after the end".into());
+            return Err("a message follows the end record".into());
         }
         let data = fields.0;
         match channel {
@@ -233,7 +233,7 @@ impl<'v> Content<'v> {
     fn take_manifest(&mut self, sequence: u32, data: &[u8]) -> Result<(), String> {
         let unreadable = |err: serde_json::Error| format!("the manifest is unreadable: {err}");
         if self.segment.has_manifest {
-            return Err("there is a second manifest".into());
+            return Err("the segment has a second manifest".into());
         }
         // The version comes first, because the rest of a newer manifest may not parse.
         let value: serde_json::Value = serde_json::from_slice(data).map_err(unreadable)?;
@@ -253,7 +253,7 @@ impl<'v> Content<'v> {
         let manifest: Manifest = serde_json::from_value(value).map_err(unreadable)?;
         match &self.manifest {
             Some(first) if *first != manifest => {
-                return Err("its manifest differs from that of the segments before".into());
+                return Err("its manifest differs from that of the earlier segments".into());
             }
             Some(_) => {}
             None if sequence > 0 => {
@@ -324,7 +324,7 @@ impl<'v> Content<'v> {
 
     fn take_health(&mut self, data: &[u8]) -> Result<(), String> {
         let health: HealthMessage = serde_json::from_slice(data)
-            .map_err(|err| format!("a message of health is unreadable: {err}"))?;
+            .map_err(|err| format!("a health message is unreadable: {err}"))?;
         self.health.take(&health);
         (self.visit)(LogPart::Health(&health));
         Ok(())
@@ -363,13 +363,13 @@ impl<'v> Content<'v> {
         let raw_bytes = before.saturating_add(self.raw_bytes);
         if end.raw_bytes != raw_bytes {
             let recorded = end.raw_bytes;
-            return Err(format!("{recorded} raw bytes were recorded, and the log has {raw_bytes}"));
+            return Err(format!("{recorded} raw bytes were recorded, but the log has {raw_bytes}"));
         }
         if !self.has_raw && end.samples == samples && has_entries {
             return Ok(());
         }
         Err(format!(
-            "{} samples and {} entries were recorded, and the log has {samples} and {entries}",
+            "{} samples and {} entries were recorded, but the log has {samples} and {entries}",
             end.samples, end.entries
         ))
     }

@@ -17,7 +17,7 @@ pub enum LogError {
     #[error("another program changed the session log {path} during the recording: {alteration}")]
     Altered { alteration: Alteration, path: String },
     #[error(
-        "the disk of {path} did not keep up for {seconds} s, and no more samples fit in memory; everything saved before is kept, use a faster disk"
+        "the disk of {path} did not keep up for {seconds} s, and no more samples fit in memory; everything saved before is kept; use a faster disk"
     )]
     TooSlow { seconds: u64, path: String },
     #[error(
@@ -44,12 +44,12 @@ pub(crate) fn encode_error<E: Display>(what: &'static str) -> impl Fn(E) -> LogE
 
 #[derive(Debug, Error)]
 pub enum ReadError {
-    #[error("there is no session at {}; check the path", path.display())]
+    #[error("no session exists at {}; check the path", path.display())]
     Missing { path: PathBuf },
     #[error("{} is not a palpate session ({reason}); choose a session folder or its {LOG_FILE}", path.display())]
     NotASession { path: PathBuf, reason: String },
     #[error(
-        "{} was written by palpate {software_version} with record version {record_version}; this palpate reads up to {RECORD_VERSION}; update palpate", path.display()
+        "{} was written by palpate {software_version} with record version {record_version}, but this palpate reads versions up to {RECORD_VERSION}; update palpate", path.display()
     )]
     Newer { path: PathBuf, software_version: String, record_version: u64 },
     #[error(

@@ -82,7 +82,7 @@ impl ChunkReader {
         let size = usize::try_from(size)
             .ok()
             .filter(|&size| size <= FRAME_BYTES_MAX)
-            .ok_or("a chunk claims to be larger than any chunk can be")?;
+            .ok_or("a chunk claims to be larger than the largest possible chunk")?;
         self.records.clear();
         match compression {
             "" => self.records.extend_from_slice(fields.0),
@@ -90,7 +90,7 @@ impl ChunkReader {
                 self.records.reserve_exact(size);
                 self.decompressor
                     .decompress_to_buffer(fields.0, &mut self.records)
-                    .map_err(|err| format!("a chunk does not decompress ({err})"))?;
+                    .map_err(|err| format!("a chunk cannot be decompressed ({err})"))?;
             }
             _ => return Err("a chunk has an unknown compression".into()),
         }

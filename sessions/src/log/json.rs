@@ -44,6 +44,6 @@ where
     if back == *value {
         Ok(json)
     } else {
-        Err(LogError::Encode { what, reason: "it would not read back unchanged".into() })
+        Err(LogError::Encode { what, reason: "it would change when it is read back".into() })
     }
 }

@@ -203,7 +203,7 @@ impl<'v> Reader<'v> {
                 Ok(SegmentOutcome::Nothing) => {
                     let name = name_of(file);
                     self.notes.push(format!(
-                        "{name} is empty: the recording was interrupted before it got data"
+                        "{name} is empty: the recording was interrupted before this file received data"
                     ));
                 }
                 Err(found) => {
@@ -244,22 +244,22 @@ impl<'v> Reader<'v> {
             let missing = recovered.missing.sentences();
             let missing =
                 if missing.is_empty() { "nothing is missing".into() } else { missing.join("; ") };
-            notes.push(format!("recovered from {}: {missing}", recovered.from));
+            notes.push(format!("the session was recovered from {}: {missing}", recovered.from));
         }
         // Only a segment with a successor is finished without an end.
         let goes_on = !self.is_folder && self.is_finished && end.is_none();
         if goes_on {
             notes.push(format!(
-                "no end record: this part of a recording ends at {last:.1} s; open the session's folder for what follows"
+                "this part of a recording ends at {last:.1} s and has no end record; open the session's folder for the later parts"
             ));
         } else if end.is_none()
             && let Some(spare) = &self.absent_spare
         {
             let absent = describe_absent(spare);
-            notes.push(format!("no end record: the data here ends at {last:.1} s; {absent}"));
+            notes.push(format!("the recording has no end record, and the data in this folder end at {last:.1} s; {absent}"));
         } else if end.is_none() {
             notes.push(format!(
-                "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
+                "the recording has no end record: it was interrupted at {last:.1} s; all data before are complete"
             ));
         } else if !self.is_finished {
             notes.push(NO_INDEX.into());
@@ -291,7 +291,7 @@ impl<'v> Reader<'v> {
         let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
         let failed = |source| ReadError::Io { path: path.into(), source };
         if !path.is_file() {
-            let mut reason = "this segment is missing, though a later one is there".to_owned();
+            let mut reason = "this segment is missing, but a later segment exists".to_owned();
             if let Some(spare) = &self.absent_spare {
                 reason = format!("{reason}; {}", describe_absent(spare));
             }
@@ -331,7 +331,7 @@ impl<'v> Reader<'v> {
         }
         let is_rewrite = self.content.segment.is_rewrite;
         if had_end && !is_rewrite {
-            let reason = "a segment follows the one that ended the recording";
+            let reason = "a segment follows the segment with the end record";
             return Ok(Err(damage(0, reason)));
         }
         let is_finished = source.has_footer().map_err(failed)?;
@@ -365,7 +365,9 @@ impl<'v> Reader<'v> {
         if let Some(name) = self.unfinished.take() {
             self.notes.push(if is_rewrite {
                 let name_here = name_of(path);
-                format!("writing {name} failed; {name_here} repeats what it may have lost")
+                format!(
+                    "writing {name} failed; {name_here} repeats the data that {name} may have lost"
+                )
             } else {
                 format!("{name} is unfinished; the next segment continues where it stops")
             });
@@ -380,7 +382,7 @@ impl<'v> Reader<'v> {
 
 const NO_INDEX: &str = "the index at the end is missing; all samples and entries are present";
 const LATER_PART: &str =
-    "this is a later part of a recording; open the session's folder for what came before";
+    "this is a later part of a recording; open the session's folder for the earlier parts";
 
 pub(crate) const NO_BEGINNING: &str = "it does not begin like a segment";
 pub(crate) const NOT_BEGUN: &str =
@@ -402,7 +404,7 @@ pub(crate) fn check_beginning(
     let reason = if source.length() == 0 {
         "it is empty: nothing was recorded"
     } else if !is_ours {
-        "it does not begin like one"
+        "it does not begin like a session log"
     } else {
         return Ok(());
     };

@@ -49,7 +49,7 @@ impl Seek for Tape {
             SeekFrom::Current(0) => Ok(position),
             SeekFrom::Start(start) if start == position => Ok(position),
             // Seeking is disabled in the container; this keeps the file append-only in any case.
-            _ => Err(io::Error::other("a session log is only ever appended to")),
+            _ => Err(io::Error::other("data can only be appended to a session log")),
         }
     }
 }

@@ -15,7 +15,7 @@ pub enum Alteration {
     Gone,
     #[error("another file replaced it")]
     Replaced,
-    #[error("it has {found} bytes, and {written} were written")]
+    #[error("it has {found} bytes, but {written} were written")]
     Length { found: u64, written: u64 },
     #[error("its content differs from what was written")]
     Content,
@@ -55,7 +55,7 @@ pub trait SegmentSource: Send {
     /// Creates the segment in another place after a failure; returns its path too.
     fn create_elsewhere(&mut self, number: u32) -> io::Result<(Self::Sink, String)> {
         let path = self.path(number);
-        Err(io::Error::other(format!("there is no spare folder for {path}")))
+        Err(io::Error::other(format!("{path} has no spare folder")))
     }
 }
 

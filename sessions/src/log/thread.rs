@@ -141,7 +141,7 @@ impl SessionWriter {
             .name("session-writer".into())
             .spawn(move || write_batches(log, &receiver, &thread_status, monotonic_now))
             .map_err(|err| LogError::Disk {
-                reason: format!("no thread to write on: {err}"),
+                reason: format!("the writing thread did not start: {err}"),
                 path: path.into(),
             })?;
         Ok(Self {

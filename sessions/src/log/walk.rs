@@ -37,7 +37,10 @@ pub(crate) fn walk(
             Ok(frame) => frame,
             Err(FrameError::TooLong) => {
                 let is_torn = is_zeroed(offset)?;
-                return damage("a record is longer than the largest possible one".into(), is_torn);
+                return damage(
+                    "a record is longer than the longest possible record".into(),
+                    is_torn,
+                );
             }
             Err(FrameError::PastEnd) => {
                 // A later chunk distinguishes damage from an incomplete end.

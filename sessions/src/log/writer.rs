@@ -217,7 +217,7 @@ impl<S: Sink> LogWriter<S> {
             self.at.last_order = Some(entry.order);
         }
         for health in parts.health {
-            let json = readable_json("message of health", health)?;
+            let json = readable_json("health message", health)?;
             self.put(Channel::Health, health.now, &json)?;
         }
         Ok(())
@@ -364,7 +364,7 @@ impl<S: Sink> LogWriter<S> {
         if data.len() > MESSAGE_BYTES_MAX {
             return Err(LogError::Encode {
                 what: channel.name(),
-                reason: format!("it has {} bytes, {MESSAGE_BYTES_MAX} are the most", data.len()),
+                reason: format!("it has {} bytes, more than {MESSAGE_BYTES_MAX}", data.len()),
             });
         }
         let index = channel as usize;

@@ -42,12 +42,12 @@ impl CompanionFiles {
         let edits = match Edits::read(path, &salvage.manifest.session_id) {
             Ok(edits) => edits,
             Err(err) => {
-                self.left_out.push(format!("no edit is taken over: {err}"));
+                self.left_out.push(format!("no edit is copied: {err}"));
                 return;
             }
         };
         if edits.is_torn {
-            let torn = "the last edit is incomplete and not taken over";
+            let torn = "the last edit is incomplete and is not copied";
             self.left_out.push(torn.into());
         }
         let found = contacts(&salvage.entries).len();
@@ -57,7 +57,7 @@ impl CompanionFiles {
                     if !salvage.has_every_decision || *number as usize > found =>
                 {
                     self.left_out.push(format!(
-                        "the correction of contact {number} by {} is not taken over, because contacts are counted and decisions are missing; depths count from the recorded contacts",
+                        "the correction of contact {number} by {} is not copied, because missing decisions may change the numbers of the contacts; depths count from the recorded contacts",
                         edit.by
                     ));
                 }
@@ -81,10 +81,10 @@ impl CompanionFiles {
                     "its times count from the first sample, which is missing"
                 }
                 AnalysisContent::Recalibration { .. } if !salvage.has_every_decision => {
-                    "tares are decisions, and decisions are missing"
+                    "its tares may be among the missing decisions"
                 }
                 AnalysisContent::Fit { .. } => {
-                    "it is a fit of other samples; fit this session again"
+                    "it belongs to the samples of the original; fit the recovered session again"
                 }
                 // The withdrawn analysis is not in the copy.
                 AnalysisContent::Withdrawal
@@ -99,7 +99,7 @@ impl CompanionFiles {
             };
             if analyses.withdrawal(&one.name).is_none() {
                 let (word, name) = (one.what.word(), &one.name);
-                self.left_out.push(format!("{word} '{name}' is not taken over: {reason}"));
+                self.left_out.push(format!("{word} '{name}' is not copied: {reason}"));
             }
         }
     }

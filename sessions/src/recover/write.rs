@@ -31,15 +31,15 @@ pub struct RecoveryOrigin {
 pub enum RecoverError {
     #[error(transparent)]
     Read(#[from] ReadError),
-    #[error("{} is complete; there is nothing to recover", path.display())]
+    #[error("{} is complete and needs no recovery", path.display())]
     Whole { path: PathBuf },
     #[error("{} is being recorded; wait for the run to end", path.display())]
     InUse { path: PathBuf },
-    #[error("{} is already being recovered by {}; wait for it to end, and use its result", path.display(), lock::holder_name(*holder))]
+    #[error("{} is already being recovered by {}; wait for that recovery to end, and use its result", path.display(), lock::holder_name(*holder))]
     InProgress { path: PathBuf, holder: Option<u32> },
     #[error("{} is not recovered yet: {}, or, if the disk is lost for good, delete the file 'spare' in the session's folder", path.display(), describe_absent(spare))]
     Away { path: PathBuf, spare: PathBuf },
-    #[error("{} was already recovered into {}; use that", path.display(), folder.display())]
+    #[error("{} was already recovered into {}; use that folder", path.display(), folder.display())]
     Before { path: PathBuf, folder: PathBuf },
     #[error(transparent)]
     Folder(#[from] FolderError),

@@ -155,7 +155,7 @@ fn damaged_files_are_refused_with_the_line() {
     for (text, expected) in [
         (lines[8..].join("\n"), "line 1: the numbers have no column names"),
         (with(7, ""), "line 8: the numbers have no column names"),
-        (with(7, "(s),(mm),(N)"), "line 7: it has 3 units for the 4 columns of line 6"),
+        (with(7, "(s),(mm),(N)"), "line 7 has 3 units for the 4 columns of line 6"),
         (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' is among or after the numbers"),
         (with(11, "\"0.3"), "line 11: a quote is not closed"),
         (with(11, "End of test,1"), "line 11: 'End of test,1' is among or after the numbers"),
@@ -163,7 +163,7 @@ fn damaged_files_are_refused_with_the_line() {
         (with(10, "\"0.2\",\"\",\"1\",\"0\""), "line 10: the depth is missing"),
         (
             with(10, "\"0.1\",\"0\",\"1\",\"0\""),
-            "line 10: the time 0.1 s equals that of the row before",
+            "line 10: the time 0.1 s equals that of the previous row",
         ),
         (with(10, "0.2,0,1,0,0"), "line 10 has a cell in column 5"),
         (with(1, "a remark by hand"), "line 1: 'a remark by hand' is neither"),

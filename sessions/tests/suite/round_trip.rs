@@ -82,7 +82,10 @@ fn a_log_without_an_end_opens_with_a_note() {
     assert!(same_bits(&session.rows, &rows));
     assert_eq!(session.end, None);
     let note = &session.notes[0];
-    assert!(note.starts_with("no end record") && note.contains("12.3 s"), "{note}");
+    assert!(
+        note.starts_with("the recording has no end record") && note.contains("12.3 s"),
+        "{note}"
+    );
 }
 
 #[test]

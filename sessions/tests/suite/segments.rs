@@ -218,9 +218,13 @@ fn a_segment_opens_alone_and_says_what_it_is() {
         assert!(same_bits(&part.rows, slice));
     }
     let notes = |number: usize| parts[number].notes.join("; ");
-    assert!(notes(0).contains("for what follows") && !notes(0).contains("came before"));
-    assert!(notes(1).contains("for what follows") && notes(1).contains("came before"));
-    assert!(!notes(2).contains("for what follows") && notes(2).contains("came before"));
+    assert!(
+        notes(0).contains("for the later parts") && !notes(0).contains("for the earlier parts")
+    );
+    assert!(notes(1).contains("for the later parts") && notes(1).contains("for the earlier parts"));
+    assert!(
+        !notes(2).contains("for the later parts") && notes(2).contains("for the earlier parts")
+    );
     assert!(parts[1].end.is_none() && parts[2].end.is_some());
 }
 

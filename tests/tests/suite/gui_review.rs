@@ -160,8 +160,7 @@ fn sessions_are_fitted_compared_and_predicted() {
     flow.click("Add to view");
     flow.wait("the refusal", |window| {
         use egui_kittest::kittest::Queryable;
-        let mut found =
-            window.query_all_by_label_contains("there is no session at /nowhere/at-all");
+        let mut found = window.query_all_by_label_contains("no session exists at /nowhere/at-all");
         found.next().is_some()
     });
     flow.click("read again: at-all");

@@ -116,7 +116,7 @@ impl Field {
                 "the controller's clock in its own counts; picoseconds in an imported session",
             ),
             Self::Host => {
-                ("host_ns", "ns", "arrival on the computer, since the start of the session")
+                ("host_ns", "ns", "time of arrival at the computer, from the start of the session")
             }
             Self::Status => ("status", "1", "bits of the axis' status"),
             Self::Age => (
@@ -146,19 +146,19 @@ impl Field {
 
     fn origin(self) -> &'static str {
         match self {
-            Self::SessionId => "given at the start, sorts by time",
+            Self::SessionId => "given at the start; alphabetical order is order of time",
             Self::Specimen => "typed by the operator",
             Self::Sample | Self::EveryNth => "counted",
             Self::Time => "controller ticks times the true length of a tick",
             Self::Depth => {
-                "commanded path from the recorded or corrected contact, within one pulse of the pulses"
+                "commanded path from the recorded or corrected contact; agrees with the column pulses to within one pulse"
             }
             Self::Force => "signal converted by the load-cell calibration, minus the tare",
             Self::Signal | Self::Counts | Self::Pulses | Self::Tick | Self::Status => "as received",
             Self::Phase | Self::Cycle => "decided by the engine",
             Self::Host => "the computer's monotonic clock",
             Self::Age | Self::AgeWithin => "measured by the driver, sample by sample",
-            Self::Extra(_) => "computed at export; the file's metadata has the method",
+            Self::Extra(_) => "computed at export; the file's metadata describe the method",
         }
     }
 }
@@ -205,7 +205,7 @@ impl<'a> Layout<'a> {
             columns.push(ColumnInfo {
                 name: format!("sample_every_{every}"),
                 meaning: format!(
-                    "number of the sample in the session, from 0; the table has only every {every}th selected sample, without averaging"
+                    "number of the sample in the session, from 0; the table has one of every {every} selected samples, without averaging"
                 ),
                 field: Field::EveryNth,
                 ..Field::Sample.describe()
@@ -220,7 +220,7 @@ impl<'a> Layout<'a> {
             let Some(found) = found else {
                 let all: Vec<&str> = known.iter().map(|one| one.name.as_str()).collect();
                 return Err(format!(
-                    "there is no column {name}; the columns are {}",
+                    "the session has no column {name}; its columns are {}",
                     all.join(", ")
                 ));
             };

@@ -48,7 +48,7 @@ pub enum ExportError {
     #[error("{0}")]
     Columns(String),
     #[error(
-        "the session's name {name:?} is unfit for a file in a lake; export the session as a table"
+        "the session's name {name:?} cannot be a file name in a lake; export the session as a table"
     )]
     BadName { name: String },
     #[error(transparent)]

@@ -83,7 +83,7 @@ impl SampleSelection {
         parts.extend(self.to_s.map(|to| format!("to {to} s")));
         if self.step() > 1 {
             let every = self.step();
-            parts.push(format!("every {every}th of these samples, without averaging"));
+            parts.push(format!("one of every {every} of these samples, without averaging"));
         }
         match parts.is_empty() {
             true => "All samples of the session.".into(),

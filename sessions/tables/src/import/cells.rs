@@ -11,7 +11,7 @@ pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
         })
         .collect();
     ['\t', ';', ','].into_iter().find(|delimiter| bare.contains(*delimiter)).ok_or_else(|| {
-        "the first line names no columns; separate them by comma, semicolon or tab".into()
+        "the first line has no delimiter; separate the names of the columns by comma, semicolon or tab".into()
     })
 }
 

@@ -29,7 +29,7 @@ pub struct MeasurementTable {
 pub enum TableError {
     #[error("cannot read the table {} ({source}); check the path", path.display())]
     Io { path: PathBuf, source: io::Error },
-    #[error("{} is not a text table ({reason}); give a delimited text with a header", path.display())]
+    #[error("{} is not a text table ({reason}); give a delimited text file with a header", path.display())]
     NotText { path: PathBuf, reason: String },
     #[error("{}: {reason}", path.display())]
     Content { path: PathBuf, reason: String },
@@ -95,7 +95,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Measurem
         }
         (false, Some(ColumnNames(names))) => {
             return Err(format!(
-                "the table has {} columns, but {} are named; name every one",
+                "the table has {} columns, but {} names are given; name every column",
                 cells.len(),
                 names.len()
             ));
@@ -114,7 +114,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Measurem
         let cells = split(line, delimiter, number)?;
         if cells.len() != layout.width {
             return Err(format!(
-                "line {number} has {} cells, and the header has {}; correct the line",
+                "line {number} has {} cells, but the header has {}; correct the line",
                 cells.len(),
                 layout.width
             ));
@@ -141,7 +141,9 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Measurem
     let last_cell = |line: &str| split(line, delimiter, 0).ok()?.pop();
     table.notes.extend(truncated::remark(text, last_cell));
     if left_out > 0 {
-        table.notes.push(format!("{left_out} rows outside ramp, hold and unload are left out"));
+        table.notes.push(format!(
+            "{left_out} rows with phases other than ramp, hold and unload are left out"
+        ));
     }
     Ok(table)
 }
@@ -190,7 +192,9 @@ impl Layout {
                 [(i, None)] => {
                     Err(format!("column '{}' has no known unit; name it like {example}", cells[i]))
                 }
-                [] => Err(format!("no column is the {name}; name one like {example}")),
+                [] => Err(format!(
+                    "no column is recognised as the {name}; name the column like {example}"
+                )),
                 [(i, _), (j, _), ..] => Err(format!(
                     "columns '{}' and '{}' could both be the {name}; rename one of them",
                     cells[i], cells[j]

@@ -27,7 +27,7 @@ pub enum WeightsError {
         "the table has no column {expected} in its first line; name its columns mass_g,volts and, where they are known, direction,repeat,noise_v,samples,waited_s"
     )]
     NoColumn { expected: &'static str },
-    #[error("line {line} has \"{cell}\" for {column}, which is not {expected}; correct it")]
+    #[error("line {line} has \"{cell}\" for {column}, which is not {expected}; correct the line")]
     Cell {
         /// Line, counted from 1.
         line: usize,
@@ -38,7 +38,7 @@ pub enum WeightsError {
     #[error("{0}")]
     Row(String),
     #[error(
-        "line {line} has \"{cell}\", whose comma may be a decimal comma or a separator of thousands; write every number of the table with a decimal point"
+        "line {line} has \"{cell}\", whose comma may be a decimal comma or a thousands separator; write every number of the table with a decimal point"
     )]
     Comma {
         /// Line, counted from 1.
@@ -96,7 +96,7 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         let cells = split(text, mark, line).map_err(WeightsError::Row)?;
         if cells.len() > names.len() {
             return Err(WeightsError::Row(format!(
-                "line {line} has {} cells, and the first line names {} columns; quote a number with a decimal comma, or write it with a point",
+                "line {line} has {} cells, but the first line names {} columns; quote a number with a decimal comma, or write it with a point",
                 cells.len(),
                 names.len()
             )));

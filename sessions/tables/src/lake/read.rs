@@ -86,7 +86,7 @@ pub fn read_session(
     let rows = read_table(&samples, sum, rows)?;
     if rows.len() as u64 != session.samples {
         return Err(LakeError::Bad {
-            reason: format!("{} samples of {}", rows.len(), session.samples),
+            reason: format!("it has {} of {} samples", rows.len(), session.samples),
             path: samples,
         });
     }

@@ -157,7 +157,7 @@ fn missing(quantity: Quantity, header: &Header) -> String {
         .map(|name| format!("'{name}'"))
         .collect();
     format!(
-        "no column is known as the {0} ({1} has {2}); name it, as in {0}=NAME, or {0}=-NAME to invert its sign",
+        "no column is recognised as the {0} ({1} has {2}); name the column, as in {0}=NAME, or {0}=-NAME to invert its sign",
         quantity.name(),
         header.place,
         names.join(", ")
@@ -192,14 +192,14 @@ fn column(
         None if quantity == Quantity::Time => ("s", true),
         None => {
             return Err(format!(
-                "the {what} '{name}' has no unit; give it, as in {what}=UNIT, one of {}",
+                "the {what} '{name}' has no unit; give it as {what}=UNIT, where UNIT is one of {}",
                 quantity.known_units()
             ));
         }
     };
     let scale = quantity.scale(unit).ok_or_else(|| {
         format!(
-            "the unit '{unit}' of the {what} '{name}' is unknown; give one, as in {what}=UNIT, one of {}",
+            "the unit '{unit}' of the {what} '{name}' is unknown; give {what}=UNIT, where UNIT is one of {}",
             quantity.known_units()
         )
     })?;
@@ -244,7 +244,7 @@ fn find_chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
         ([index], _) => Ok((*index, is_inverted)),
         ([], Some(number)) => Ok((number - 1, is_inverted)),
         ([], None) => Err(format!(
-            "{} has no column '{bare}'; give a name as it is written there, or the column's number",
+            "{} has no column '{bare}'; give the column's name as it is written there, or the column's number",
             header.place
         )),
         ([first, second, ..], _) => Err(format!(

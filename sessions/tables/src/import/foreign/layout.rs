@@ -78,7 +78,10 @@ pub(super) fn find(
 ) -> Result<Option<Header>, String> {
     let find_row = |what: &str, number: usize| {
         rows.index_of(number).ok_or_else(|| {
-            format!("the {} {number} for the {what} is missing or blank", rows.word())
+            format!(
+                "the {0} {number} for the {what} is missing or blank; give another {0}",
+                rows.word()
+            )
         })
     };
     let names = options.header_row.or(known.map(|head| head.names));
@@ -123,7 +126,7 @@ pub(super) fn find(
         let found = width_of(&rows.words(first));
         if found != named {
             return Err(format!(
-                "{word} {} has {found} columns, but {named} are named; name every one",
+                "{word} {} has {found} columns, but {named} names are given; name every column",
                 rows.number(first)
             ));
         }
@@ -197,7 +200,7 @@ pub(super) fn decimal(
                 (Evidence::Only(decimal), None) => found = Some((decimal, here())),
                 (Evidence::Only(decimal), Some((before, place))) if decimal != *before => {
                     return Err(format!(
-                        "{place} has a decimal {}, {} a decimal {}; give the decimal sign, or correct the file",
+                        "{place} has a decimal {}, but {} has a decimal {}; give the decimal sign, or correct the file",
                         before.name(),
                         here(),
                         decimal.name()
@@ -221,7 +224,7 @@ pub(super) fn decimal(
             Ok(decimal)
         }
         (None, Some(place)) => Err(format!(
-            "{place} may have a separator of thousands or a decimal sign, and no other number shows which; give the decimal sign, point or comma"
+            "{place} may have a thousands separator or a decimal sign, and no other number shows which; give the decimal sign (point or comma)"
         )),
         (None, None) => {
             readings.add("decimal sign", "none needed", false, option);

@@ -65,7 +65,7 @@ pub fn open_foreign(path: &Path, options: &ImportOptions) -> Result<ForeignFile,
     let refused = |reason| ForeignError::Content { path: path.into(), reason };
     let size = std::fs::metadata(path).map_err(failed)?;
     if !size.is_file() {
-        return Err(refused("it is not a file; name a file".into()));
+        return Err(refused("it is not a file; choose a file".into()));
     }
     if size.len() > TEXT_BYTES_MAX {
         return Err(refused(format!(
@@ -126,7 +126,7 @@ fn parse_text(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Parse
     let lines = formats::lines_of(&text);
     let delimiter = options.delimiter.or_else(|| Delimiter::detect(&lines));
     let delimiter = delimiter.ok_or(
-        "no line has two numbers, so it is not a table; if the delimiter is unusual, give it",
+        "no line has two numbers, so the file is not a table; if its delimiter is unusual, give the delimiter",
     )?;
     let detect = || ForeignFormat::of_text(&lines, delimiter);
     let format = options.format.unwrap_or_else(detect);

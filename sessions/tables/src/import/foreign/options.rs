@@ -52,7 +52,7 @@ impl std::str::FromStr for RowFault {
 
 fn split_quantity(text: &str, what: &str) -> Result<(Quantity, String), String> {
     let names = || Quantity::ALL.map(Quantity::name).join(", ");
-    let wrong = || format!("give QUANTITY={what}, the quantity one of {}", names());
+    let wrong = || format!("give QUANTITY={what}, where QUANTITY is one of {}", names());
     let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
     let quantity =
         Quantity::ALL.into_iter().find(|one| one.name() == name.trim()).ok_or_else(wrong)?;
@@ -115,13 +115,13 @@ impl std::str::FromStr for ZeroChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         let (quantity, rest) = split_quantity(text, "first|NUMBER")?;
         if quantity == Quantity::Time {
-            return Err("time always counts from the first row; give depth or force".into());
+            return Err("time always counts from the first row; give depth, force or signal".into());
         }
         let value = match rest.as_str() {
             "first" => None,
             number => {
                 let value = number.parse().ok().filter(|value: &f64| value.is_finite());
-                Some(value.ok_or("give first or a number in mm, N or V")?)
+                Some(value.ok_or("give 'first' or a number in mm, N or V")?)
             }
         };
         Ok(Self { quantity, value })

@@ -65,7 +65,7 @@ impl Reader<'_> {
         match beyond.position(|cell| !cell.is_empty()) {
             None => Ok(()),
             Some(place) => Err(format!(
-                "{} {number} has a cell in column {}, and the header has {width} columns; correct the {0}, or give the delimiter or decimal sign if it was detected wrongly",
+                "{} {number} has a cell in column {}, but the header has {width} columns; correct the {0}, or give the delimiter or decimal sign if it was detected wrongly",
                 self.rows.word(),
                 width + place + 1,
             )),
@@ -96,7 +96,7 @@ impl Reader<'_> {
             (_, None, ..) if is_needed => missing("depth"),
             (_, _, None, _) if is_needed => missing("force"),
             (Some(t), .., Some(last)) if t == last => {
-                (RowFault::Repeated, format!("the time {t} s equals that of the row before"))
+                (RowFault::Repeated, format!("the time {t} s equals that of the previous row"))
             }
             (Some(t), .., Some(last)) if t < last => {
                 (RowFault::Backward, format!("the time decreases from {last} to {t} s"))
@@ -112,7 +112,7 @@ impl Reader<'_> {
     fn fault(&mut self, fault: RowFault, number: usize, what: &str) -> Result<(), String> {
         if !self.skip.contains(&fault) {
             return Err(format!(
-                "{} {number}: {what}; correct the file, or skip such rows: {}",
+                "{} {number}: {what}; correct the file, or skip all rows with the fault '{}'",
                 self.rows.word(),
                 fault.name()
             ));
@@ -178,7 +178,7 @@ fn phase_of(name: &str) -> Phase {
 fn left_out(reader: &Reader<'_>) -> Vec<String> {
     let description = |fault| match fault {
         RowFault::Missing => "without a value",
-        RowFault::Repeated => "with the time of the row before",
+        RowFault::Repeated => "with the time of the previous row",
         RowFault::Backward => "with decreasing time",
     };
     RowFault::ALL
@@ -212,14 +212,14 @@ fn gaps(rows: &Rows<'_>, samples: &[ForeignSample], numbers: &[usize]) -> Option
     // With more than a tenth of uneven steps, the instrument samples unevenly.
     if 10 * even < 9 * steps.len() {
         return Some(format!(
-            "the rows are not evenly spaced: {shortest:.6} to {longest:.6} s apart"
+            "the rows are not evenly spaced in time: their intervals are {shortest:.6} to {longest:.6} s"
         ));
     }
     let is_gap = |step: &f64| *step > GAP * median;
     let count = steps.iter().filter(|step| is_gap(step)).count();
     let first = steps.iter().position(is_gap)?;
     Some(format!(
-        "{count} gaps: no row follows {} {} for {:.6} s, though rows are {median:.6} s apart; nothing is filled in",
+        "{count} gaps: no row follows {} {} for {:.6} s, but most rows are {median:.6} s apart; nothing is filled in",
         rows.word(),
         numbers[first],
         steps[first]

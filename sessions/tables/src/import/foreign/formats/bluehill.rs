@@ -76,7 +76,7 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
                 (Some(_), Some(strange)) => return Err(strange_line(&lines, strange)),
                 (None, _) => {
                     return Err(format!(
-                        "line {number}: the numbers have no column names and units above them; the beginning of the file is missing"
+                        "line {number}: the numbers have no column names and units above them; restore the missing beginning of the file"
                     ));
                 }
             }
@@ -202,7 +202,7 @@ fn head(lines: &[Line<'_>], delimiter: Delimiter) -> Result<Option<Columns>, Str
     let own_line = Some(second.0).filter(|units| *units > names);
     if own_line.is_some() && above.len() != units.len() {
         return Err(format!(
-            "line {}: it has {} units for the {} columns of line {names}; correct the line",
+            "line {} has {} units for the {} columns of line {names}; correct the line",
             second.0,
             units.len(),
             above.len(),

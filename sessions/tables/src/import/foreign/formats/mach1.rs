@@ -37,7 +37,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
                     match rest.next() {
                         None => {
                             return Err(format!(
-                                "line {number}: <DATA> has no <END DATA>; the end of the file is missing"
+                                "line {number}: <DATA> has no <END DATA>; restore the missing end of the file"
                             ));
                         }
                         Some((_, line)) if line.trim() == "<END DATA>" => break,

@@ -42,7 +42,7 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
             is_in_part = true;
         } else if bare.eq_ignore_ascii_case(STEP) {
             let (_, name) = rest.next().ok_or_else(|| {
-                format!("line {number}: the step has no name; the end of the file is missing")
+                format!("line {number}: the step has no name; restore the missing end of the file")
             })?;
             parts.push(TextPart {
                 name: name.trim().to_owned(),
