@@ -49,8 +49,8 @@ impl fmt::Display for DetectedDevice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(_, introduction, text) => write!(f, "{introduction}{text}"),
-            Self::Unknown(text) => write!(f, "unknown, says \"{text}\""),
-            Self::Silent => f.write_str("silent at this baud rate"),
+            Self::Unknown(text) => write!(f, "an unknown device that sends \"{text}\""),
+            Self::Silent => f.write_str("no device answers at this baud rate"),
         }
     }
 }

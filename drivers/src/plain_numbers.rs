@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub(crate) const KIND: DeviceKind = DeviceKind {
     word: "plain-numbers",
     title: "a device that sends plain numbers",
-    introduction: "something that sends plain numbers, such as a load cell: ",
+    introduction: "a device that sends plain numbers, such as a load cell: ",
     role: DeviceRole::Cell {
         read: |fields| Some(Arc::new(PlainNumbers::read(fields)?)),
         emulation: Some(LineEmulation {
@@ -103,7 +103,7 @@ impl PlainNumbers {
             (Unit::Counts(usual), volts) => Unit::Counts(volts.unwrap_or(usual)),
             (unit, None) => unit,
             (_, Some(_)) => {
-                let message = "applies to counts only; remove it, or set unit = \"counts\"";
+                let message = "this key needs unit = \"counts\"; remove the key or change the unit";
                 fields.mistake("cell.full_scale_v", message);
                 return None;
             }
@@ -171,7 +171,7 @@ impl PlainNumbers {
             let (first_at, first_ticks, first) = all[0];
             if number.decimals != first.decimals {
                 return Err(unfit(format!(
-                    "its numbers had first {} and now {} digits after the point; print them all with the same number of digits",
+                    "its numbers first had {} and now have {} digits after the point; print all numbers with the same number of digits",
                     first.decimals, number.decimals
                 )));
             }
@@ -192,9 +192,9 @@ impl PlainNumbers {
         let received = console.received();
         let Some(line) = wrong else {
             return if received.is_empty() {
-                console.no_answer("check port, cable and that the board sends by itself")
+                console.no_answer("check the port, the cable and that the board sends numbers without being asked")
             } else {
-                unfit("it sends less than a number a second; make it send more")
+                unfit("it sends less than one number a second; make it send numbers more often")
             };
         };
         let other = DeviceKind::recognise_lines(&split_lines(&received));
@@ -207,7 +207,7 @@ impl PlainNumbers {
             Some(_) => "a time, a comma and a number",
         };
         unfit(format!(
-            "it sends {quote:?} where the rig file expects {wanted}; correct cell.time_column, or what the board prints"
+            "it sends {quote:?} where the rig file expects {wanted}; correct cell.time_column in the rig file, or correct the output of the board"
         ))
     }
 }
@@ -224,7 +224,7 @@ impl CellDevice for PlainNumbers {
         let counts_max = (self.full_scale / like.step()).round();
         if counts_max > f64::from(i32::MAX) {
             return Err(unfit(format!(
-                "full_scale = {} is too large for numbers with {} digits after the point",
+                "full_scale = {} is too large for numbers with {} digits after the point; lower full_scale",
                 self.full_scale, like.decimals
             )));
         }
@@ -309,7 +309,7 @@ impl CellProtocol for PlainNumberReader {
         let is_beyond = number.digits.saturating_abs() >= self.counts_max;
         reports.set_beyond_range(
             is_beyond,
-            "its number is at the end of its range or beyond; take the load off, or correct cell.full_scale of the rig file",
+            "its number is at or beyond the end of its range; take the load off, or correct cell.full_scale in the rig file",
         );
         let counts = if self.cell.is_reversed { -number.digits } else { number.digits };
         reports.push_counts(now, device_time, counts, self.per_count);

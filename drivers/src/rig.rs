@@ -48,7 +48,7 @@ pub(crate) fn axis_status<const N: usize>(bits: [(bool, AxisStatus); N]) -> Axis
 #[derive(Debug, Error)]
 pub enum RigError {
     #[error(
-        "no rig is called '{name}'; use 'sim', 'sim:NAME' for a shared simulated rig, or a rig file, NAME.toml"
+        "no rig is called '{name}'; use 'sim', 'sim:NAME' for a shared simulated rig, or the path of a rig file, NAME.toml"
     )]
     Unknown { name: String },
     #[error("the rig file {file} cannot be read ({detail}); check its path")]

@@ -71,10 +71,16 @@ const DURATION: Nanos = Nanos(500_000_000);
 const SECONDS_MAX: f64 = 86_400.0;
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a fault; give KIND@SECONDS or KIND@SECONDS:DURATION with one of {kinds}", kinds = kinds())]
+#[error("'{0}' is not a fault; give KIND@SECONDS or KIND@SECONDS:DURATION, where KIND is one of {kinds}", kinds = kinds())]
 pub struct FaultError(String);
 
-fn kinds() -> String {
+impl FaultError {
+    pub(super) fn text(&self) -> &str {
+        &self.0
+    }
+}
+
+pub(super) fn kinds() -> String {
     KINDS.map(|(name, _)| name).join(", ")
 }
 

@@ -1,6 +1,6 @@
 //! Orders to a running emulator: a fault, or an action of a person at the bench.
 
-use super::faults::{FaultError, ScheduledFault};
+use super::faults::{FaultError, ScheduledFault, kinds};
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 use thiserror::Error;
@@ -14,9 +14,12 @@ pub enum EmulatorOrder {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum OrderError {
     /// Neither a fault nor an action.
-    #[error("{0}; or one of: load GRAMS, mount NUMBER, unmount")]
+    #[error(
+        "'{text}' is not an order; give one of: load GRAMS, mount NUMBER, unmount, KIND or KIND:DURATION, where KIND is one of {kinds}",
+        text = .0.text(), kinds = kinds()
+    )]
     Unknown(FaultError),
-    #[error("'{order}' is not a valid order; give {right}")]
+    #[error("'{order}' is not a valid order; write {right}")]
     Number { order: String, right: &'static str },
 }
 
@@ -31,7 +34,7 @@ impl EmulatorOrder {
                 let mass_g: f64 = rest.parse().unwrap_or(f64::NAN);
                 // A tonne is beyond every load cell.
                 if !(0.0..=1e6).contains(&mass_g) {
-                    return Err(wrong("load and a mass in g, 0 for a free cell"));
+                    return Err(wrong("load and a mass in g, which is 0 for a free load cell"));
                 }
                 Ok(Self::Hand(HandAction::LoadCell { mass_g }))
             }

@@ -134,7 +134,7 @@ pub fn set_up(
             pace,
             plan: None,
             words: "samples polled".to_owned(),
-            measured: format!("samples polled at up to {rate:.0} a second{why}"),
+            measured: format!("samples are polled at up to {rate:.0} a second{why}"),
         }
     };
     // A recording that an earlier program has left running takes the controller's time.
@@ -149,7 +149,7 @@ pub fn set_up(
     });
     let Some((n, (pace, age))) = chosen else {
         if settings.sampling == Sampling::Record {
-            return Err(no_recording("the link is too slow for it"));
+            return Err(no_recording("the link is too slow"));
         }
         return Ok(polled(
             ", because recorded samples would be too old when they arrive over this link",
@@ -208,7 +208,7 @@ fn start_recording(
         }
     }
     let Some(ring) = ring else {
-        return Err(no_recording("it has no room for arrays"));
+        return Err(no_recording("it has no memory left for the arrays of samples"));
     };
     let (a, input) = (settings.axis, INPUTS[usize::from(settings.input - 1) % 8]);
     let arrays = ARRAYS.map(|name| format!("{name}[]")).join(",");
@@ -243,7 +243,7 @@ fn anchor(
         }
         let reply = console.ask(&question)?;
         let Some(status) = reply.numbers().as_deref().and_then(RecordingStatus::read) else {
-            return Err(no_recording("its answers do not have the expected numbers"));
+            return Err(no_recording("its answers do not contain the expected numbers"));
         };
         count += 1;
         if rough.is_none() && status.next == 0 {
@@ -254,7 +254,7 @@ fn anchor(
         let half = ring / 2;
         let off = (status.next - 1 - linear + half).rem_euclid(ring) - half;
         if off.abs() > 2 {
-            return Err(no_recording("it does not record at the interval that was set"));
+            return Err(no_recording("it does not record at the set interval"));
         }
         let newest = linear + off;
         let base = status.time - newest * interval;

@@ -163,7 +163,10 @@ fn silence_controller(
             console.ask("AB 1")?;
         }
         if console.now().since(start) > Nanos::from_millis(6_000) {
-            return Err(GalilOpenError::set_otherwise("AB 1", format!("axis {a} still moving")));
+            return Err(GalilOpenError::set_otherwise(
+                "AB 1",
+                format!("that axis {a} still moves"),
+            ));
         }
     }
     Ok(())

@@ -20,23 +20,27 @@ impl GalilError {
         };
         match ErrorCode(code) {
             E::UNRECOGNIZED | E::PROGRAM_ONLY | E::NOT_IN_PROGRAM => {
-                "this firmware does not know the command; update it or choose another controller"
+                "this firmware does not know the command; update the firmware or use another controller"
             }
             E::OPERAND | E::FEW_FIELDS => "check the axis letter in the rig file",
-            E::BUFFER_FULL => "the line is slower than the commands; check the baud rate",
+            E::BUFFER_FULL => "the link is too slow for the commands; check the baud rate",
             E::OUT_OF_RANGE => {
-                "a setting of the rig file is beyond what this controller makes; lower it"
+                "a setting in the rig file is beyond the range of this controller; lower the setting"
             }
             E::RUNNING | E::NOT_RUNNING | E::BEGIN_RUNNING | ErrorCode(29) => {
                 "wait until the axis rests"
             }
-            ErrorCode(14 | 15) => "the controller's memory has failed; have it serviced",
+            ErrorCode(14 | 15) => {
+                "the controller's memory has failed; have the controller serviced"
+            }
             E::PROGRAM_RUNNING | E::STRAND_BUSY => {
                 "a program is running on the controller; stop it with HX"
             }
             E::CONTOURING => "end the contour mode with ST",
             E::MOTOR_OFF => "the motor is off; energise it and check the amplifier",
-            E::LIMIT_SWITCH => "a limit switch is closed; move the other way and check the switch",
+            E::LIMIT_SWITCH => {
+                "a limit switch is closed; move the axis the other way and check the switch"
+            }
             E::ARRAY_SPACE | E::TOO_MANY_NAMES => {
                 "free the controller's arrays and variables (DA*[],*)"
             }
@@ -49,7 +53,7 @@ impl GalilError {
             }
             ErrorCode(134 | 135) => "switch the motor off first (MO)",
             ErrorCode(136..=138) => "the controller is locked; enter its password",
-            E::NOT_SUPPORTED => "this model does not have the feature",
+            E::NOT_SUPPORTED => "this model does not have the feature; use another model",
             _ => "",
         }
     }

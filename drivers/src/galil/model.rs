@@ -22,7 +22,7 @@ impl GalilBoard {
             |why: &'static str| GalilOpenError::Unsupported { revision: revision.to_owned(), why };
         let Some(model) = revision.strip_prefix("DMC") else {
             return Err(if revision.starts_with("RIO") {
-                unsupported("it has inputs and outputs and drives no axis")
+                unsupported("it has only inputs and outputs and drives no axis")
             } else {
                 GalilOpenError::NoGalil { got: revision.to_owned() }
             });
@@ -34,15 +34,17 @@ impl GalilBoard {
             [3, 0, 0, 1, 0] => 1,
             [1, 8, ..] | [1, 7, ..] => {
                 return Err(unsupported(
-                    "it is a card on a computer's bus, which palpate does not drive",
+                    "it is a card on a computer's bus, and palpate drives no cards",
                 ));
             }
             _ => {
-                return Err(unsupported("palpate drives the series 21x3, 41x3, 40x0 and 30010"));
+                return Err(unsupported(
+                    "palpate drives only the series 21x3, 41x3, 40x0 and 30010",
+                ));
             }
         };
         if !(1..=8).contains(&axes) {
-            return Err(unsupported("its name has no number of axes from 1 to 8"));
+            return Err(unsupported("its name does not give a number of axes from 1 to 8"));
         }
         Ok(Self { revision: revision.to_owned(), axes, serial_number: None })
     }
@@ -64,7 +66,7 @@ pub enum GalilOpenError {
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
     Lost { detail: String },
     #[error(
-        "no Galil controller answers; check its power, the cable and the baud rate of its jumpers"
+        "no Galil controller answers; check its power, the cable and the baud rate that its jumpers set"
     )]
     Silent,
     #[error(
@@ -74,14 +76,14 @@ pub enum GalilOpenError {
     #[error("{revision} cannot be used: {why}")]
     Unsupported { revision: String, why: &'static str },
     #[error(
-        "the controller has serial number {found}, the rig file says {expected}; check the cables and the serial_number of the rig file"
+        "the controller has serial number {found}, but the rig file expects {expected}; check the cables and the serial_number in the rig file"
     )]
     OtherSerial {
         found: String,
         /// The rig file's.
         expected: u64,
     },
-    #[error("{revision} has {axes} axes and no axis {axis}; correct the axis of the rig file")]
+    #[error("{revision} has {axes} axes and no axis {axis}; correct the axis in the rig file")]
     NoAxis {
         revision: String,
         axes: usize,
@@ -90,11 +92,11 @@ pub enum GalilOpenError {
     },
     #[error("the controller refuses {command} ({error})")]
     Refused { command: String, error: GalilError },
-    #[error("the controller reads back {found} after {command}; correct the rig file")]
+    #[error("the controller reports {found} after {command}; correct the rig file")]
     SetOtherwise { command: String, found: String },
     /// The rig file asks for a recording that there cannot be.
     #[error(
-        "this controller cannot record samples ({0}); remove sampling from the rig file or set it to \"auto\""
+        "this controller cannot record samples ({0}); remove the key sampling from the rig file or set the key to \"auto\""
     )]
     NoRecording(String),
 }

@@ -74,7 +74,7 @@ impl GalilOrder {
                     (settings.counts(wanted.speed.0), settings.counts(wanted.acceleration.0));
                 if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
                     return OrderStep::Refused(format!(
-                        "a speed of {} is above the {} of the rig file",
+                        "a speed of {} is not between one pulse a second and the maximum of the rig file, {}",
                         wanted.speed, settings.speed_max
                     ));
                 }
@@ -136,7 +136,7 @@ impl GalilOrder {
                 let target = parse_register(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
                     return OrderStep::Refused(format!(
-                        "it reads back another target than {} pulses",
+                        "the controller reports a target other than {} pulses",
                         wanted.target_pulses
                     ));
                 }
@@ -145,8 +145,7 @@ impl GalilOrder {
                 let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
                     return OrderStep::Refused(format!(
-                        "the controller reads back speed {speed}, acceleration {ac} and deceleration {dc} where \
-                         {speed_asked} and {ac_asked} were set, in counts"
+                        "the controller reports speed {speed}, acceleration {ac} and deceleration {dc} in counts, after speed {speed_asked} and acceleration {ac_asked} were set"
                     ));
                 }
                 let made = MoveTo {
@@ -162,7 +161,7 @@ impl GalilOrder {
                     != (Some(wanted.0), Some(wanted.1))
                 {
                     return OrderStep::Refused(format!(
-                        "it reads back software limits {forward} and {reverse} after {} and {} were set",
+                        "the controller reports software limits {forward} and {reverse} after {} and {} were set",
                         wanted.0, wanted.1
                     ));
                 }
@@ -173,7 +172,7 @@ impl GalilOrder {
                 let ac_asked = settings.counts(wanted.acceleration.0) as f64;
                 if ac != dc || ac <= 0.0 || ac > ac_asked {
                     return OrderStep::Refused(format!(
-                        "it reads back acceleration {ac} and deceleration {dc} in counts after {ac_asked} was set"
+                        "the controller reports acceleration {ac} and deceleration {dc} in counts, after {ac_asked} was set for both"
                     ));
                 }
                 let made =
@@ -182,7 +181,9 @@ impl GalilOrder {
                 (RigCommand::Oscillate(made), feed.begin())
             }
             _ => {
-                return OrderStep::Refused("its answer does not have the expected numbers".into());
+                return OrderStep::Refused(
+                    "the controller's answer does not contain the expected numbers".into(),
+                );
             }
         };
         self.stage = Stage::Doing(made);

@@ -8,14 +8,16 @@ use thiserror::Error;
 pub enum GrblOpenError {
     #[error("the link was lost while the board was set up ({detail}); check the cable")]
     Lost { detail: String },
-    #[error("no Grbl board answers; check power, port and baud rate (115200 is Grbl's)")]
+    #[error(
+        "no Grbl board answers; check the power, the port and the baud rate (Grbl's default is 115200)"
+    )]
     Silent,
     #[error("the device is not a Grbl board: it answers '{found}'; check the port in the rig file")]
     NotGrbl { found: String },
     #[error("the board runs Grbl {version}, which cannot be driven safely; load Grbl 1.1")]
     OtherVersion { version: String },
     #[error(
-        "the board is called '{found}', the rig file says '{expected}'; check the cables and the build_info of the rig file"
+        "the board is called '{found}', but the rig file expects '{expected}'; check the cables and the build_info in the rig file"
     )]
     OtherBoard {
         /// Its text of `$I=`.
@@ -28,11 +30,11 @@ pub enum GrblOpenError {
     )]
     Locked { reason: String },
     /// It is in a state in which nothing can be done.
-    #[error("the board is in state {0}; reset it and open the rig again")]
+    #[error("the board is in state {0}; reset the board and open the rig again")]
     State(String),
     /// A limit switch is closed that Grbl itself watches.
     #[error(
-        "the limit pin of axis {axis} is closed, and the board locks itself again as soon as it opens; move the slide off the switch by hand, then open the rig again"
+        "the limit pin of axis {axis} is closed, and the board locks itself again as soon as the pin opens; move the slide off the switch by hand, then open the rig again"
     )]
     OnALimit { axis: char },
     #[error(
@@ -46,7 +48,7 @@ pub enum GrblOpenError {
     TooFine { number: u16, found: f64 },
     /// It is not known at which end the axis stands.
     #[error(
-        "the limit pin of axis {axis} is closed, and home and the far limit share it; move the slide off the switch by hand, or set closed_is_home = true in the rig file if only home can have closed it"
+        "the home switch and the far limit switch share the limit pin of axis {axis}, which is closed; move the slide off the switch by hand, or set closed_is_home = true in the rig file if only the home switch can have closed the pin"
     )]
     OnASwitch { axis: char },
     #[error("the board refuses {line} ({detail})")]
@@ -81,11 +83,11 @@ impl GrblCode {
     fn remedy(&self) -> &'static str {
         match (self.is_alarm, self.code) {
             (true, Some(1)) => {
-                "a limit switch has closed and the axis was stopped at once; free it by hand, then open the rig again and home it"
+                "a limit switch has closed, so the axis was stopped at once; move the axis off the switch by hand, then open the rig again and home the axis"
             }
             (true, Some(2)) => "the target was outside the travel of the board; open the rig again",
             (true, Some(3)) => {
-                "the board was reset in motion and its position is lost; open the rig again and home it"
+                "the board was reset in motion, so the position is lost; open the rig again and home the axis"
             }
             (true, Some(4 | 5)) => "a probe cycle has failed; check the wiring of the probe",
             (true, Some(6..=9)) => {
@@ -103,11 +105,13 @@ impl GrblCode {
                 "the board's homing is off; set $22=1 or let palpate search for home"
             }
             (false, Some(7)) => {
-                "the board could not read its memory and has factory settings now; set them again and open the rig"
+                "the board could not read its memory and now has the factory settings; enter your settings and open the rig again"
             }
-            (false, Some(8)) => "the board is not at rest; wait",
+            (false, Some(8)) => "the board is not at rest; wait until the axis is at rest",
             (false, Some(10)) => "soft limits need homing ($22=1)",
-            (false, Some(12)) => "the board makes fewer steps a second; lower the speed",
+            (false, Some(12)) => {
+                "the speed needs more steps a second than the board makes; lower the speed"
+            }
             (false, Some(13)) => "the safety door is open; close it",
             (false, Some(15)) => {
                 "the target is outside the axis travel set in the board ($130 to $132); home the axis or correct these settings"

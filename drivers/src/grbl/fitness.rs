@@ -51,13 +51,13 @@ pub(super) fn check_settings(
     let checks = [
         (
             100 + axis,
-            "steps per mm, 1 / mm_per_pulse",
+            "steps per mm, which is 1 / mm_per_pulse",
             format!("{scale:.3}"),
             is_near(steps_per_mm, scale, 2e-4),
         ),
         (
             110 + axis,
-            "fastest rate in mm/min, speed_max_mm_s times 60 or more",
+            "fastest rate in mm/min, at least 60 times speed_max_mm_s",
             format!("{fastest:.3}"),
             has(110 + axis) >= fastest * (1.0 - 1e-4),
         ),
@@ -69,27 +69,27 @@ pub(super) fn check_settings(
         ),
         (
             1,
-            "ms until the motor is switched off at rest; 255 leaves it on",
+            "time in ms until a motor at rest is switched off; 255 keeps the motor on",
             "255".into(),
             has(1) == 255.0,
         ),
         (13, "reports in inches", "0".into(), has(13) == 0.0),
         (
             21,
-            "hard limits; on with a home switch on the probe pin, off with one on the limit pin",
+            "hard limits; on for a home switch on the probe pin, off for a home switch on the limit pin",
             hard_limits.to_string(),
             has(21) == hard_limits,
         ),
         // Bit 0 of `$10`: machine position rather than work position.
         (
             10,
-            "status reports; the machine position must be in them",
+            "status reports, which must contain the machine position",
             "1".into(),
             has(10) as i64 & 1 == 1,
         ),
         (
             130 + axis,
-            "travel in mm, travel_mm or more",
+            "travel in mm, at least travel_mm",
             format!("{travel:.3}"),
             !has_soft_limits || has(130 + axis) >= travel,
         ),

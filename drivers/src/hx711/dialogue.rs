@@ -61,7 +61,7 @@ impl Hx711LineReader {
     fn check(&mut self, header: Header) {
         if header.board != self.header.board || header.gain != self.header.gain {
             self.other = Some(format!(
-                "another HX711 board answers: {} with gain {} instead of {} with gain {}",
+                "another HX711 board answers: '{}' with gain {} instead of '{}' with gain {}; check the cables and open the rig again",
                 header.board, header.gain, self.header.board, self.header.gain
             ));
         }

@@ -139,7 +139,7 @@ fn mistakes_in_the_rig_file_are_reported() {
     assert!(found("full_scale = 1\n").contains("cell.unit"));
     assert!(found("unit = \"N\"\n").contains("cell.full_scale"));
     let volts = found("unit = \"N\"\nfull_scale = 25\nfull_scale_v = 5\n");
-    assert!(volts.contains("counts only"), "{volts}");
+    assert!(volts.contains("needs unit"), "{volts}");
     assert!(found("unit = \"N\"\nfull_scale = 25\ntime_column = \"s\"\n").contains("\"us\""));
 }
 

@@ -23,7 +23,7 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<DeviceAdd
             if baud.is_some() {
                 fields.mistake(
                     &key("baud"),
-                    "a controller on a network has no baud rate; remove this",
+                    "a controller on a network has no baud rate; remove this key",
                 );
             }
             Some(DeviceAddress::Tcp(address))
@@ -31,7 +31,7 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<DeviceAdd
         (Some(_), Some(_)) => {
             fields.mistake(
                 &key("address"),
-                "a device is at a port or at an address, not at both; remove one of them",
+                "a device has either a port or an address, not both; remove one of the two keys",
             );
             None
         }

@@ -168,7 +168,7 @@ impl Fields {
 
     pub fn required_number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         if !self.all.iter().any(|field| field.key == key) {
-            self.mistake(key, "is missing; add it to the file");
+            self.mistake(key, "this key is missing; add it to the file");
             return None;
         }
         self.number(key, least, most)

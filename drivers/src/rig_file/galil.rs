@@ -46,7 +46,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, 
         let least = 1024.0 * mm_per_pulse;
         fields.mistake(
             "acceleration_mm_s2",
-            &format!("give at least {least:.4} mm/s2, the least that the controller makes with such pulses"),
+            &format!("give at least {least:.4} mm/s2, the lowest acceleration of the controller for this mm_per_pulse"),
         );
     }
     let range = range?;

@@ -14,7 +14,7 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (axis, cell) = (axis?, cell?);
     if axis.0 == cell.0 {
         fields
-            .mistake("cell.port", "the board is at this port; give another port for the load cell");
+            .mistake("cell.port", "the board uses this port; give another port for the load cell");
         return None;
     }
     let places = vec![axis.0.clone(), cell.0.clone()];
@@ -30,7 +30,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, 
     if mm_per_pulse.is_some_and(|mm| mm < MM_PER_STEP_MIN) {
         fields.mistake(
             "mm_per_pulse",
-            "Grbl reports positions in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
+            "Grbl reports positions in thousandths of a mm, so a step must be at least 0.001 mm; set the drive to coarser microsteps",
         );
     }
     let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
@@ -44,7 +44,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, 
     if is_closed_home.is_some() && home == Some(HomeSwitch::Probe) {
         fields.mistake(
             "closed_is_home",
-            "a home switch on the probe pin needs no such key; remove this",
+            "a home switch on the probe pin does not use this key; remove the key",
         );
     }
     let build_info = fields.text("build_info");

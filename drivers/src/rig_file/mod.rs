@@ -46,7 +46,7 @@ impl RigFile {
         let error = |mistakes| RigFileError { file: file.to_owned(), mistakes };
         if text.len() > BYTES_MAX {
             let message = format!(
-                "the file has more than {BYTES_MAX} bytes, which is no rig file; check its path"
+                "the file has more than {BYTES_MAX} bytes, so it is not a rig file; check its path"
             );
             return Err(error(vec![Mistake { line: 0, message }]));
         }

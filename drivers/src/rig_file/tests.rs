@@ -100,7 +100,7 @@ fn every_mistake_is_reported_with_its_line() {
 #[test]
 fn keys_that_exclude_each_other_are_mistakes() {
     let both = format!("{THESIS}address = \"10.0.0.5:23\"\n");
-    assert!(mistakes(&both)[0].1.contains("not at both"));
+    assert!(mistakes(&both)[0].1.contains("not both"));
     let nowhere = THESIS.replace("port = \"/dev/ttyUSB0\"\n", "");
     assert!(mistakes(&nowhere)[0].1.contains("controller"));
     let slow = THESIS.replace("61.44", "5");
@@ -112,7 +112,7 @@ fn keys_that_exclude_each_other_are_mistakes() {
 #[test]
 fn a_text_that_is_no_rig_file_is_a_mistake() {
     assert_eq!(mistakes("device = \"galil")[0].0, 1);
-    assert!(mistakes(&"#".repeat(BYTES_MAX + 1))[0].1.contains("no rig file"));
+    assert!(mistakes(&"#".repeat(BYTES_MAX + 1))[0].1.contains("not a rig file"));
     assert_eq!(mistakes("").len(), 1);
     assert!(mistakes("device = \"galil\"").len() > 3);
     assert!(mistakes(&THESIS.replace("150", "inf"))[0].1.contains("travel_mm"));
@@ -151,7 +151,7 @@ fn mistakes_of_controller_and_cell_are_reported_together() {
     let found = mistakes(&text);
     let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
     assert_eq!(lines, [0, 7, 12, 13], "{found:?}");
-    assert!(found[0].1.contains("cell.capacity_n: is missing"));
+    assert!(found[0].1.contains("cell.capacity_n: this key is missing"));
     assert!(found[2].1.contains("'cell.board' means nothing"));
     let one = PARTS.replace("ttyACM1", "ttyACM0");
     assert!(mistakes(&one)[0].1.contains("another"));

@@ -8,10 +8,10 @@ use thiserror::Error;
 pub enum DeviceError {
     #[error("the {device} does not answer; {hint}")]
     Silent { device: &'static str, hint: &'static str },
-    #[error("the device is {found}, not a {device}; check the cables")]
+    #[error("the device is {found}, not the expected {device}; check the cables")]
     Other { device: &'static str, found: String },
     #[error(
-        "the {device} has serial number {found}, the rig file says {expected}; check the cables, or correct the file"
+        "the {device} has serial number {found}, but the rig file expects {expected}; check the cables, or correct the rig file"
     )]
     OtherSerial { device: &'static str, found: String, expected: String },
     /// It cannot do what is needed, or is not set up for it.

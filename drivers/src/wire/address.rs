@@ -31,12 +31,12 @@ impl fmt::Display for DeviceAddress {
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum WireError {
-    #[error("there is no serial port {port}; this computer has {present}")]
+    #[error("the serial port {port} does not exist; this computer has {present}")]
     Missing { port: String, present: String },
     #[error("the serial port {port} is in use by another program; close that program first")]
     Busy { port: String },
     #[error(
-        "this account may not open {port}; add it to the group that owns the port (on Linux mostly `sudo usermod -aG dialout $USER`) and log in again"
+        "this account may not open {port}; add the account to the group that owns the port (on Linux usually `sudo usermod -aG dialout $USER`) and log in again"
     )]
     Forbidden { port: String },
     #[error("the serial port {port} cannot be opened ({detail}); check cable and settings")]

@@ -9,8 +9,8 @@ use std::collections::VecDeque;
 pub(crate) const ORDERS_MAX: usize = 64;
 /// Without samples being taken for so long, palpate hangs and the axis is stopped.
 pub(crate) const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-pub(crate) const OVERTAKEN: &str = "a stop came first, so it was not begun";
-pub(crate) const TOO_MANY_COMMANDS: &str = "too many commands at once";
+pub(crate) const OVERTAKEN: &str = "a stop came first, so the command was not begun";
+pub(crate) const TOO_MANY_COMMANDS: &str = "too many commands are waiting";
 
 /// Statistics of a link, for the operator and the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

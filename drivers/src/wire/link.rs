@@ -23,7 +23,7 @@ pub trait Link: Send {
 pub const WRITE_MAX: Duration = Duration::from_millis(250);
 
 fn hung_up_error() -> io::Error {
-    io::Error::new(ErrorKind::UnexpectedEof, "the device has hung up")
+    io::Error::new(ErrorKind::UnexpectedEof, "the device has disconnected")
 }
 
 pub struct SerialLink(pub Box<dyn SerialPort>);

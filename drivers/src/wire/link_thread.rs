@@ -240,9 +240,9 @@ fn describe_error(err: &io::Error) -> String {
         io::ErrorKind::BrokenPipe
         | io::ErrorKind::UnexpectedEof
         | io::ErrorKind::ConnectionReset => {
-            "the device has hung up; check its plug and power".into()
+            "the device has disconnected; check its plug and power".into()
         }
-        io::ErrorKind::TimedOut => "the device takes no bytes; check its cable".into(),
+        io::ErrorKind::TimedOut => "the device accepts no data; check its cable".into(),
         _ => err.to_string(),
     }
 }

@@ -37,7 +37,7 @@ impl FaultLog {
             Some(one) => {
                 match std::mem::take(&mut one.since) {
                     0 => warn!("{fault}"),
-                    more => warn!("{fault}; {more} more of its kind since the last line"),
+                    more => warn!("{fault}; {more} more faults of this kind since the last line"),
                 }
                 one.logged = now;
             }

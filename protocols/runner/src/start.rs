@@ -127,7 +127,7 @@ fn manifest(
     started_at: SystemTime,
 ) -> Result<Manifest, StartError> {
     let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
-        value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
+        value.map_err(|err| StartError::Failed(format!("the {what} cannot be recorded ({err})")))
     };
     let mut acknowledgements = Vec::new();
     if request.is_acknowledged {

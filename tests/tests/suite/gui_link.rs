@@ -37,7 +37,7 @@ impl Rig for Unplugged {
         if std::mem::replace(&mut self.is_reported, true) {
             return None;
         }
-        let fault = Fault::LinkLost { detail: "the device has hung up".into() };
+        let fault = Fault::LinkLost { detail: "the device has disconnected".into() };
         Some(RigEvent::new(until, RigEventBody::Fault(fault)))
     }
 
@@ -67,7 +67,7 @@ fn a_lost_link_is_reported_and_reconnected_by_a_button() {
     flow.wait("the loss", |window| window.state().snapshot().rig.link_error.is_some());
     flow.window.step();
     assert!(flow.says("State: LINK LOST"));
-    assert!(flow.says("the device has hung up"));
+    assert!(flow.says("the device has disconnected"));
     assert!(!flow.is_enabled("Start  F5"));
     // The first try fails, and says so.
     flow.click("Connect again");

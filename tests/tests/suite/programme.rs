@@ -162,7 +162,7 @@ fn another_or_a_changed_programme_is_refused() {
     carry_out(JOGS, folder.path()).unwrap();
     let changed = JOGS.replace("repeats = 3", "repeats = 4");
     let refusal = carry_out(&changed, folder.path()).unwrap_err().to_string();
-    assert!(refusal.contains("was changed since"), "{refusal}");
+    assert!(refusal.contains("was changed after"), "{refusal}");
     let other = JOGS.replace("name = \"jogs\"", "name = \"other\"");
     let refusal = carry_out(&other, folder.path()).unwrap_err().to_string();
     assert!(refusal.contains("'jogs'"), "{refusal}");

@@ -204,7 +204,7 @@ fn refusal_has_a_remedy() {
     })
     .unwrap();
     assert_eq!(err.code, 22);
-    assert!(err.to_string().contains("move the other way"), "{err}");
+    assert!(err.to_string().contains("move the axis the other way"), "{err}");
     let number = parse_error(&GalilReply { is_accepted: true, bytes: b" 6".to_vec() });
     assert_eq!(number.map(|err| err.code), Some(6));
     assert_eq!(parse_error(&GalilReply { is_accepted: true, bytes: b"what".to_vec() }), None);

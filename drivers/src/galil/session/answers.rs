@@ -74,7 +74,7 @@ impl GalilSession {
             0..REFUSALS_MAX => self.send_urgent(stop.command, again),
             REFUSALS_MAX => self.send_urgent(RigCommand::Halt, again),
             _ => {
-                let detail = format!("it refuses {:?}", stop.command);
+                let detail = format!("the controller refuses {:?}", stop.command);
                 match stop.number {
                     Some(number) => self.refuse(now, number, detail),
                     None => self.report_in_order(now, RigEventBody::refusal(detail)),

@@ -44,7 +44,8 @@ impl GalilSession {
         self.is_motion_begun = false;
         if let Some((number, _)) = self.order.take() {
             // It may or may not be under way: to be safe, it is not.
-            let why = "its answer was garbled, so the axis was stopped; check the cable";
+            let why =
+                "the controller's answer was garbled, so the axis was stopped; check the cable";
             self.refuse(now, number, why);
             self.send_urgent(RigCommand::Stop, ExpectedReply::Stop(PendingStop::QUIET));
         }
@@ -52,7 +53,7 @@ impl GalilSession {
             recording.abandon_fetch();
         }
         if self.sine.take().is_some() {
-            self.end_sine(now, "answers were garbled; check the cable");
+            self.end_sine(now, "the controller's answers were garbled; check the cable");
         }
         self.resync = Some(Resynchronisation { last_byte: now, marker_at: None, markers: 0 });
     }

@@ -152,7 +152,10 @@ impl GalilSession {
         }
         if self.sine.as_ref().is_some_and(|sine| sine.is_dry(now)) {
             self.sine = None;
-            self.end_sine(now, "this computer did not send it in time; close other programs");
+            self.end_sine(
+                now,
+                "this computer did not send the next part in time; close other programs",
+            );
             return self.urgent.pop_front();
         }
         if let Some(commands) = self.sine.as_mut().and_then(|sine| sine.take(now)) {

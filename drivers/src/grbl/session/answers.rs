@@ -48,7 +48,8 @@ impl GrblSession {
             self.motion = None;
             self.refuse(now, number, refusal.to_string());
         } else if motion.cancelled.is_none() {
-            let why = format!("a part of a motion was refused, so the axis is stopped: {refusal}");
+            let why =
+                format!("the board refused a part of a motion, so the axis is stopped: {refusal}");
             self.end(now, &why);
         }
     }
@@ -123,7 +124,7 @@ impl GrblSession {
             GrblState::Alarm => self.lock_and_report(now, LOCKED),
             other => {
                 let why = format!(
-                    "the board is in state {other:?}, which palpate never commands; press reset and open the rig again"
+                    "the board is in state {other:?}, which palpate never commands; reset the board and open the rig again"
                 );
                 self.lock_and_report(now, &why);
             }
@@ -147,14 +148,15 @@ impl GrblSession {
             Some(true) if is_far => {
                 // For a motion under way the samples show it.
                 if let Some(number) = self.take_unacknowledged() {
-                    self.refuse(now, number, "the far limit switch is closed");
+                    let why = "the far limit switch is closed; move the axis the other way";
+                    self.refuse(now, number, why);
                 }
                 self.cancel(now);
             }
             // Whichever end it is.
             Some(false) if is_closing => self.end(
                 now,
-                "a limit switch closed during homing where none was expected, so the axis is stopped; check the switch",
+                "a limit switch closed unexpectedly during homing, so the axis is stopped; check the switch",
             ),
             _ => {}
         }
@@ -173,7 +175,9 @@ impl GrblSession {
                 self.track().begin_rest(now, here);
                 self.fault(
                     now,
-                    format!("the axis has moved by {by} pulses by itself; home it again"),
+                    format!(
+                        "the axis has moved by {by} pulses without a command; home the axis again"
+                    ),
                 );
             }
             return;
@@ -195,10 +199,10 @@ impl GrblSession {
             }
             (None, Some(started)) if queried_at > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
-                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or repair the link");
+                    self.fault(now, "the link is too slow to keep the axis moving, so the axis has stopped; lower the speed or repair the link");
                 } else if steps != motion.to {
                     let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
-                    self.fault(now, format!("the axis ended at {there} of its own pulses instead of {wanted}; home it again"));
+                    self.fault(now, format!("the axis stopped at pulse {there} by the board's count instead of pulse {wanted}; home the axis again"));
                 }
             }
             _ => return,
@@ -226,7 +230,7 @@ impl GrblSession {
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
-            self.fault(now, format!("the axis is at {here:.0} of its own pulses instead of {late:.0}, so it is stopped; check the cable and home it"));
+            self.fault(now, format!("the axis is at pulse {here:.0} by the board's count instead of pulse {late:.0}, so it is stopped; check the cable and home the axis"));
             return self.cancel(now);
         }
         let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);

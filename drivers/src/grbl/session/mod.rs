@@ -146,9 +146,11 @@ impl GrblSession {
                 self.acknowledge(now, number, command);
             }
             RigCommand::MoveTo(wanted) => self.begin_move(now, number, wanted),
-            RigCommand::Oscillate(_) => {
-                self.refuse(now, number, "Grbl makes no sines; choose a protocol of ramps")
-            }
+            RigCommand::Oscillate(_) => self.refuse(
+                now,
+                number,
+                "Grbl cannot follow a sine; choose a protocol with ramps only",
+            ),
             RigCommand::Stop | RigCommand::Halt => self.stop(now, command),
         }
     }
@@ -164,17 +166,19 @@ impl GrblSession {
         if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || feed < FEED_MIN {
             let (speed, least, most) = (wanted.speed, FEED_MIN / 60.0, settings.speed_max);
             return Err(format!(
-                "a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"
+                "a speed of {speed} is not between Grbl's minimum, {least:.4} mm/s, and the maximum of the rig file, {most}"
             ));
         }
         if (wanted.acceleration.0 / settings.acceleration.0 - 1.0).abs() > 1e-6 {
             let (wanted, own) = (wanted.acceleration, settings.acceleration);
-            return Err(format!("an acceleration of {wanted} differs from the {own} of the board"));
+            return Err(format!(
+                "an acceleration of {wanted} differs from the board's acceleration of {own}"
+            ));
         }
         let to = settings.sign() * (wanted.target_pulses + self.zero);
         // Grbl reads eight digits of a number.
         if (to as f64 / self.facts.steps_per_mm).abs() > 9_999.0 {
-            return Err("the target is more than ten metres away".into());
+            return Err("the target is more than ten metres from the board's zero".into());
         }
         Ok((to, feed))
     }

@@ -13,7 +13,7 @@ use palpate_model::units::Newtons;
 const RANGE: f64 = 1.1;
 
 pub(crate) const BEYOND_RANGE: &str =
-    "the force is beyond the gauge's range; take the load off before it is damaged";
+    "the force is beyond the gauge's range; take the load off before the gauge is damaged";
 
 /// Conversion of readings to counts.
 #[derive(Clone, Copy, Debug, PartialEq)]

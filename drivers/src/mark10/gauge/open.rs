@@ -34,13 +34,16 @@ impl CellDevice for GaugeSettings {
         silence_gauge(&mut console)?;
         let model = identify(&mut console, self)?;
         let set = set_up(&mut console, self, as_line)?;
-        let set = set.ok_or_else(|| unfit("it no longer answers LIST"))?;
+        let set =
+            set.ok_or_else(|| unfit("it no longer answers the command LIST; check its cable"))?;
         console.write("?C\r")?;
         let like = console.find(ANSWER_MAX, |line| match GaugeLine::parse(line) {
             GaugeLine::Reading(reading) => Some(reading),
             _ => None,
         })?;
-        let like = like.ok_or_else(|| unfit("it does not answer ?C with a reading"))?;
+        let like = like.ok_or_else(|| {
+            unfit("it does not answer the command ?C with a reading; check its cable")
+        })?;
         let scale = GaugeScale::new(like, self.capacity);
         console.write(&format!("AOUT{}\r", self.per_second))?;
         let rate = measure(&mut console, scale, self.per_second)?;
@@ -71,15 +74,17 @@ pub(crate) fn check(settings: &GaugeSettings) -> Result<(), DeviceError> {
     if !RATES.contains(&settings.per_second) {
         let rates = RATES.map(|rate| rate.to_string()).join(", ");
         return Err(unfit(format!(
-            "it does not send {} readings a second; choose one of {rates}",
+            "it cannot send {} readings a second; choose one of {rates}",
             settings.per_second
         )));
     }
     if settings.filter.is_some_and(|n| n > FILTER_MAX) {
-        return Err(unfit(format!("its filter goes from 0 to {FILTER_MAX}: 2^n samples")));
+        return Err(unfit(format!(
+            "its filter must be from 0 to {FILTER_MAX}; a filter n averages 2^n samples"
+        )));
     }
     if !(settings.capacity.0 > 0.0 && settings.capacity.0 < 1e6) {
-        return Err(unfit("its capacity must be above 0 N, as on its label"));
+        return Err(unfit("its capacity must be above 0 N; give the capacity on its label"));
     }
     Ok(())
 }
@@ -99,15 +104,15 @@ fn silence_gauge(console: &mut TextConsole<'_>) -> Result<(), DeviceError> {
     let lines: Vec<GaugeLine> = received.lines().map(GaugeLine::parse).collect();
     Err(if lines.iter().any(|line| matches!(line, GaugeLine::Error)) {
         unfit(
-            "it refuses LIST, as gauges of Series 4 do, which send single readings only; use one of Series 5, 7 or 7i",
+            "it refuses the command LIST, like a gauge of Series 4, which sends single readings only; use a gauge of Series 5, 7 or 7i",
         )
     } else if lines.iter().any(|line| matches!(line, GaugeLine::Reading(_))) {
         unfit(
-            "the gauge sends readings but does not receive commands; check its cable and whether its menu listens to USB or RS-232",
+            "the gauge sends readings but does not receive commands; check its cable and the choice of USB or RS-232 in its menu",
         )
     } else {
         console.no_answer(
-            "check that it is on, its baud rate, and whether its menu sends over USB or RS-232",
+            "check its power, its baud rate, and the choice of USB or RS-232 in its menu",
         )
     })
 }
@@ -180,7 +185,8 @@ pub(crate) fn ask_text(
 
 /// Whether a gauge has taken the settings.
 fn check_list(set: &GaugeList, settings: &GaugeSettings) -> Result<(), DeviceError> {
-    let wrong = |what: &str| unfit(format!("it does not take {what}; it answers {}", set.line));
+    let wrong =
+        |what: &str| unfit(format!("it does not accept {what}; its settings are {}", set.line));
     if let Err(unit) = &set.unit {
         return Err(unfit(format!(
             "it measures in {unit}, which is not a unit of force; choose newtons in its menu"
@@ -238,7 +244,7 @@ fn measure(
     }
     let (Some(first), Some(last)) = (times.first(), times.last()) else {
         return Err(unfit(format!(
-            "it sends no readings after AOUT{requested}; check its firmware"
+            "it sends no readings after the command AOUT{requested}; check its firmware"
         )));
     };
     let span = last.since(*first).0 as f64 * 1e-9;

@@ -92,11 +92,11 @@ fn sample(console: &mut TextConsole<'_>) -> Result<Option<(GaugeReading, i64)>, 
         }
     })?;
     if is_over {
-        return Err(unfit("its gauge is beyond its range; take the load off"));
+        return Err(unfit("the force is beyond the range of its gauge; take the load off"));
     }
     if is_inches {
         return Err(unfit(
-            "it keeps counting in inches; switch it to millimetres and PC control on",
+            "it reports travel in inches; switch it to millimetres, and switch PC control on",
         ));
     }
     Ok(found)
@@ -113,7 +113,7 @@ fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
         );
     }
     console.no_answer(
-        "check that it is on, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
+        "check its power, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
     )
 }
 
@@ -123,7 +123,7 @@ fn set_up_gauge(
     settings: &StandSettings,
 ) -> Result<(GaugeList, String), DeviceError> {
     let list = gauge::set_up(console, &settings.gauge, to_gauge)?.ok_or_else(|| {
-        unfit("its gauge does not answer LIST; it must be of Series 5 or 7, at 115200 baud over RS-232")
+        unfit("its gauge does not answer the command LIST; use a gauge of Series 5 or 7, at 115200 baud over RS-232")
     })?;
     let serial = gauge::ask_text(console, to_gauge, "RS")?;
     let expected = settings.gauge.serial_number.as_deref();
@@ -137,7 +137,7 @@ fn check_status(console: &mut TextConsole<'_>) -> Result<bool, DeviceError> {
     let status = console.find(ANSWER_MAX, StandStatus::parse)?;
     if status.is_some_and(|status| status.is_limit_mode == Some(false)) {
         return Err(unfit(
-            "it does not enter its travel limit mode; switch PC control on, cycling and auto return off",
+            "it does not enter its travel limit mode; switch PC control on, and switch cycling and auto return off",
         ));
     }
     Ok(status.is_some())
@@ -153,14 +153,14 @@ fn set_limits(
     let upper = end.max(0).max(here) + MARGIN;
     for (is_upper, limit) in [(false, lower), (true, upper)] {
         let set = set_limit(is_upper, limit)
-            .ok_or_else(|| unfit("its travel limits go to 999.99 mm; make travel_mm smaller"))?;
+            .ok_or_else(|| unfit("its travel limits cannot exceed 999.99 mm; lower travel_mm"))?;
         console.write(&format!("{set}{}", ask_limit(is_upper)))?;
         let found = console.find(ANSWER_MAX, number)?;
         let is_right = found.is_some_and(|found| (found * 100.0).round() as i64 == limit);
         if !is_right {
             let found = found.map_or_else(|| "nothing".into(), |found| found.to_string());
             return Err(unfit(&format!(
-                "after {set} it reads back {found}; switch PC control on, and check its range"
+                "it reports {found} after the command {set}; switch PC control on, and check the range of the stand"
             )));
         }
     }

@@ -78,7 +78,7 @@ fn place(one: &TargetResult) -> String {
 
 fn sentence(one: &TargetResult) -> String {
     format!(
-        "{} {:.4} {unit} instead of {:.4} {unit}, which may be off by {:.4} {unit}",
+        "{} is {:.4} {unit} instead of {:.4} {unit}, beyond the tolerance of {:.4} {unit}",
         place(one),
         one.achieved,
         one.target,

@@ -230,13 +230,13 @@ impl SceneLoop {
         let period = scene.settings().period;
         if *device.settings() != scene.settings().device {
             return Err(
-                "the scene is made for a different device than the connected one; give the scene the settings of the connected device".into(),
+                "the scene has the settings of a different device; give the scene the settings of the connected device".into(),
             );
         }
         let task = SceneTask::new(scene, device, recorder);
         let first = task.first();
         let beat = RealTimeLoop::start(task, period, first).map_err(|err| {
-            format!("the thread of the scene cannot be started ({err}); end other programs")
+            format!("the thread of the scene cannot be started ({err}); close other programs")
         })?;
         Ok(Self { beat, hand: None })
     }

@@ -245,7 +245,8 @@ fn read(fields: &mut Fields) -> SceneFile {
     let source = fields.text("tissue.source");
     let body = read_body(fields, "tissue");
     if source.is_some() && body.is_some() {
-        fields.mistake("tissue.source", "give either a source or parameters, not both");
+        fields
+            .mistake("tissue.source", "give either a source or the parameters of a body, not both");
     }
     file.body = body.unwrap_or(file.body);
     file.source = source.filter(|source| source != THESIS);
@@ -257,7 +258,10 @@ fn read(fields: &mut Fields) -> SceneFile {
     let nodes = fields.whole_number("mesh.nodes", NODES[0], NODES[1]);
     match (fields.flag("mesh.auto"), nodes) {
         (Some(true), Some(_)) => {
-            fields.mistake("mesh.auto", "a mesh has a number of nodes or auto, not both");
+            fields.mistake(
+                "mesh.auto",
+                "a mesh has either nodes or auto, not both; remove one of the two keys",
+            );
         }
         (Some(true), None) => file.nodes = None,
         (_, Some(nodes)) => file.nodes = Some(nodes as usize),

@@ -20,7 +20,7 @@ pub enum CalibrationSessionError {
     )]
     NoReadings(String),
     #[error(
-        "session {session} ended by {ending} before its plan did; a calibration must be complete, so run it again"
+        "session {session} ended by {ending} before its plan was complete; a calibration must be complete, so run the protocol again"
     )]
     Incomplete { session: String, ending: String },
     /// The readings make none.

@@ -10,7 +10,7 @@ pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]
     let plan = task.plan(1, None);
     if task.calibrates && !plan.as_ref().is_some_and(has_weighing) {
         find_contradictions.push(format!(
-            "calibrates = true needs readings under known masses, and protocol {} takes none; remove it, or use load-cell-calibration",
+            "calibrates = true needs readings under known masses, but protocol {} takes none; remove calibrates, or use the protocol load-cell-calibration",
             task.protocol.name
         ));
     }
@@ -18,13 +18,13 @@ pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]
         let fitted = before.iter().find(|one| one.name == model.task);
         if let Some(reason) = fitted.and_then(reason_unfitted) {
             find_contradictions.push(format!(
-                "validates = \"{}\" needs a task with a fitted model, and that task has none, because {reason}; name a task that is one ramp and hold",
+                "validates = \"{}\" names a task that has no fitted model, because {reason}; name a task with one ramp and hold",
                 model.task
             ));
         }
         if let Some(reason) = reason_unfitted(task) {
             find_contradictions.push(format!(
-                "validates = \"{}\" has nothing to compare, because {reason}; remove it, or use a protocol that is one ramp and hold",
+                "validates = \"{}\" has nothing to compare, because {reason}; remove validates, or use a protocol with one ramp and hold",
                 model.task
             ));
         }

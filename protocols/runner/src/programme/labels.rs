@@ -72,7 +72,7 @@ fn report_specimen(entry: &DocumentEntry, problems: &mut Problems) {
     problems.error(
         entry.line,
         format!(
-            "'{}' is not the table of a specimen; write [specimen.2] for the one that a task with specimen = 2 clips in, and labels of all specimens into [about]",
+            "'{}' is not the table of a specimen; write labels of specimen 2 into [specimen.2], and labels of all specimens into [about]",
             entry.key
         ),
     );
@@ -93,12 +93,12 @@ fn read_pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, proble
             }
             _ => {
                 let kind = entry.node.kind();
-                problems.error(entry.line, format!("{key} is {kind}; give it a text"));
+                problems.error(entry.line, format!("{key} is {kind}; give a text in quotes"));
                 continue;
             }
         };
         let checked = match found.iter().any(|(known, _)| *known == key) {
-            true => Err(format!("{key} is given twice; keep one")),
+            true => Err(format!("{key} is given twice; remove one of them")),
             false => check_label(&key, &value),
         };
         if problems.take(entry.line, checked).is_some() {
@@ -109,7 +109,7 @@ fn read_pairs(table: &DocumentTable, prefix: &str, found: &mut Vec<Pair>, proble
 
 fn check_label(key: &str, value: &str) -> Result<(), String> {
     if key.trim().starts_with("series.") {
-        return Err(format!("a programme counts its series itself; leave out {key}"));
+        return Err(format!("a programme sets the labels of its series itself; remove {key}"));
     }
     SessionLabels::default().set(key, value).map_err(|err| err.to_string())
 }

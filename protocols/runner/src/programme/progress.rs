@@ -59,19 +59,19 @@ pub struct ProgrammeProgress {
 /// A journal that does not belong to the programme.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ProgressError {
-    #[error("the folder holds the programme '{0}'; choose a new folder")]
+    #[error("the folder already holds another programme, '{0}'; choose a new folder")]
     Other(String),
     #[error(
-        "the programme '{0}' was changed since it was begun here; restore it, or begin in a new folder"
+        "the programme '{0}' was changed after it was begun in this folder; restore its file, or begin in a new folder"
     )]
     Changed(String),
     /// Rig, limits, calibration or protocols are others.
     #[error(
-        "the programme '{programme}' was begun here under other conditions: {}; go on under those it was begun under, or begin in a new folder",
+        "the programme '{programme}' was begun in this folder under other conditions: {}; restore the earlier conditions, or begin in a new folder",
         .changes.join(", ")
     )]
     Conditions { programme: String, changes: Vec<String> },
-    #[error("the journal does not begin with its programme; choose a new folder")]
+    #[error("the journal in the folder does not begin with a programme; choose a new folder")]
     Headless,
 }
 

@@ -56,7 +56,7 @@ const TASK_NEEDED: [&str; 2] = ["name = \"press\"", "protocol = \"ramp-hold\""];
 
 const WHOLE: &str = "a whole number without quotes, such as 2";
 
-const PLAIN: &str = "use letters, digits and hyphens, since its folder is called so";
+const PLAIN: &str = "use only letters, digits and hyphens, because a folder gets this name";
 
 impl Programme {
     /// Reads a programme. `other` gives the text of a protocol that is not built in, by the name the programme calls
@@ -146,7 +146,7 @@ impl Reader {
         let message = match &node.value {
             DocumentValue::Number(found) if found == LANGUAGE => return,
             DocumentValue::Number(found) => format!(
-                "this is written in version {found} of the language and this palpate reads {LANGUAGE}; use a newer palpate"
+                "the programme is written in version {found} of the language, but this palpate reads version {LANGUAGE}; use a newer palpate"
             ),
             _ => wrong("palpate-programme", node, "the number 1, without quotes"),
         };
@@ -220,7 +220,8 @@ impl Reader {
                 self.problems.error(line("name"), message);
             }
             if tasks.names.contains(name) {
-                let message = format!("there is a task '{name}' already; choose another name");
+                let message =
+                    format!("the programme already has a task '{name}'; choose another name");
                 self.problems.error(line("name"), message);
             }
         }
@@ -238,11 +239,11 @@ impl Reader {
         let validates = self.text(table, "validates");
         if let Some(model) = validates.as_ref().filter(|one| !tasks.names.contains(*one)) {
             let message = format!(
-                "there is no task '{model}' before this one whose model it could be compared with"
+                "no task before this one is called '{model}'; validates must name an earlier task"
             );
             self.problems.error(line("validates"), message);
         }
-        let number = format!("{WHOLE}; give its name as name in [specimen.2]");
+        let number = format!("{WHOLE}, and write the name of the specimen as name in [specimen.2]");
         let specimen: Option<u64> = self.number(table, "specimen", &number);
         let values = self.values(table, "set");
         let calibrates = self.flag(table, "calibrates").unwrap_or_default();

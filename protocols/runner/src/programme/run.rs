@@ -70,7 +70,7 @@ pub enum ProgrammeRunError {
     Refused { task: String, reason: String },
     /// A run ended before its plan did.
     #[error(
-        "task '{task}', repeat {repeat}, ended by {ending}: {reason}; the same command goes on from there"
+        "task '{task}', repeat {repeat}, ended by {ending}: {reason}; run the programme again to go on from there"
     )]
     Ended { task: String, repeat: u32, ending: String, reason: String },
     #[error("task '{task}': {source}")]
@@ -92,7 +92,8 @@ pub fn run_programme(
     let _lock =
         HolderLock::acquire(&lock).map_err(|err| ProgrammeRunError::Folder(err.to_string()))?;
     if laboratory.folder.join(LOG_FILE).exists() {
-        let reason = format!("{} is a session; choose a new folder", laboratory.folder.display());
+        let reason =
+            format!("the folder {} is a session; choose a new folder", laboratory.folder.display());
         return Err(ProgrammeRunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
@@ -180,9 +181,9 @@ impl ProgrammeRun<'_> {
             |reason: String| ProgrammeRunError::Refused { task: task.name.clone(), reason };
         let specimen = programme.specimen_at(place.task);
         let remount = specimen.filter(|_| std::mem::take(&mut self.is_remounting));
-        let plan = task
-            .plan(place.repeat, remount)
-            .ok_or_else(|| refused("its protocol cannot be written out".into()))?;
+        let plan = task.plan(place.repeat, remount).ok_or_else(|| {
+            refused("its protocol gives no plan; check the values under set".into())
+        })?;
         let to_acknowledge = (self.laboratory.gate)(&plan).map_err(refused)?;
         let session = session_folder(&task.name, &place);
         let folder = self.laboratory.folder.join(&session);

@@ -53,7 +53,7 @@ pub enum ReplayError {
     Imported { file: String },
     /// The manifest's plan or calibration is not what this version knows.
     #[error(
-        "the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it"
+        "the session's {what} cannot be understood ({detail}); use the version of palpate that wrote the session"
     )]
     Manifest {
         what: &'static str,
@@ -61,7 +61,9 @@ pub enum ReplayError {
         detail: String,
     },
     /// A recorded input is not what this version knows.
-    #[error("input {order} of the session cannot be understood ({detail})")]
+    #[error(
+        "input {order} of the session cannot be understood ({detail}); use the version of palpate that wrote the session"
+    )]
     Input {
         order: u64,
         /// The parser's words.
@@ -120,16 +122,18 @@ pub struct ReplayReport {
 pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     let folder = if folder.is_file() { folder.parent().unwrap_or(folder) } else { folder };
     let path = folder.join("blessed.json");
-    let Some(text) = palpate_sessions::text::read_if_present(&path)
-        .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))?
+    let Some(text) = palpate_sessions::text::read_if_present(&path).map_err(|err| {
+        format!("the blessings cannot be read ({err}); check the file {}", path.display())
+    })?
     else {
         return Ok(Vec::new());
     };
-    let blessings: Vec<Blessing> = serde_json::from_str(&text)
-        .map_err(|err| format!("the blessings cannot be understood ({err}): {}", path.display()))?;
+    let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {
+        format!("the blessings cannot be understood ({err}); correct the file {}", path.display())
+    })?;
     match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
         Some(blessing) => Err(format!(
-            "decision {} is blessed without a reason; write the reason down: {}",
+            "decision {} is blessed without a reason; write the reason into {}",
             blessing.decision,
             path.display()
         )),

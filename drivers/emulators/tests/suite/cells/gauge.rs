@@ -167,7 +167,7 @@ fn a_stuck_a_restarted_and_an_unplugged_gauge() {
 fn who_does_not_fit_is_reported_in_words() {
     let other = GaugeSettings { serial_number: Some("1".into()), ..GaugeSettings::default() };
     let err = refused(&bench(), &other);
-    assert!(err.contains("3519042") && err.contains("says 1"), "{err}");
+    assert!(err.contains("3519042") && err.contains("expects 1"), "{err}");
     for (says, name) in [
         ("", "does not answer"),
         ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),

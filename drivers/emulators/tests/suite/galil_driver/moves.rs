@@ -147,7 +147,7 @@ fn what_cannot_be_done_is_refused_in_words() {
     let mut host = Host::new(&thesis());
     host.until("a sample", |host| !host.readings.is_empty());
     for (command, words) in
-        [(to(10, 5.0), "TC 20"), (to(10, 30.0), "rig file"), (to(1 << 40, 5.0), "another target")]
+        [(to(10, 5.0), "TC 20"), (to(10, 30.0), "rig file"), (to(1 << 40, 5.0), "a target other")]
     {
         let before = host.faults.len();
         let now = host.now();

@@ -222,9 +222,9 @@ fn what_cannot_be_done_is_refused_in_words() {
     };
     for (command, words) in [
         (to(10, 30.0), "rig file"),
-        (to(10, 0.01), "slowest of Grbl"),
+        (to(10, 0.01), "Grbl's minimum"),
         (to(1 << 40, 5.0), "ten metres"),
-        (RigCommand::Oscillate(sine), "no sines"),
+        (RigCommand::Oscillate(sine), "cannot follow a sine"),
     ] {
         let message = host.refused(command);
         assert!(message.contains(words), "{message}");

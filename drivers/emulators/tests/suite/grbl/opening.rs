@@ -114,7 +114,7 @@ fn a_board_that_is_held_is_reported() {
     wire.lock().board.receive(Nanos::ZERO, b"!");
     let err = try_connect(&wire, &slide()).expect_err("refused");
     assert!(err.to_string().contains("Hold"), "{err}");
-    assert!(err.to_string().contains("reset it"), "{err}");
+    assert!(err.to_string().contains("reset the board"), "{err}");
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
         acceleration: MmPerS2(50.0),
     });
     for (command, word) in [
-        (oscillation, "straight only"),
+        (oscillation, "cannot follow a sine"),
         (to(500_000, 1.0), "999.99 mm"),
         (to(500, 0.001), "60.0 mm/min"),
     ] {

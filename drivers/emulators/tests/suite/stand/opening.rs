@@ -74,7 +74,7 @@ fn who_does_not_fit_is_reported_in_words() {
     let mut other = usual();
     other.gauge.serial_number = Some("7".into());
     let err = refused(&stand(), &other);
-    assert!(err.contains("3519042") && err.contains("says 7"), "{err}");
+    assert!(err.contains("3519042") && err.contains("expects 7"), "{err}");
 
     let without = Shared::new(EmulatedStandSettings {
         is_without_control: true,
@@ -97,7 +97,7 @@ fn who_does_not_fit_is_reported_in_words() {
         vec![if is_changed { b'0' } else { byte }]
     });
     let err = refused(&clipped, &usual());
-    assert!(err.contains("reads back -10"), "{err}");
+    assert!(err.contains("reports -10"), "{err}");
 
     let silent = stand();
     silent.lock().is_deaf = true;

@@ -197,7 +197,10 @@ impl StandSession {
     fn execute_now(&mut self, now: Nanos, command: RigCommand) {
         if let RigCommand::DefinePosition { pulses } = command {
             if !matches!(self.motion, Motion::Rest) || self.tick.is_none() {
-                return self.refuse(now, "the crosshead moves; a position is defined at rest");
+                return self.refuse(
+                    now,
+                    "the crosshead moves, so its position cannot be defined; stop it first",
+                );
             }
             self.offset = pulses - self.settings.pulses(self.travel);
             self.rests_at = Some(pulses);
@@ -207,7 +210,11 @@ impl StandSession {
 
     fn begin(&mut self, now: Nanos, command: RigCommand) {
         let RigCommand::MoveTo(to) = command else {
-            return self.finish_order(now, command, "the stand moves straight only, not on a sine");
+            return self.finish_order(
+                now,
+                command,
+                "the stand cannot follow a sine; choose a protocol with ramps only",
+            );
         };
         let target = self.settings.pulses(to.target_pulses - self.offset);
         let tenths = (to.speed.0 * 600.0).round() as i64;
@@ -216,7 +223,7 @@ impl StandSession {
             return self.refuse(
                 now,
                 format!(
-                    "the stand takes speeds up to 9999.9 mm/min and limits up to 999.99 mm, not {} to {:.2} mm",
+                    "the stand takes speeds up to 9999.9 mm/min and travel limits up to 999.99 mm, not a speed of {} and a limit of {:.2} mm",
                     to.speed,
                     target as f64 * MM_PER_PULSE
                 ),
@@ -378,7 +385,7 @@ impl Dialogue for StandSession {
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
         (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
-            "the stand no longer gives sensible answers; it stops at its travel limit; check cable and power"
+            "the stand no longer gives sensible answers, and the crosshead stops at its travel limit; check cable and power"
                 .into()
         })
     }
