@@ -43,7 +43,7 @@ fn errors_name_the_step() {
     let err = with_step(0, |step| step.volts = Volts(f64::NAN));
     assert!(err.to_string().contains("weight step 1"), "{err}");
     let err = with_step(0, |step| step.mass_g = -1.0);
-    assert!(err.to_string().contains("not negative"), "{err}");
+    assert!(err.to_string().contains("must not be negative"), "{err}");
 }
 
 #[test]
@@ -360,7 +360,7 @@ fn age_and_rig_raise_doubts() {
         (Some(336), Some("29 more")),
         (Some(365), Some("0 more")),
         (Some(366), Some("366 days")),
-        (Some(-1), Some("1 days ahead")),
+        (Some(-1), Some("1 days in the future")),
         (None, Some("when it was taken")),
     ] {
         let doubts = calibration.validity_warnings(&bench(age));

@@ -73,7 +73,7 @@ pub(super) fn words(bands: &[DepthBand], deepest: Depth) -> String {
         (true, true) => format!("between {:.3} and {:.3}", band.from, band.to),
         (true, false) => format!("beyond {:.3}", band.from),
         (false, true) => format!("below {:.3}", band.to),
-        (false, false) => format!("of up to {:.3}", band.to),
+        (false, false) => format!("down to {:.3}", band.to),
     };
     bands.iter().map(one).collect::<Vec<_>>().join(" and ")
 }
