@@ -93,7 +93,7 @@ pub enum MetadataError {
     #[error("'{key}' is not a metadata entry; choose from {}", names())]
     UnknownKey { key: String },
     /// Not `KEY=VALUE`.
-    #[error("'{text}' is not KEY=VALUE; write an entry as in specimen.thickness_mm=12")]
+    #[error("'{text}' is not KEY=VALUE; write an entry such as specimen.thickness_mm=12")]
     NotAPair { text: String },
     /// The value cannot be.
     #[error("{key} cannot be '{value}'; give {expected}")]

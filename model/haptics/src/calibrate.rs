@@ -60,7 +60,7 @@ pub enum BiasError {
     },
     /// Too few points.
     #[error(
-        "the rising branch has only {found} points; measure at least {LINE_MIN} with a bias above the dead band"
+        "the rising branch has only {found} points; measure at least {LINE_MIN} points with a bias above the dead band"
     )]
     TooFew { found: usize },
     /// The force does not follow.

@@ -26,7 +26,7 @@ palpate_model::named! {
         /// The force rises after start, stall or contact.
         RampingIn = "the force rises slowly after a start, a stall or a contact",
         /// The device gives all it has.
-        Saturated = "the device gives its largest force; the model asks for more",
+        Saturated = "the device gives its largest force, but the force of the model is larger",
         /// A guard changes the force: it changes too fast, or the loop made energy.
         Guarded = "a guard limits the force: the force would change too fast, or the loop generated energy",
         /// The force is less than the device's friction.

@@ -104,12 +104,12 @@ pub fn plan(
             needs.budget_us
         ),
         (None, _) => format!(
-            "no measured scene keeps the error of shape within {} mm; the smallest is {} mm",
+            "no measured scene keeps the error of shape within {} mm; the smallest error is {} mm",
             needs.shape_mm,
             least_error(&shapes)
         ),
         (_, None) => format!(
-            "no measured scene keeps the error of force within {force_n:.3} N; the smallest is {:.3} N",
+            "no measured scene keeps the error of force within {force_n:.3} N; the smallest error is {:.3} N",
             least_error(&forces)
         ),
     };
@@ -121,7 +121,7 @@ pub fn plan(
             plan.mesh.nodes, plan.family.family, plan.shape_error_mm, plan.force_error_n
         ),
         None => {
-            "; no measured scene keeps within the budget: allow more time for a tick".to_owned()
+            "; no measured scene keeps within the budget, so allow more time for a tick".to_owned()
         }
     };
     Err(ScenePlanError { reason: why + &advice, nearest: nearest.map(Box::new) })

@@ -34,7 +34,7 @@ pub enum FitError {
         "the record has {samples} sample(s) with a force and the fit has {parameters} free parameter(s); record more samples or fix parameters"
     )]
     TooFewSamples { samples: usize, parameters: usize },
-    #[error("sample {index} has a {what} of {value}; remove samples that are not finite numbers")]
+    #[error("sample {index} has a {what} of {value}; remove samples whose numbers are not finite")]
     NotFinite { index: usize, what: &'static str, value: f64 },
     #[error(
         "the record has a {what} of {value:e} {unit}, but a fit needs numbers between 1e-50 and 1e50; check the unit"
