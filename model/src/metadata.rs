@@ -54,19 +54,19 @@ const fn length(name: &'static str, meaning: &'static str) -> MetadataKey {
 /// Every possible entry, in the order it is shown. The first three are fields of their own in the
 /// manifest.
 pub const METADATA_KEYS: &[MetadataKey] = &[
-    text("operator", "who runs it"),
-    text("specimen", "what is indented: the specimen's name"),
-    text("indenter", "the probe, in words"),
-    text("specimen.source", "animal or material, organ, and who supplied it"),
+    text("operator", "who runs the test"),
+    text("specimen", "name of the specimen that is indented"),
+    text("indenter", "description of the probe"),
+    text("specimen.source", "animal or material, organ and supplier"),
     MetadataKey {
         name: "specimen.time_since_death_h",
         meaning: "hours from death to the test",
         kind: MetadataKind::Number { unit: "h", above: 0.0, is_limit_allowed: true },
     },
-    text("specimen.storage", "how and how long it was stored"),
+    text("specimen.storage", "how and how long the specimen was stored"),
     MetadataKey {
         name: "specimen.temperature_c",
-        meaning: "its temperature in the test, degrees Celsius",
+        meaning: "temperature of the specimen in the test, in degrees Celsius",
         kind: MetadataKind::Number {
             unit: "degrees Celsius",
             // Absolute zero: what is below was not measured.
@@ -74,26 +74,26 @@ pub const METADATA_KEYS: &[MetadataKey] = &[
             is_limit_allowed: false,
         },
     },
-    text("specimen.hydration", "how it was kept moist"),
-    length("specimen.thickness_mm", "its thickness under the probe"),
-    text("specimen.mounting", "how it was held, and on what"),
+    text("specimen.hydration", "how the specimen was kept moist"),
+    length("specimen.thickness_mm", "thickness of the specimen under the probe"),
+    text("specimen.mounting", "how the specimen was held, and on which base"),
     length("indenter.diameter_mm", "diameter of the probe"),
-    text("indenter.tip", "shape of its tip: flat, spherical, conical"),
-    text("indenter.material", "what the probe is made of"),
-    text("signal.filter", "what filter there is between cell and converter"),
+    text("indenter.tip", "shape of the tip of the probe: flat, spherical or conical"),
+    text("indenter.material", "material of the probe"),
+    text("signal.filter", "filter between load cell and converter"),
     text("series.id", "name of the series the session belongs to"),
     count("series.specimen", "number of the specimen in the series"),
-    count("series.repeat", "which repeat on this specimen, from 1"),
-    count("series.repeats", "how many repeats are planned"),
+    count("series.repeat", "number of the repeat on this specimen, from 1"),
+    count("series.repeats", "number of repeats that are planned"),
 ];
 
 /// An entry is not possible.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum MetadataError {
-    #[error("there is no entry '{key}'; choose from {}", names())]
+    #[error("'{key}' is not a metadata entry; choose from {}", names())]
     UnknownKey { key: String },
     /// Not `KEY=VALUE`.
-    #[error("'{text}' is not KEY=VALUE, as in specimen.thickness_mm=12")]
+    #[error("'{text}' is not KEY=VALUE; write an entry such as specimen.thickness_mm=12")]
     NotAPair { text: String },
     /// The value cannot be.
     #[error("{key} cannot be '{value}'; give {expected}")]

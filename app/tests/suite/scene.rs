@@ -99,7 +99,7 @@ fn a_mesh_is_planned_from_what_is_measured() {
     )
     .unwrap();
     let none = palpate(at.path(), &["scene", "run", "exact.toml"]);
-    assert_refused(&none, 1, "nothing measured holds");
+    assert_refused(&none, 1, "no measured scene keeps");
     let bench = json(&typed(at.path(), "scene bench coarse.toml --json"));
     assert_eq!(bench["command"], "scene-bench");
     assert_eq!(bench["curves"]["meshes"][0]["nodes"], 51);

@@ -51,19 +51,21 @@ pub struct BiasCalibration {
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum BiasError {
     /// A point that is no number.
-    #[error("point {index} of the calibration is not a number; measure it again")]
+    #[error(
+        "the bias or the force of calibration point {index} is not a number; measure this point again"
+    )]
     NotANumber {
         /// Which, from 1.
         index: usize,
     },
     /// Too few points.
     #[error(
-        "only {found} points are on the straight part of the rising branch; measure at least {LINE_MIN}, with the bias above the dead band"
+        "the rising branch has only {found} points; measure at least {LINE_MIN} points with a bias above the dead band"
     )]
     TooFew { found: usize },
     /// The force does not follow.
     #[error(
-        "the force does not rise with the bias voltage ({slope:.3} N/V, standard error {error:.3}); check the drive, the load cell and the sign"
+        "the force does not rise with the bias voltage (slope {slope:.3} N/V, standard error {error:.3} N/V); check the drive, the load cell and the sign of the force"
     )]
     Flat {
         /// Slope in N/V.

@@ -18,7 +18,7 @@ pub struct ContactSettings {
 /// No hysteresis.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
-    "contact that begins at {on} and ends below {off} has no hysteresis; end it at a smaller force than it begins"
+    "contact begins at {on} and ends below {off}, which leaves no hysteresis; choose a smaller force for the end than for the beginning"
 )]
 pub struct ContactThresholdError {
     pub on: Newtons,

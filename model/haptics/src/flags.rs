@@ -18,28 +18,28 @@ macro_rules! facts {
 }
 
 facts! {
-    DEPTH_NAN 0 "the depth is not a number; the last one was taken";
-    DEPTH_RANGE 1 "the depth is beyond the stroke; the end of the stroke was taken";
-    JUMP 2 "the depth moved faster than a hand can; the model follows at the fastest speed allowed";
-    PULL 3 "the model would pull; tissue does not hold the probe, so the force is zero";
-    NO_FORCE 4 "the model has no force for this step; the force is zero";
+    DEPTH_NAN 0 "the depth is not a number; the model uses the last valid depth";
+    DEPTH_RANGE 1 "the depth is beyond the end of the stroke; the model uses the end of the stroke";
+    JUMP 2 "the depth changes faster than a hand can move; the model follows at the fastest speed allowed";
+    PULL 3 "the model would pull the probe, but tissue does not adhere to a probe; the force is zero";
+    NO_FORCE 4 "the model gives no finite force for this step; the force is zero";
     FORCE_MAX 5 "the force is held at its limit";
-    SLEW 6 "the force changes as fast as it may";
+    SLEW 6 "the force changes at its largest allowed rate";
     SOFT_START 7 "the force rises slowly after the start";
-    STALL 8 "the loop had stopped; the force rises slowly from what the device held";
+    STALL 8 "the control loop had stopped; the force rises slowly from the value that the device held";
     CONTACT_RAMP 9 "the force rises slowly after contact";
-    NO_CONTACT 10 "the load cell feels no contact; the force is zero";
+    NO_CONTACT 10 "the load cell detects no contact; the force is zero";
     ABOVE_SURFACE 11 "the probe is above the surface; the force is zero";
     PASSIVITY 12 "the control loop generated energy; damping is added to dissipate it";
-    DAMPING_LIMIT 13 "the damping that would take all energy back at once is more than the device's mass allows; the rest waits";
+    DAMPING_LIMIT 13 "dissipating all generated energy at once needs more damping than the device's mass allows; the rest is dissipated later";
     BUZZ 14 "the control loop of the device oscillates by itself";
-    PULSE_RATE 15 "the slave cannot follow: it would need more pulses than its drive may output";
-    COUNT_RATE 16 "the encoder turns faster than it can be counted; counts may be lost";
-    SATURATED 17 "the drive gives all it has; the torque is less than commanded";
-    CONTINUOUS 18 "the torque is above what the motor may give for long";
-    HOT 19 "the winding is hotter than it may be";
-    CELL 20 "the load cell gives no number; contact stays as it was";
-    MARGIN 21 "the device has less damping than this depth needs to stay calm";
+    PULSE_RATE 15 "the slave lags behind: the motion needs more pulses than the slave's drive may output";
+    COUNT_RATE 16 "the encoder turns too fast for its counter; counts may be lost";
+    SATURATED 17 "the drive is at its largest voltage; the torque is less than commanded";
+    CONTINUOUS 18 "the torque is above the continuous torque of the motor";
+    HOT 19 "the motor winding is hotter than its limit";
+    CELL 20 "the load cell gives no valid number; the contact state does not change";
+    MARGIN 21 "the device has less damping than stability needs at this depth";
     OFF 22 "the force is switched off";
 }
 

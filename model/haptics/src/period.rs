@@ -15,10 +15,10 @@ pub struct Period(u64);
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum PeriodError {
     /// Beyond what a loop is made for.
-    #[error("a haptic loop of {0} Hz is not offered; choose from 250 Hz to 10000 Hz")]
+    #[error("a haptic loop cannot run at {0} Hz; choose from 250 Hz to 10000 Hz")]
     Rate(f64),
     /// Zero or too long for the numbers.
-    #[error("a tick of {0} ns is not possible; a tick is from 1 ns to 1 s")]
+    #[error("a tick of {0} ns is not possible; choose from 1 ns to 1 s")]
     Nanos(u64),
 }
 

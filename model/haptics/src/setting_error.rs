@@ -5,7 +5,7 @@ use thiserror::Error;
 
 /// A setting outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("{subject} with {name} = {value}{unit} is not possible; it must be {range}")]
+#[error("{subject} with {name} = {value}{unit} is not possible; {name} must be {range}")]
 pub struct SettingError {
     /// Whose setting it is, such as `a motor drive`.
     pub subject: &'static str,

@@ -24,7 +24,7 @@ pub enum Tolerance {
 /// A text that is no tolerance.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "'{text}' is not a tolerance of force; write newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd), above zero"
+    "'{text}' is not a tolerance of force; write a number above zero in newtons (0.05N), percent of the peak force (1%) or percent of the smallest change that a hand notices (10%jnd)"
 )]
 pub struct BadTolerance {
     pub text: String,
@@ -73,7 +73,10 @@ impl fmt::Display for Tolerance {
             Self::Newtons(newtons) => write!(f, "{} N", newtons.0),
             Self::PercentOfPeak(percent) => write!(f, "{percent} % of the peak force"),
             Self::PercentOfThreshold(percent) => {
-                write!(f, "{percent} % of what a hand notices at the peak force")
+                write!(
+                    f,
+                    "{percent} % of the smallest change that a hand notices at the peak force"
+                )
             }
         }
     }

@@ -241,8 +241,8 @@ impl Calibration {
     /// Numbers other than the readings must be finite, and uncertainties not negative.
     fn check_facts(&self) -> Result<(), CalibrationError> {
         let signed = [
-            ("zero before", self.zero_before),
-            ("zero after", self.zero_after),
+            ("zero signal before the weights", self.zero_before),
+            ("zero signal after the weights", self.zero_after),
             ("excitation", self.excitation),
         ];
         let signed = signed.map(|(what, volts)| (what, volts.map(Volts::get), f64::NEG_INFINITY));

@@ -12,7 +12,7 @@ pub enum CalibrationError {
     TooFewSteps { count: usize },
     /// NaN, infinite, or a negative mass.
     #[error(
-        "weight step {step} has mass {mass_g} g and signal {volts} V; both must be finite and the mass not negative, take this step again"
+        "weight step {step} has mass {mass_g} g and signal {volts} V; both must be finite and the mass must not be negative, so take this step again"
     )]
     NotANumber {
         /// Step, counted from 1.
@@ -22,11 +22,11 @@ pub enum CalibrationError {
     },
     /// A number other than a reading.
     #[error(
-        "the {what} of the calibration is {value}, which is not possible; correct it or leave it out"
+        "the {what} of the calibration is {value}, which is not possible; correct or remove this value"
     )]
     Fact { what: &'static str, value: f64 },
     #[error(
-        "weight step {step} has {mass_g} g after {before_g} g; masses must increase from step to step, remove or reorder it"
+        "weight step {step} has {mass_g} g after {before_g} g; masses must increase from step to step, so remove or reorder this step"
     )]
     MassNotIncreasing {
         /// Step, counted from 1.
@@ -37,7 +37,7 @@ pub enum CalibrationError {
     },
     /// More mass did not give more volts.
     #[error(
-        "weight step {step} reads {volts} V after {before_volts} V; the signal must rise with every weight, check the wiring and take this step again"
+        "weight step {step} reads {volts} V after {before_volts} V; the signal must rise with every weight, so check the wiring and take this step again"
     )]
     VoltsNotIncreasing {
         /// Step, counted from 1 in order of mass.
@@ -48,7 +48,7 @@ pub enum CalibrationError {
     },
     /// A series falls where weight is added, by more than repeats differ.
     #[error(
-        "under {mass_g} g the cell reads {volts} V in {way}, less than the {before_volts} V under {before_g} g; the signal must rise with every weight, check the wiring and take the weights again"
+        "under {mass_g} g the load cell reads {volts} V during {way}, less than {before_volts} V under {before_g} g; the signal must rise with every weight, so check the wiring and take the weights again"
     )]
     SignalFalls {
         mass_g: f64,
@@ -63,17 +63,17 @@ pub enum CalibrationError {
     },
     /// Next to no rise between two weights.
     #[error(
-        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave one of them out or take the steps again"
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or take their steps again"
     )]
     TooFlat,
     /// Written by a later version.
     #[error(
-        "the calibration has format {format}, which is newer than this program reads; read it with the version that wrote it"
+        "the calibration has format {format}, which is newer than this program can read; use the version that wrote the calibration"
     )]
     NewerFormat { format: u32 },
     /// A step names a weight that the document does not list.
     #[error(
-        "weight step {step} has the weight \"{name}\" on it, which is not in the list of weights; add it there"
+        "weight step {step} uses the weight \"{name}\", which is not in the list of weights; add the weight to the list"
     )]
     UnknownWeight {
         /// Step, counted from 1.
@@ -96,7 +96,7 @@ pub enum CalibrationError {
     Tolerance { tolerance_g: f64 },
     /// Straight segments through masses that were not taken.
     #[error(
-        "straight segments through {} do not go from the first to the last weight through weights that were taken; give masses of the table in order", grams(.through_g)
+        "straight segments through {} do not run from the first to the last weight through measured weights; give masses of the calibration in order", grams(.through_g)
     )]
     NoSuchBreak { through_g: Vec<f64> },
     /// A polynomial that turns back or that the points do not determine.

@@ -233,9 +233,7 @@ fn findings(quality: &CalibrationQuality, uncertainty: &ForceUncertainty) -> Vec
     let mut findings = Vec::new();
     for flat in &quality.flat {
         let own = flat.worst_uncertainty_n.map_or(String::new(), |sigma| {
-            format!(
-                ", and the calibration alone leaves up to {sigma:.2} N (one standard uncertainty)"
-            )
+            format!(", and the calibration alone has a standard uncertainty of up to {sigma:.2} N")
         });
         // A fall within its repeatability has no such ratio.
         let less = match flat.rise_v > 0.0 {
@@ -243,13 +241,12 @@ fn findings(quality: &CalibrationQuality, uncertainty: &ForceUncertainty) -> Vec
             false => "which is no rise".to_owned(),
         };
         findings.push(format!(
-            "from {:.0} g to {:.0} g ({:.2} to {:.2} N) the cell moves only {} V for {:.0} g, {less}: a signal error of 1 mV there is up to {:.3} N{own}",
+            "from {:.0} g to {:.0} g ({:.2} N to {:.2} N) the signal changes by only {} V, {less}: a signal error of 1 mV there means a force error of up to {:.3} N{own}",
             flat.from_g,
             flat.to_g,
             flat.from_n,
             flat.to_n,
             (flat.rise_v * 1e4).round() / 1e4,
-            flat.to_g - flat.from_g,
             flat.worst_n_per_mv,
         ));
     }
@@ -262,7 +259,7 @@ fn findings(quality: &CalibrationQuality, uncertainty: &ForceUncertainty) -> Vec
     let missing: Vec<&str> = uncertainty.not_stated().iter().map(|term| term.name()).collect();
     if !missing.is_empty() {
         findings.push(format!(
-            "the uncertainty leaves out what the calibration does not state: {}",
+            "the uncertainty omits components that the calibration does not state: {}",
             missing.join(", ")
         ));
     }

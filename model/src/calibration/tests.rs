@@ -43,7 +43,7 @@ fn errors_name_the_step() {
     let err = with_step(0, |step| step.volts = Volts(f64::NAN));
     assert!(err.to_string().contains("weight step 1"), "{err}");
     let err = with_step(0, |step| step.mass_g = -1.0);
-    assert!(err.to_string().contains("not negative"), "{err}");
+    assert!(err.to_string().contains("must not be negative"), "{err}");
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn facts_that_cannot_be_are_refused() {
     let nan = Some(Volts(f64::NAN));
     for (wrong, fact) in [
         (Calibration { excitation: nan, ..thesis() }, "excitation"),
-        (Calibration { zero_after: nan, ..thesis() }, "zero after"),
+        (Calibration { zero_after: nan, ..thesis() }, "zero signal after the weights"),
         (Calibration { resolution: Some(Volts(-0.1)), ..thesis() }, "resolution"),
     ] {
         let refusal = wrong.curve().unwrap_err();
@@ -360,7 +360,7 @@ fn age_and_rig_raise_doubts() {
         (Some(336), Some("29 more")),
         (Some(365), Some("0 more")),
         (Some(366), Some("366 days")),
-        (Some(-1), Some("1 days ahead")),
+        (Some(-1), Some("1 days in the future")),
         (None, Some("when it was taken")),
     ] {
         let doubts = calibration.validity_warnings(&bench(age));

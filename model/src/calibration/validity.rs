@@ -71,7 +71,7 @@ pub enum WeightCheckError {
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
     /// A number that cannot be.
-    #[error("the {what} of the check is {value}; {advice}")]
+    #[error("the {what} of the weight check is {value}; {advice}")]
     Number { what: &'static str, value: f64, advice: &'static str },
 }
 
@@ -81,14 +81,14 @@ impl KnownWeight {
         let limit_percent = self.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
         let is_positive = |value: f64| value > 0.0 && value.is_finite();
         for (what, value, is_right, advice) in [
-            ("mass", self.mass_g, is_positive(self.mass_g), "give grams above 0"),
-            ("limit", limit_percent, is_positive(limit_percent), "give percent above 0"),
-            ("signal", self.volts.0, self.volts.is_finite(), "read it again"),
+            ("mass", self.mass_g, is_positive(self.mass_g), "give a mass above 0 g"),
+            ("limit", limit_percent, is_positive(limit_percent), "give a percentage above 0"),
+            ("signal", self.volts.0, self.volts.is_finite(), "read the signal again"),
             (
                 "tolerance",
                 self.tolerance_g.unwrap_or(0.0),
                 self.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
-                "give grams, 0 or more",
+                "give 0 g or more",
             ),
             ("tare", self.tare.0, self.tare.is_finite(), "read the empty cell again"),
         ] {
@@ -110,27 +110,27 @@ impl Calibration {
         };
         let valid = i64::from(self.valid_days());
         match bench.age_days {
-            None => doubt("does not say when it was taken, so its age is not known; check it with one known weight".into()),
+            None => doubt("does not state when it was taken, so its age is unknown; check the calibration with one known weight".into()),
             Some(age) if age < 0 => {
-                doubt(format!("is dated {} days ahead; check the clock of this computer", -age));
+                doubt(format!("is dated {} days in the future; check the clock of this computer", -age));
             }
             Some(age) if age > valid => {
-                doubt(format!("is {age} days old and was valid for {valid}; take a new one"));
+                doubt(format!("is {age} days old but was valid for {valid} days; take a new calibration"));
             }
             Some(age) if age > valid - WARNING_DAYS => {
-                doubt(format!("is valid for {} more day(s); plan a new one", valid - age));
+                doubt(format!("is valid for {} more day(s); plan a new calibration", valid - age));
             }
             Some(_) => {}
         }
         if !self.rig.is_empty() && self.rig != bench.rig {
             doubt(format!(
-                "was taken on rig {}, and this is rig {}; take one on this rig",
+                "was taken on rig {}, but this is rig {}; take a calibration on this rig",
                 self.rig, bench.rig
             ));
         }
         if let Some(cell) = bench.cell.filter(|cell| !self.cell.is_empty() && *cell != self.cell) {
             doubt(format!(
-                "is of cell {}, and cell {cell} is mounted; take one of this cell",
+                "is for load cell {}, but load cell {cell} is mounted; take a calibration of the mounted cell",
                 self.cell
             ));
         }
@@ -138,7 +138,7 @@ impl Calibration {
             && (then.0 - now.0).abs() > EXCITATION_SHARE * then.0.abs()
         {
             doubt(format!(
-                "was taken at an excitation of {then}, and it is {now} now; set it back or take a new calibration"
+                "was taken at an excitation of {then}, but the excitation is {now} now; restore the excitation or take a new calibration"
             ));
         }
         doubts
@@ -191,13 +191,15 @@ impl Calibration {
             .min_by(|a, b| share(a).total_cmp(&share(b)));
         let advice = best.map_or_else(
             || {
-                "this calibration cannot be checked with any weight up to its heaviest; make a new one"
+                "no weight in the range of this calibration allows a check; take a new calibration"
                     .to_owned()
             },
-            |best| format!("take a weight where the cell is more sensitive, such as {best} g"),
+            |best| {
+                format!("use a weight at which the load cell is more sensitive, such as {best} g")
+            },
         );
         Ok(Some(format!(
-            "the calibration knows the force of {mass_g} g to {own:.3} N only (one standard uncertainty), worse than the limit of {:.3} N, so a check with it says nothing; {advice}",
+            "the calibration gives the force of {mass_g} g with a standard uncertainty of {own:.3} N, more than the limit of {:.3} N, so a check with this weight proves nothing; {advice}",
             limit(mass_g)
         )))
     }
@@ -225,13 +227,13 @@ impl Calibration {
         }
         if let Some(sigma) = sigma.filter(|sigma| 2.0 * sigma > limit) {
             doubts.push(format!(
-                "the calibration knows this force to {sigma:.3} N only (one standard uncertainty), so a limit of {limit:.3} N says little here; take a weight where the cell is more sensitive"
+                "the standard uncertainty of this force is {sigma:.3} N, so a limit of {limit:.3} N proves little here; use a weight at which the load cell is more sensitive"
             ));
         }
         let is_passed = error.abs() <= limit;
         let percent = 100.0 * error / true_force.0;
         let sentence = format!(
-            "{:.0} g reads {:.3} N instead of {:.3} N: {error:+.3} N or {percent:+.2} %, {} the limit of {limit_percent} %{}",
+            "{:.0} g reads {:.3} N instead of {:.3} N; the error of {error:+.3} N ({percent:+.2} %) is {} the limit of {limit_percent} %{}",
             weight.mass_g,
             force.0,
             true_force.0,

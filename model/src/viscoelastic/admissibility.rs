@@ -50,9 +50,9 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
     let cases = [
         (
             unstable_bands(body),
-            "the elastic force falls with depth {bands}: there this body is unstable if held by force",
+            "the elastic force falls with depth {bands}; this body is unstable there under force control",
         ),
-        (active_cycles(body), "around depths {bands} a small slow cycle returns energy"),
+        (active_cycles(body), "a small slow cycle around depths {bands} returns energy"),
         (
             active_pokes(body),
             "a step from the surface to depths {bands} does not relax, and a slow poke returns energy",
@@ -76,7 +76,7 @@ fn words(band: &InadmissibleBand, deepest: f64) -> Option<String> {
         (true, true) => format!("between {:.3} and {:.3} mm", band.from, band.to),
         (true, false) => format!("beyond {:.3} mm", band.from),
         (false, true) => format!("below {:.3} mm", band.to),
-        (false, false) => format!("anywhere down to {deepest:.3} mm"),
+        (false, false) => format!("down to {deepest:.3} mm"),
     })
 }
 

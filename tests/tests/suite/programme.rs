@@ -466,7 +466,7 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
         ("rabbit, specimen 1", "rabbit, specimen 2")
     );
     for (key, value, words) in
-        [("series.repeat", "2", "series"), ("specimen.colour", "red", "there is no entry")]
+        [("series.repeat", "2", "series"), ("specimen.colour", "red", "is not a metadata entry")]
     {
         let refusal = whole.set_label(key, value).unwrap_err();
         assert!(refusal.contains(words), "{refusal}");

@@ -291,7 +291,7 @@ mod tests {
             "energy 0.000 N·mm measured, 0.000 fitted; largest residual 0.0 mN",
             "- beware",
             "- found",
-            "- it cannot represent a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading",
+            "- it cannot represent an equilibrium force other than zero; stiffness that grows with depth; unloading that differs from loading",
         ];
         assert_eq!(fit_text(&report, details), lines.join("\n"));
     }

@@ -67,13 +67,13 @@ pub(super) fn where_above(
     bands
 }
 
-/// The bands in words, as they stand in the middle of a sentence.
+/// The bands in words, to follow "depths".
 pub(super) fn words(bands: &[DepthBand], deepest: Depth) -> String {
     let one = |band: &DepthBand| match (band.from.0 > 0.0, band.to < deepest) {
         (true, true) => format!("between {:.3} and {:.3}", band.from, band.to),
         (true, false) => format!("beyond {:.3}", band.from),
         (false, true) => format!("below {:.3}", band.to),
-        (false, false) => format!("anywhere down to {:.3}", band.to),
+        (false, false) => format!("down to {:.3}", band.to),
     };
     bands.iter().map(one).collect::<Vec<_>>().join(" and ")
 }

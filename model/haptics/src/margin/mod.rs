@@ -201,7 +201,7 @@ impl MarginReport {
         let mut all = vec![self.damping_sentence()];
         if !self.bands.is_empty() {
             all.push(format!(
-                "The damping is too little {}; there the guard adds it.",
+                "The damping is too small at depths {}; the guard adds the missing damping there.",
                 bands::words(&self.bands, self.deepest)
             ));
         }
@@ -210,13 +210,13 @@ impl MarginReport {
             format!("Friction of {friction:.3} suppresses the vibration of single encoder counts.")
         } else {
             format!(
-                "A buzz of an encoder count or two is possible: at {depth:.1} single counts stay quiet from {friction_needed:.3} of friction on, the device has {friction:.3}. A finer encoder needs less."
+                "A buzz of an encoder count or two is possible: a friction of {friction_needed:.3} suppresses the buzz at a depth of {depth:.1}, but the device has {friction:.3}. A finer encoder needs less friction."
             )
         });
         if !self.cycles.is_empty() {
             all.push(format!(
-                "{} the model itself returns energy in small slow cycles.",
-                sentence_case(&bands::words(&self.cycles, self.deepest))
+                "The model itself returns energy in small slow cycles at depths {}.",
+                bands::words(&self.cycles, self.deepest)
             ));
         }
         if !self.pokes.is_empty() {
@@ -233,28 +233,23 @@ impl MarginReport {
         // N s/mm as N s/m, which is what catalogues have.
         let (needed_si, has_si) = (needed * 1e3, has * 1e3);
         let Some(ratio) = self.ratio() else {
-            return "The body brings all the damping it needs.".into();
+            return "The body itself supplies all the damping needed.".into();
         };
         let why = match cause {
-            MarginCause::Lag => "the body's own lag asks for it, and a faster loop does not help",
-            MarginCause::Tick => "tick and delay ask for it, so a faster loop helps",
-            MarginCause::Sudden => "sudden moves ask for it, so a faster loop or less delay helps",
+            MarginCause::Lag => "the cause is the lag of the body, so a faster loop does not help",
+            MarginCause::Tick => "the causes are the tick and the delay, so a faster loop helps",
+            MarginCause::Sudden => {
+                "the cause is sudden moves, so a faster loop or less delay helps"
+            }
         };
         if self.worst.is_enough() {
             format!(
-                "The device has {ratio:.2} times the damping needed: {has_si:.2} N s/m, and {needed_si:.2} at {depth:.1}."
+                "The device has {ratio:.2} times the damping needed: it has {has_si:.2} N s/m and needs {needed_si:.2} N s/m at a depth of {depth:.1}."
             )
         } else {
             format!(
-                "The device has {ratio:.2} of the damping needed: {has_si:.2} N s/m, and {needed_si:.2} at {depth:.1}; {why}."
+                "The device has {ratio:.2} times the damping needed: it has {has_si:.2} N s/m and needs {needed_si:.2} N s/m at a depth of {depth:.1}; {why}."
             )
         }
     }
-}
-
-fn sentence_case(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().collect::<String>() + letters.as_str()
-    })
 }

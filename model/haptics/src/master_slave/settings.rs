@@ -110,6 +110,8 @@ pub enum MasterSlaveError {
     /// A number of encoder, motor, drive or master.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    #[error("the surface cannot be {0} mm from where the slave starts; give a finite distance")]
+    #[error(
+        "the distance from the start of the slave to the surface is {0} mm; give a finite distance"
+    )]
     Surface(f64),
 }

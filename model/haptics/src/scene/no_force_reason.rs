@@ -11,7 +11,7 @@ palpate_model::named! {
     #[serde(rename_all = "kebab-case")]
     pub enum NoForceReason {
         /// Nothing does.
-        None = "the force is the model's",
+        None = "the force is that of the model",
         /// The stylus is above the surface.
         #[default]
         NoContact = "the stylus is above the surface",
@@ -20,15 +20,15 @@ palpate_model::named! {
         /// The place is no number.
         NotANumber = "the device reports no position",
         /// The model has no force.
-        NoModel = "the model has no force for this move",
+        NoModel = "the model gives no finite force for this move",
         /// The tissue follows more slowly than the stylus leaves.
-        Leaving = "the stylus withdraws faster than the tissue follows, and tissue cannot pull on it",
+        Leaving = "the stylus withdraws faster than the tissue follows, and tissue cannot pull the stylus",
         /// The force rises after start, stall or contact.
-        RampingIn = "the force rises slowly after start, stall or contact",
+        RampingIn = "the force rises slowly after a start, a stall or a contact",
         /// The device gives all it has.
-        Saturated = "the device gives its largest force; the model asks for more",
+        Saturated = "the device gives its largest force, but the force of the model is larger",
         /// A guard changes the force: it changes too fast, or the loop made energy.
-        Guarded = "a guard holds the force: it would change too fast, or the loop made energy",
+        Guarded = "a guard limits the force: the force would change too fast, or the loop generated energy",
         /// The force is less than the device's friction.
         BelowThreshold = "the force is less than the device's own friction, so it cannot be felt",
     }

@@ -89,7 +89,7 @@ impl FromStr for ScenePath {
         let found = Self::ALL.into_iter().find(|path| path.name() == name);
         found.ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
-            format!("there is no path '{name}'; choose one of {names}")
+            format!("'{name}' is not the name of a path; choose one of {names}")
         })
     }
 }

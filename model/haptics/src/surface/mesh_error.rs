@@ -7,7 +7,7 @@ use thiserror::Error;
 pub enum MeshError {
     /// Too few nodes, or too many.
     #[error(
-        "a mesh of {columns} x {rows} nodes is not possible; each side has 2 to 65535 nodes and all together at most 16777216"
+        "a mesh of {columns} x {rows} nodes is not possible; choose 2 to 65535 nodes for each side and at most 16777216 in all"
     )]
     Size {
         /// Nodes along x.
@@ -16,14 +16,16 @@ pub enum MeshError {
         rows: usize,
     },
     /// No distance.
-    #[error("nodes {0} mm apart are not possible; the spacing is from 0.000001 to 1000 mm")]
+    #[error("a node spacing of {0} mm is not possible; choose from 0.000001 mm to 1000 mm")]
     Spacing(f64),
     /// Not a number for each node.
-    #[error("there are {given} {what} for {nodes} nodes; give one for each, row by row")]
+    #[error(
+        "the mesh has {given} {what} for {nodes} nodes; give one height for each node, row by row"
+    )]
     Count { what: &'static str, given: usize, nodes: usize },
     /// No height.
     #[error(
-        "the rest height of column {column}, row {row} is {height} mm; heights are within 1000000 mm of zero"
+        "the rest height of column {column}, row {row} is {height} mm; heights must be within 1000000 mm of zero"
     )]
     Height {
         column: usize,
@@ -32,11 +34,11 @@ pub enum MeshError {
         height: f64,
     },
     /// No limit.
-    #[error("a MaxShear of {0} mm is not possible; it is zero or more, and may be infinite")]
+    #[error("a MaxShear of {0} mm is not possible; choose zero, a positive number or infinity")]
     Shear(f64),
     /// The surface at rest breaks its own limits.
     #[error(
-        "at rest, column {column}, row {row} is {rise} mm from its neighbour in height, and MaxShear there is {limit} mm; make the rest surface smoother or MaxShear larger"
+        "the rest heights of column {column}, row {row} and its neighbour differ by {rise} mm, more than a MaxShear of {limit} mm allows; make the rest surface smoother or MaxShear larger"
     )]
     Steep {
         column: usize,

@@ -77,10 +77,10 @@ pub fn plan(
     let refuse = |why: String| ScenePlanError { reason: why, nearest: None };
     let force_n = needs.force.in_newtons(needs.peak).0;
     for (what, value) in [
-        ("tolerance of force", force_n),
-        ("tolerance of shape", needs.shape_mm),
-        ("budget of a tick", needs.budget_us),
-        ("factor of cost", slower),
+        ("force tolerance", force_n),
+        ("shape tolerance", needs.shape_mm),
+        ("tick budget", needs.budget_us),
+        ("cost factor", slower),
     ] {
         if !(value > 0.0 && value.is_finite()) {
             return Err(refuse(format!(
@@ -98,18 +98,18 @@ pub fn plan(
             return Ok(curves.assemble_plan(shape, force, slower));
         }
         (Some(shape), Some(force)) => format!(
-            "the cheapest that holds {} mm and {force_n:.3} N takes {:.1} us a tick, and the budget is {} us",
+            "the cheapest measured scene within {} mm and {force_n:.3} N takes {:.1} us a tick, but the budget is {} us",
             needs.shape_mm,
             shape.cost + force.cost,
             needs.budget_us
         ),
         (None, _) => format!(
-            "nothing measured holds a shape to {} mm; the most exact is off by {} mm",
+            "no measured scene keeps the error of shape within {} mm; the smallest error is {} mm",
             needs.shape_mm,
             least_error(&shapes)
         ),
         (_, None) => format!(
-            "nothing measured holds a force to {force_n:.3} N; the most exact is off by {:.3} N",
+            "no measured scene keeps the error of force within {force_n:.3} N; the smallest error is {:.3} N",
             least_error(&forces)
         ),
     };
@@ -117,10 +117,12 @@ pub fn plan(
         .map(|[shape, force]| curves.assemble_plan(shape, force, slower));
     let advice = match &nearest {
         Some(plan) => format!(
-            "; within the budget, {} nodes a side and the family {} are off by {:.3} mm and {:.3} N",
+            "; within the budget, {} nodes a side and the family {} have errors of {:.3} mm and {:.3} N",
             plan.mesh.nodes, plan.family.family, plan.shape_error_mm, plan.force_error_n
         ),
-        None => "; nothing measured keeps to the budget: allow a tick more time".to_owned(),
+        None => {
+            "; no measured scene keeps within the budget, so allow more time for a tick".to_owned()
+        }
     };
     Err(ScenePlanError { reason: why + &advice, nearest: nearest.map(Box::new) })
 }
@@ -208,21 +210,22 @@ impl SceneCurves {
         let fullest = most_exact(&self.families, |point| (point.error_n, point.cost_us));
         let words = |step: &StepPoint| format!("{} at {} s", step.scheme.name(), step.step_s);
         let of_mesh = finest.map(|finest| {
-            let what = format!("a mesh of {} nodes a side; {} are used", finest.nodes, mesh.nodes);
+            let what =
+                format!("a mesh of {} nodes a side; the plan has {}", finest.nodes, mesh.nodes);
             let saved_us = (finest.cost_us - mesh.cost_us) * cut.cost_share;
             (what, [mesh.error_mm, finest.error_mm], "mm", saved_us)
         });
         let of_cut = widest.map(|widest| {
-            let what = format!("influence beyond {}", cut.description());
+            let what = format!("influence beyond the cut, {}", cut.description());
             let saved_us = (widest.cost_share - cut.cost_share) * mesh.cost_us;
             (what, [cut.error_mm, widest.error_mm], "mm", saved_us)
         });
         let of_step = shortest.map(|shortest| {
-            let what = format!("{}; {} is used", words(shortest), words(step));
+            let what = format!("{}; the plan has {}", words(shortest), words(step));
             (what, [step.error_n, shortest.error_n], "N", shortest.cost_us - step.cost_us)
         });
         let of_family = fullest.map(|fullest| {
-            let what = format!("the family {}; {} is used", fullest.family, family.family);
+            let what = format!("the family {}; the plan has {}", fullest.family, family.family);
             (what, [family.error_n, fullest.error_n], "N", fullest.cost_us - family.cost_us)
         });
         // What is as exact as the most exact leaves nothing out.

@@ -35,10 +35,12 @@ pub struct CyclePrediction {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum PredictionError {
     #[error(
-        "{measured} samples with a known force before the turning point are too few for a comparison; record more"
+        "the record has only {measured} samples with a known force before the turning point, too few for a comparison; record more samples"
     )]
     TooFew { measured: usize },
-    #[error("the prediction is not a number; check the body and that times of the record increase")]
+    #[error(
+        "the prediction is not a number; check the parameters of the body and the order of the times of the record"
+    )]
     NotFinite,
 }
 

@@ -57,7 +57,7 @@ impl Sinusoid {
     pub fn remark(&self) -> Option<String> {
         (self.zero_share > LOST_SHARE).then(|| {
             format!(
-                "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe loses contact, and stiffness, loss and phase are not those of the tissue, whatever their errors; press deeper or reduce the amplitude",
+                "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe loses contact, so stiffness, loss and phase are not those of the tissue, however small their errors; press deeper or reduce the amplitude",
                 self.frequency,
                 100.0 * self.zero_share
             )
@@ -71,11 +71,11 @@ pub enum SinusoidError {
     #[error("a frequency of {frequency} Hz is not possible; give a positive number")]
     Frequency { frequency: f64 },
     #[error(
-        "the record holds {cycles:.2} cycles at {frequency} Hz; record at least one, better five"
+        "the record holds {cycles:.2} cycles at {frequency} Hz; record at least one cycle, better five"
     )]
     TooShort { cycles: f64, frequency: f64 },
     #[error(
-        "{per_cycle:.1} samples in a cycle do not resolve its harmonics; sample at least 12 times as fast as the sine"
+        "{per_cycle:.1} samples per cycle do not resolve the harmonics; take at least 12 samples per cycle"
     )]
     TooSparse { per_cycle: f64 },
     #[error("the depth does not move at {frequency} Hz; check the frequency")]

@@ -30,17 +30,17 @@ const Z975: f64 = 1.959_963_984_540_054;
 pub enum ExpectedError {
     #[error(transparent)]
     Body(#[from] BodyError),
-    #[error("a {what} of {value} is not possible; give a finite number above zero")]
+    #[error("the {what} is {value}; give a finite number above zero")]
     BadNumber { what: &'static str, value: f64 },
     #[error(
-        "{sample_rate_hz} samples per second over {duration_s:.0} s are too few for a relaxation time of {tau_s} s; sample at {wanted_hz:.0} per second at least"
+        "{sample_rate_hz} samples per second over {duration_s:.0} s are too few for a relaxation time of {tau_s} s; take at least {wanted_hz:.0} samples per second"
     )]
     TooCoarse { tau_s: f64, sample_rate_hz: f64, duration_s: f64, wanted_hz: f64 },
     #[error("this protocol cannot separate {names}; add a hold of about 5 tau or a second speed")]
     Inseparable { names: String },
     #[error("the model has no parameter '{name}'; it has {}", PARAMETER_NAMES.join(", "))]
     UnknownParameter { name: String },
-    #[error("{name} is zero in this model, so an interval in percent of it means nothing")]
+    #[error("{name} is zero in this model, so an interval in percent has no meaning")]
     ZeroParameter { name: &'static str },
     #[error(
         "pressing to {depth_mm} mm takes {force_n:.2} N even at {speed_mm_per_s} mm/s, but only {allowed_n} N are allowed; press less deep or allow more force"
@@ -51,7 +51,7 @@ pub enum ExpectedError {
     )]
     TooLittleTime { depth_mm: f64, speed_mm_per_s: f64, allowed_s: f64 },
     #[error(
-        "{name} cannot be known to {wanted} % with any protocol up to {longest_s} s; the best found reaches {reached} %; allow more time or noise that is smaller"
+        "no protocol of up to {longest_s} s determines {name} to {wanted} %; the best protocol found reaches {reached} %; allow more time or reduce the noise"
     )]
     Unreachable { name: &'static str, wanted: f64, reached: String, longest_s: f64 },
 }

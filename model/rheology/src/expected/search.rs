@@ -166,7 +166,7 @@ impl Search<'_> {
     fn proposal(&self, best: BestProtocol, reason: &str) -> Option<ProtocolProposal> {
         let (family, expected) = best?;
         let name = self.worst(&expected).map_or("nothing", |(target, _)| target.parameter);
-        let reason = format!("{name} decides the length; {reason}");
+        let reason = format!("{name} determines the duration; {reason}");
         Some(ProtocolProposal { family, expected, reason })
     }
 
@@ -185,7 +185,7 @@ impl Search<'_> {
             }
         }
         let reason = format!(
-            "both records are fitted together, and the rest of {:.1} s between them counts",
+            "both records are fitted together, and the duration includes the rest of {:.1} s between them",
             rest.0
         );
         self.proposal(best, &reason)
@@ -200,7 +200,7 @@ impl Search<'_> {
                 best = found.or(best);
             }
         }
-        let reason = "it turns back while the probe still presses, since tissue does not adhere to a probe that pulls";
+        let reason = "each cycle turns back while the probe still presses, because tissue does not adhere to a probe";
         self.proposal(best, reason)
     }
 
@@ -306,7 +306,7 @@ impl Search<'_> {
             format!("{} mm/s is the rig's fastest speed", displayed(speed))
         } else {
             format!(
-                "{} mm/s is the fastest speed that stays under {:.2} N",
+                "{} mm/s is the fastest speed that keeps the force under {:.2} N",
                 displayed(speed),
                 self.rig.force_max.0
             )

@@ -77,15 +77,17 @@ pub fn judge(
             (ExtremesVerdict::Wrong, None, "refused without a reason".to_owned())
         }
         SubjectAnswer::Refused(reason) if expected == ExpectedAnswer::Number => {
-            (ExtremesVerdict::Wrong, None, format!("refused what has an answer: {reason}"))
+            (ExtremesVerdict::Wrong, None, format!("refused although an answer exists: {reason}"))
         }
         SubjectAnswer::Refused(reason) => (ExtremesVerdict::Refused, None, reason),
         SubjectAnswer::Number { error, .. } if !error.is_finite() => {
             (ExtremesVerdict::Wrong, None, "the answer is not a finite number".to_owned())
         }
-        SubjectAnswer::Number { error, .. } if expected == ExpectedAnswer::Refusal => {
-            (ExtremesVerdict::Wrong, Some(error), "a number where there is no answer".to_owned())
-        }
+        SubjectAnswer::Number { error, .. } if expected == ExpectedAnswer::Refusal => (
+            ExtremesVerdict::Wrong,
+            Some(error),
+            "a number is given where no answer exists".to_owned(),
+        ),
         SubjectAnswer::Number { error, .. } if error <= tolerance => {
             (ExtremesVerdict::Right, Some(error), String::new())
         }
@@ -95,7 +97,7 @@ pub fn judge(
         SubjectAnswer::Number { error, .. } => (
             ExtremesVerdict::Wrong,
             Some(error),
-            format!("off by {error:.1e}, more than {tolerance:.0e}"),
+            format!("the error is {error:.1e}, more than {tolerance:.0e}"),
         ),
     };
     ExtremesRow {

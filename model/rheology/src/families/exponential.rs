@@ -38,7 +38,7 @@ impl Family for ExponentialKelvin {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "more than one relaxation time; stiffness that grows other than in proportion to force; unloading that differs from loading"
+        "more than one relaxation time; stiffness that does not grow in proportion to force; unloading that differs from loading"
     }
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {

@@ -18,7 +18,7 @@ static FRACTIONAL: Spectrum = Spectrum {
     name: "fractional Kelvin-Zener",
     equation: "F + tau^alpha D^alpha F = k0 x + (k0 + k1) tau^alpha D^alpha x",
     cannot_represent: "stiffness that grows with depth; unloading that differs from loading; an exponent alpha above 0.95, which is practically the standard linear solid",
-    adds: "a continuous spread of relaxation times",
+    adds: "a continuous spectrum of relaxation times",
     exponent: ("alpha", OuterRange::Share(0.1, 0.95)),
     digits_max: 14,
     shares,

@@ -38,8 +38,8 @@ impl Family for Kelvin {
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {
         vec![
-            ("voigt".into(), "relaxation of the spring beside the dashpot"),
-            ("maxwell".into(), "a spring that holds"),
+            ("voigt".into(), "a spring in series with the dashpot"),
+            ("maxwell".into(), "a spring in parallel"),
         ]
     }
 

@@ -32,7 +32,7 @@ impl Family for Maxwell {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading"
+        "an equilibrium force other than zero; stiffness that grows with depth; unloading that differs from loading"
     }
 
     fn outer(&self) -> Vec<OuterParameter> {

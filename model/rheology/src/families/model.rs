@@ -38,7 +38,9 @@ pub struct Model {
 pub enum ModelError {
     #[error(transparent)]
     Family(#[from] UnknownFamily),
-    #[error("a model of family {family} has {wanted} numbers and {given} were given; give {names}")]
+    #[error(
+        "a model of family {family} needs {wanted} numbers, but {given} are given; give {names}"
+    )]
     Count { family: String, wanted: usize, given: usize, names: String },
     #[error("{family}: {name} cannot be {}; it must be {must}", plain(.value))]
     Value { family: String, name: String, value: f64, must: &'static str },

@@ -58,7 +58,7 @@ impl Family for PowerSeries {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "more than one relaxation time; unloading that differs from loading; anything deeper than the data, where a power series runs away"
+        "more than one relaxation time; unloading that differs from loading; depths beyond the data, where a power series diverges"
     }
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {

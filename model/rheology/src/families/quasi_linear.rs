@@ -53,12 +53,12 @@ impl Family for QuasiLinear {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "relaxation whose shape depends on depth; stiffness that grows other than in proportion to force; unloading that differs from loading"
+        "relaxation whose shape depends on depth; stiffness that does not grow in proportion to force; unloading that differs from loading"
     }
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {
         vec![
-            ("exponential".into(), "a continuous spread of relaxation times"),
+            ("exponential".into(), "a continuous spectrum of relaxation times"),
             ("fractional".into(), "stiffness that grows with force"),
         ]
     }

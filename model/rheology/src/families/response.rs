@@ -20,14 +20,14 @@ pub(super) fn plain(value: &f64) -> String {
 pub enum StepError {
     #[error("a depth of {0} mm is not a finite number; give the depth of the probe in mm")]
     Depth(f64),
-    #[error("a time step of {0} s is not possible; time steps are zero or more seconds")]
+    #[error("a time step of {0} s is not possible; give zero or more seconds")]
     Time(f64),
     #[error(
-        "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
+        "a dashpot cannot move from {} mm to {} mm at once, because that takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
     Jump { from: f64, to: f64 },
     #[error(
-        "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
+        "the speed of a move from {} mm to {} mm in {} s is beyond the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
     Speed { from: f64, to: f64, dt: f64 },
     #[error(

@@ -30,7 +30,7 @@ pub(super) struct FamilyKind {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("there is no model family '{key}'; there are {known}")]
+#[error("'{key}' is not a model family; choose from {known}")]
 pub struct UnknownFamily {
     pub key: String,
     pub known: String,

@@ -49,7 +49,7 @@ impl Family for Unloading {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "more than one relaxation time; recovery of what was lost; a second loading that differs from the unloading before it; anything deeper than the data"
+        "more than one relaxation time; recovery of lost stiffness; a second loading that differs from the unloading before it; depths beyond the data"
     }
 
     fn adds_to(&self) -> Vec<(String, &'static str)> {

@@ -33,7 +33,7 @@ impl Family for Voigt {
     }
 
     fn cannot_represent(&self) -> &'static str {
-        "relaxation at constant depth: its force falls at once when the probe stops; a jump of depth, which would take an infinite force; stiffness that grows with depth"
+        "relaxation at constant depth, because its force falls at once when the probe stops; a jump of depth, because a jump takes an infinite force; stiffness that grows with depth"
     }
 
     fn outer(&self) -> Vec<OuterParameter> {

@@ -57,8 +57,8 @@ pub(super) fn check(
     let advice = if is_speed {
         "the depth moves at one speed only; add a hold of about 5 tau or a second speed"
     } else {
-        "along this path they change the force in the same way; add a hold of about 5 tau or a \
-         second speed, or fix one of them"
+        "along this path the parameters change the force in the same way; add a hold of about 5 tau or a \
+         second speed, or fix one of the parameters"
     };
     Err(FitError::Inseparable { names, advice: advice.to_owned() })
 }

@@ -164,7 +164,7 @@ impl FitOptions {
         }
         match self.known[index].range {
             Some(OuterRange::Time) if value <= 0.0 => {
-                return Err(bad("a relaxation time is greater than zero"));
+                return Err(bad("a relaxation time must be greater than zero"));
             }
             Some(range) => range.allows(value).map_err(bad)?,
             None => {}

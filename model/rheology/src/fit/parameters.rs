@@ -59,7 +59,7 @@ impl System<'_> {
         Err(FitError::Unsupported {
             family: self.source.family.name(),
             reason: format!(
-                "while the force is known the probe retracts by {:.0} % of its greatest depth, and {:.0} % are needed to separate unloading from loading; record the unloading, press deeper, or unload more slowly so that contact lasts",
+                "the probe retracts by {:.0} % of its greatest depth while the force is known, but a separation of unloading from loading needs {:.0} %; record the unloading, press deeper, or unload more slowly so that contact lasts",
                 100.0 * share,
                 100.0 * RETURN_MIN
             ),
@@ -104,7 +104,7 @@ impl System<'_> {
         // The search keeps within the bounds, so what the records do not hold ends on one.
         if let Some(parameter) = self.first_zero(points) {
             return Err(refused(format!(
-                "{} would have to be zero or negative; these records support fewer terms",
+                "the fit would need a {} of zero or less; these records support fewer terms",
                 self.known()[parameter].name
             )));
         }

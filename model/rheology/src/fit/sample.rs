@@ -34,16 +34,18 @@ pub enum FitError {
         "the record has {samples} sample(s) with a force and the fit has {parameters} free parameter(s); record more samples or fix parameters"
     )]
     TooFewSamples { samples: usize, parameters: usize },
-    #[error("sample {index} has a {what} of {value}; remove samples that are not finite numbers")]
+    #[error("sample {index} has a {what} of {value}; remove samples whose numbers are not finite")]
     NotFinite { index: usize, what: &'static str, value: f64 },
     #[error(
-        "the record has a {what} of {value:e} {unit}, out of scale: a fit needs numbers between 1e-50 and 1e50; check its unit"
+        "the record has a {what} of {value:e} {unit}, but a fit needs numbers between 1e-50 and 1e50; check the unit"
     )]
     Scale { what: &'static str, value: f64, unit: &'static str },
-    #[error("sample {index} has a force uncertainty of {sigma} N; it must be greater than zero")]
+    #[error(
+        "sample {index} has a force uncertainty of {sigma} N; the uncertainty must be greater than zero"
+    )]
     SigmaNotPositive { index: usize, sigma: f64 },
     #[error(
-        "sample {index} is at {t} s after {before} s; times must increase, remove repeated samples and sort the record"
+        "sample {index} is at {t} s, but the sample before is at {before} s; times must increase, so remove repeated samples and sort the record"
     )]
     TimeNotIncreasing { index: usize, t: f64, before: f64 },
     #[error(
@@ -52,20 +54,20 @@ pub enum FitError {
     NeverInTissue { deepest: f64, contact: f64 },
     #[error("this record cannot separate {}: {advice}", list(.names))]
     Inseparable { names: Vec<String>, advice: String },
-    #[error("{reason}, in {record}")]
+    #[error("{record}: {reason}")]
     InRecord { record: String, reason: Box<FitError> },
     #[error("{name} belongs to one recording and cannot be shared; share any of {known}")]
     NotShareable { name: String, known: String },
     #[error(
-        "the residuals are autocorrelated over so long a time that the record has {blocks} independent block(s), and a bootstrap needs {needed}; use the intervals of the fit or of the profile"
+        "the residuals are autocorrelated for so long that the record has only {blocks} independent block(s), but a bootstrap needs {needed}; use the intervals of the fit or of the profile"
     )]
     TooFewBlocks { blocks: usize, needed: usize },
     #[error(
-        "the force never changes from {force} N, so it does not depend on the tissue; check the load cell and the columns"
+        "the force stays at {force} N, so the force does not depend on the tissue; check the load cell and the columns"
     )]
     ConstantForce { force: f64 },
     #[error(
-        "the depth never changes from {depth} mm, so the tissue is not indented; move deeper, or check the columns"
+        "the depth stays at {depth} mm, so the probe does not indent the tissue; move deeper, or check the columns"
     )]
     ConstantDepth { depth: f64 },
     #[error("the model has no parameter '{name}'; it has {known}")]

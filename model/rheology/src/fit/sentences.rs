@@ -30,7 +30,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
     }
     if fitted.is_contact_at_start(record) {
         warnings.push(
-            "contact lies at or before the shallowest recorded depth, where it is not separable from \
+            "the contact point lies at or before the shallowest recorded depth and is not separable from \
              the elastic coefficients; record the approach as well"
                 .to_owned(),
         );
@@ -66,7 +66,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
         if parameter.value.abs() > LEVEL_LARGE * (high - low) {
             warnings.push(format!(
                 "{} is far larger than the range of the force, so it stands for something that the model \
-                 does not contain; fix it, or check the start of the record",
+                 does not contain; fix this parameter, or check the start of the record",
                 parameter.name
             ));
         }
@@ -142,7 +142,7 @@ fn edge_warning(
         let (value, unit) = (found.value, &found.unit);
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         return format!(
-            "{name} lies at an end of its range, {value:.3e}{unit}; the other parameters are conditional on it"
+            "{name} lies at an end of its range, {value:.3e}{unit}; the other parameters are conditional on this value"
         );
     }
     let end = match end {
@@ -152,7 +152,7 @@ fn edge_warning(
     let (low, high) = fitted.system.ranges[record].outers[outer];
     format!(
         "{name} lies at the {end} end of what this record can show ({:.3e} s to {:.3e} s); \
-         the other parameters are conditional on it",
+         the other parameters are conditional on this value",
         low.exp(),
         high.exp()
     )

@@ -92,12 +92,10 @@ pub enum IntegratorError {
     Body(#[from] BodyError),
     #[error(transparent)]
     Step(#[from] StepError),
-    #[error(
-        "a time step of {0} s is not possible; a constant step is finite and greater than zero"
-    )]
+    #[error("a time step of {0} s is not possible; give a finite step greater than zero")]
     Time(f64),
     #[error(
-        "{name} is unstable at steps of {dt} s, {h:.3} relaxation times; it is stable below {limit:.3}"
+        "{name} is unstable at steps of {dt} s, which are {h:.3} relaxation times; use steps below {limit:.3} relaxation times"
     )]
     Unstable { name: &'static str, dt: f64, h: f64, limit: f64 },
 }

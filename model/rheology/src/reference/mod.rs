@@ -26,7 +26,7 @@ const EXPONENT_MAX: f64 = 1e5;
 /// A force that the reference does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
-    #[error("a reference has 20 to 1000 digits, not {0}")]
+    #[error("a reference cannot have {0} digits; choose from 20 to 1000")]
     Digits(usize),
     #[error("the force at rest at that depth is beyond the largest number")]
     Overflow,

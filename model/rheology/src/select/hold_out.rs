@@ -38,11 +38,11 @@ pub enum HoldOutError {
     #[error("'{0}' cannot be held out; choose auto, speed, depth, specimen or none")]
     Unknown(String),
     #[error(
-        "no {what} can be held out, because the {records} record(s) have one {what} only; add records of another, or hold out 'auto'"
+        "no {what} can be held out, because the {records} record(s) have one {what} only; add records of another {what}, or hold out 'auto'"
     )]
     AllAlike { what: &'static str, records: usize },
     #[error(
-        "no specimen can be held out, because {record} does not name its specimen; name one for each source, or hold out 'auto'"
+        "no specimen can be held out, because {record} does not name its specimen; name a specimen for each source, or hold out 'auto'"
     )]
     NoSpecimen { record: String },
 }

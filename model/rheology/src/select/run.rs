@@ -47,9 +47,9 @@ pub struct SelectProgress {
 /// Nothing could be compared.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SelectError {
-    #[error("there is no record to compare models on; name a session or a table")]
+    #[error("the comparison has no record; name a session or a table")]
     NoRecords,
-    #[error("there is no family to compare; name at least one")]
+    #[error("the comparison has no family; name at least one family")]
     NoFamilies,
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),

@@ -86,7 +86,7 @@ fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> S
             (
                 SelectionOutcome::NoneAdequate,
                 format!(
-                    "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} of them carry the information of {:.0} independent ones), so the lowest criterion proves nothing; state a tolerance, the error that does not matter",
+                    "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} samples carry the information of {:.0} independent samples), so the lowest BIC proves nothing; state a tolerance, which is the largest error that does not matter",
                     counts.samples, counts.effective
                 ),
             )
@@ -94,7 +94,7 @@ fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> S
         Some(one) if near.len() > 1 => (
             SelectionOutcome::NoWinner,
             format!(
-                "no winner among {}: their BIC differ by less than {BARE_MENTION}; use {}, the simplest of them",
+                "no winner among {}: their BIC values differ by less than {BARE_MENTION}; use {}, the simplest of them",
                 list(&among),
                 one.family
             ),
@@ -106,7 +106,7 @@ fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> S
                 .map(|other| other.bic_above)
                 .fold(f64::INFINITY, f64::min);
             let lead = if next.is_finite() {
-                format!(": the lowest BIC, {next:.1} below the next")
+                format!(": it has the lowest BIC, {next:.1} below the next")
             } else {
                 ", the only family compared".to_owned()
             };
@@ -114,7 +114,7 @@ fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> S
         }
         None => (
             SelectionOutcome::NoneAdequate,
-            "no family has a criterion; check the units of force and depth".to_owned(),
+            "no family has a finite BIC; check the units of force and depth".to_owned(),
         ),
     };
     let is_chosen = matches!(outcome, SelectionOutcome::Recommended | SelectionOutcome::NoWinner);
@@ -133,7 +133,7 @@ fn choose_within(
     is_predicted: bool,
 ) -> SelectionVerdict {
     let error = |one: &ModelCandidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
-    let what = if is_predicted { "predicts what was held out" } else { "describes the records" };
+    let what = if is_predicted { "predicts the held-out data" } else { "describes the records" };
     let good: Vec<&ModelCandidate> =
         candidates.iter().filter(|one| error(one) <= tolerance).collect();
     let by_cost = |one: &&&ModelCandidate| (one.cost, one.free);
@@ -142,13 +142,14 @@ fn choose_within(
         let nearest = nearest.filter(|one| error(one).is_finite());
         let sentence = match nearest {
             Some(one) => format!(
-                "no winner: no family {what} within {}; the nearest is {} with {} rms",
+                "no winner: no family {what} within {}; the nearest is {} with an error of {} rms",
                 newtons(tolerance),
                 one.family,
                 newtons(error(one))
             ),
             None => {
-                "no winner: no family could be fitted to what was not held out; add records".into()
+                "no winner: no family can be fitted to the data that are not held out; add records"
+                    .into()
             }
         };
         return SelectionVerdict {
@@ -167,7 +168,7 @@ fn choose_within(
     let among: Vec<String> = equals.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&equals).unwrap_or(cheapest);
     let first = format!(
-        "{} ({}): it {what} within {}, {} rms and {} at worst, for {} operations an evaluation",
+        "{} ({}): it {what} within {}, with an error of {} rms and {} at worst, for {} operations per evaluation",
         chosen.family,
         chosen.name,
         newtons(tolerance),
@@ -177,7 +178,7 @@ fn choose_within(
     );
     let mut sentences = vec![if equals.len() > 1 {
         format!(
-            "no winner among {}, of one cost and one error; use the simplest: {first}",
+            "no winner among {}, which have equal costs and equal errors; use the simplest, {first}",
             list(&among)
         )
     } else {
@@ -226,14 +227,15 @@ fn remarks(
     let error = |one: &ModelCandidate| one.error(is_predicted).unwrap_or(f64::INFINITY);
     if worst(chosen, is_predicted) > tolerance {
         remarks.push(format!(
-            "the tolerance holds on average, not everywhere; the error of single samples is up to {}",
+            "the tolerance holds on average but not everywhere; the error of single samples is up to {}",
             newtons(worst(chosen, is_predicted))
         ));
     }
     let spread = chosen.prediction.as_ref().and_then(|one| one.std_error_n);
     if let Some(spread) = spread.filter(|spread| error(chosen) + spread > tolerance) {
         remarks.push(format!(
-            "its error varies between records by {} (standard error), more than the margin to the tolerance; another record may lie outside it",
+            "the error of {} varies between records by {} (standard error), more than the margin to the tolerance; another record may exceed the tolerance",
+            chosen.family,
             newtons(spread)
         ));
     }
@@ -242,7 +244,7 @@ fn remarks(
         && best.family != chosen.family
     {
         remarks.push(format!(
-            "{} reduces the error to {} for {} operations",
+            "{} reduces the error to {} for {} operations per evaluation",
             best.family,
             newtons(lowest),
             best.cost.operations

@@ -175,14 +175,14 @@ fn best(
         )),
         (None, None, None) => Advice::None("nothing was measured".into()),
         (None, Some(nearest), _) => Advice::None(format!(
-            "nothing measured is within {tolerance}; the nearest is {} with {:.2e} of the peak force",
+            "no measured setting is within {tolerance}; the nearest is {} with an error of {:.2e} of the peak force",
             nearest.setting, nearest.error_of_peak
         )),
         (Some(choice), _, Some((rate, share)))
             if choice.share_of_period.is_some_and(|used| used > share) =>
         {
             Advice::None(format!(
-                "the cheapest within {tolerance} is {}, which takes {:.3} % of each period at {rate} updates a second; allowed are {} %",
+                "the cheapest setting within {tolerance} is {}, which takes {:.3} % of each period at {rate} updates a second, more than the {} % allowed",
                 choice.setting,
                 100.0 * choice.share_of_period.unwrap_or_default(),
                 100.0 * share

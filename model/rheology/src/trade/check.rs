@@ -6,12 +6,14 @@ use thiserror::Error;
 
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CurveError {
-    #[error("these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again")]
+    #[error(
+        "these curves have format {0}, but this version of palpate reads format {TRADE_FORMAT}; measure again"
+    )]
     Format(u32),
     #[error("the curves give {what} of {value}, which is not possible; measure again")]
     Number { what: String, value: f64 },
     #[error(
-        "the curves contradict themselves at {0}: they were changed after they were measured; measure again"
+        "the curves contradict themselves at {0}, so they were changed after the measurement; measure again"
     )]
     Contradiction(String),
     #[error(

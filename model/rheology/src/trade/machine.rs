@@ -39,24 +39,24 @@ impl TradeCurves {
         let there = &self.machine;
         if (&there.cpu, &there.os, there.cores) != (&here.cpu, &here.os, here.cores) {
             doubts.push(format!(
-                "these curves were measured on another computer ({}), and this is {}; measure here",
+                "these curves were measured on another computer ({}), but this computer is {}; measure again here",
                 there.words(),
                 here.words()
             ));
         } else if there.profile != here.profile {
             doubts.push(format!(
-                "these curves are of a {} build and this is a {} build; measure again",
+                "these curves are from a {} build, but this is a {} build; measure again",
                 there.profile, here.profile
             ));
         }
         if self.version != version {
             doubts.push(format!(
-                "these curves are stale: measured by palpate {}, this is {version}; measure again",
+                "these curves are stale: they are from palpate {}, but this is palpate {version}; measure again",
                 self.version
             ));
         } else if age_days > STALE_DAYS {
             doubts.push(format!(
-                "these curves are stale: measured {age_days:.0} days ago; measure again"
+                "these curves are stale: they were measured {age_days:.0} days ago; measure again"
             ));
         } else if age_days < -1.0 {
             // A day allows for a clock that was set.
@@ -65,7 +65,9 @@ impl TradeCurves {
             );
         }
         if self.quick {
-            doubts.push("these curves were measured quickly: few rows, rough times".into());
+            doubts.push(
+                "these curves were measured quickly, so they have few rows and rough times".into(),
+            );
         }
         doubts
     }

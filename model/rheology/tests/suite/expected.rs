@@ -219,7 +219,7 @@ fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
     let noise = MeasurementNoise::white(Newtons(0.02));
     let refusal = intervals(&hasty, &thesis_protocol(1e3), &noise, FreeOffsets::default());
     let text = refusal.unwrap_err().to_string();
-    assert!(text.contains("sample at 2000 per second"), "{text}");
+    assert!(text.contains("take at least 2000 samples per second"), "{text}");
     // At a rate that resolves it, the plan is the same question on another scale of time: speeds
     // and times in units of tau, with the viscous coefficient to match.
     let (slow, quick) = (BODY, 0.01);

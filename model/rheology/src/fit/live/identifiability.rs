@@ -62,7 +62,7 @@ impl BlindParameters {
             .collect();
         let is_pair = |a: &str, b: &str| name == a && others == [b];
         Some(if others.is_empty() {
-            format!("{name} has not changed the force yet: move deeper")
+            format!("{name} has not changed the force yet; move deeper")
         } else if is_pair("mu1", "tau_sig") || is_pair("tau_sig", "mu1") {
             format!(
                 "{name} cannot yet be separated from {}: the depth has moved at one speed only; \
@@ -71,7 +71,7 @@ impl BlindParameters {
             )
         } else {
             format!(
-                "{name} cannot yet be separated from {}: along this path they change the force in \
+                "{name} cannot yet be separated from {}: along this path these parameters change the force in \
                  the same way; hold for about 5 tau or add a second speed",
                 others.join(", ")
             )

@@ -39,8 +39,8 @@ impl SystematicUncertainty {
         let names = names.join(" and ");
         let Some(first) = self.parameters.first() else {
             let states = match is_one {
-                true => "states nothing of its",
-                false => "state nothing of their",
+                true => "states nothing about its",
+                false => "state nothing about their",
             };
             return format!("{names} {states} own errors, so the systematic error is not known");
         };
@@ -68,7 +68,7 @@ impl SystematicUncertainty {
             false => "",
         };
         format!(
-            "{names} {} the systematic error as one standard uncertainty, which repeats do not reduce ({parts}){beyond}",
+            "{names} {} a systematic error, stated as one standard uncertainty, which repeats do not reduce ({parts}){beyond}",
             if is_one { "adds" } else { "add" },
         )
     }
