@@ -215,11 +215,7 @@ fn a_limit_that_changes_nothing_is_reported_where_it_stands() {
         let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
         succeeded(&preview);
         let message = stdout(&preview) + &stderr(&preview);
-        assert_eq!(
-            message.matches("changes nothing").count(),
-            usize::from(is_reported),
-            "{message}"
-        );
+        assert_eq!(message.matches("has no effect").count(), usize::from(is_reported), "{message}");
     }
 }
 

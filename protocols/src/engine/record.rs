@@ -211,7 +211,7 @@ impl fmt::Display for Record {
         match self {
             Self::PhaseStarted { phase, .. } => write!(f, "{phase}"),
             Self::Homed { edge_pulses } => {
-                write!(f, "home found at counter {edge_pulses}; position zero set there")
+                write!(f, "home found at pulse {edge_pulses}, which is now position zero")
             }
             Self::Tared { volts, noise, drift, .. } => {
                 write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)?;
@@ -221,7 +221,7 @@ impl fmt::Display for Record {
                 })
             }
             Self::ContactTriggered { pass, position, force, .. } => {
-                write!(f, "pass {pass} triggered with {force:.3} at {position:.3}")
+                write!(f, "pass {pass} triggered at {position:.3} with a force of {force:.3}")
             }
             Self::ContactFound { position, std_error_mm } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
@@ -250,7 +250,7 @@ impl fmt::Display for Record {
             ),
             Self::LeadLost { silent } => write!(
                 f,
-                "the slave has had no lead for {silent:.1}; it stops, and the step ends unless a lead arrives"
+                "the slave has had no lead for {silent:.1}; the axis stops, and the step ends unless a lead arrives"
             ),
             Self::HoldSteady { slope_n_per_s, held } => write!(
                 f,
@@ -261,7 +261,7 @@ impl fmt::Display for Record {
                 write!(f, "{force:.3} reached at {depth:.3}; the target was {target:.3}")
             }
             Self::Prompted { message, timeout } => {
-                write!(f, "{message} (waits {:.0})", *timeout)
+                write!(f, "{message} (waits at most {:.0})", *timeout)
             }
             Self::Answered { answer } => f.write_str(match answer {
                 PromptAnswer::Confirmed => "done",
@@ -269,18 +269,18 @@ impl fmt::Display for Record {
                 PromptAnswer::TimedOut => "no answer in time",
             }),
             Self::PausePending { step_index } => {
-                write!(f, "will pause after step {}", step_index + 1)
+                write!(f, "the run will pause after step {}", step_index + 1)
             }
             Self::Paused { reason, no_resume } => match no_resume {
-                Some(cause) => write!(f, "paused: {reason}; cannot go on: {cause}"),
+                Some(cause) => write!(f, "paused: {reason}; the run cannot go on: {cause}"),
                 None => write!(f, "paused: {reason}"),
             },
             Self::Resumed => f.write_str("resumed"),
             Self::Refused { reason } => write!(f, "refused: {reason}"),
             Self::FinishedEarly => f.write_str("the rest of the measurement is skipped"),
             Self::StepFailed { reason, then } => match then {
-                FailureResponse::Retry(count) => write!(f, "{reason}; trying again ({count})"),
-                FailureResponse::Skip => write!(f, "{reason}; skipped"),
+                FailureResponse::Retry(count) => write!(f, "{reason}; retry {count} follows"),
+                FailureResponse::Skip => write!(f, "{reason}; the step is skipped"),
             },
             Self::MonitorTripped { message, value, .. } => write!(f, "{message} ({value:.4})"),
             Self::MonitorPast { index, value } => {
@@ -288,7 +288,7 @@ impl fmt::Display for Record {
             }
             Self::Weighed { mass_g, is_loading, repeat, volts, .. } => {
                 let way = if *is_loading { "loading" } else { "unloading" };
-                write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
+                write!(f, "{mass_g} g, {way}, pass {repeat}: {volts:.4}")
             }
             Self::StepReported { text, .. } => f.write_str(text),
             Self::Noted { text } => write!(f, "note: {text}"),

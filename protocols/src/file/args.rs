@@ -16,7 +16,7 @@ const MASS_MAX: f64 = 100_000.0;
 pub(super) const COUNT_MAX: f64 = 10_000.0;
 
 /// What to do about steps below another [table]: everything belongs to the last one above it.
-pub(super) const STEPS_HINT: &str = "write [procedure] on a line above it";
+pub(super) const STEPS_HINT: &str = "write [procedure] on a line above the steps";
 
 pub(crate) struct Args(Vec<(&'static str, ProtocolValue)>);
 
@@ -65,7 +65,7 @@ impl Args {
                             problems.error(
                                 entry.line,
                                 format!(
-                                    "'{}' of {what} cannot be none; give {}",
+                                    "'{}' of {what} is \"none\" but needs a value, such as {}",
                                     key.name,
                                     key.kind.example()
                                 ),
@@ -157,15 +157,17 @@ fn checked(key: &Key, given: ProtocolValue) -> Result<ProtocolValue, String> {
         },
         QuantityKind::Text => match key.range {
             Range::OneOf(words) if !words.contains(&given.text.as_str()) => {
-                Err(format!("'{}' is not possible; {}", given.text, suggestion(&given.text, words)))
+                Err(format!("'{}' is not allowed; {}", given.text, suggestion(&given.text, words)))
             }
-            _ if given.text.trim().is_empty() => Err("it is empty; write a text".into()),
+            _ if given.text.trim().is_empty() => {
+                Err("the text is empty; write at least one word".into())
+            }
             _ => Ok(given),
         },
         kind => {
             let number = given.number(kind)?;
             check_range(kind, key.range, number)
-                .map_err(|reason| format!("{} is not possible; {reason}", given.text))?;
+                .map_err(|reason| format!("{} is out of range; {reason}", given.text))?;
             Ok(given)
         }
     }
@@ -180,21 +182,22 @@ pub(super) fn check_range(kind: QuantityKind, range: Range, number: f64) -> Resu
         _ => SIZE_MAX,
     };
     let (is_within, least) = match range {
-        Range::Above0 => (number > 0.0, "more than 0"),
-        Range::From0 => (number >= 0.0, "0"),
-        Range::Any | Range::OneOf(_) => (number >= -most, "less"),
+        Range::Above0 => (number > 0.0, "more than 0 and at most".to_owned()),
+        Range::From0 => (number >= 0.0, "0 to".to_owned()),
+        Range::Any | Range::OneOf(_) => (number >= -most, format!("-{most} to")),
     };
     if is_within && number <= most {
         return Ok(());
     }
-    let unit = kind.unit();
-    Err(match range {
-        Range::Any | Range::OneOf(_) => format!("give -{most} to {most} {unit}"),
-        _ => format!("give {least} and at most {most} {unit}"),
-    })
+    // A count has no unit.
+    Err(format!("give {least} {most} {}", kind.unit()).trim_end().to_owned())
 }
 
 fn describe_missing(what: &str, key: &Key) -> String {
-    let (name, example) = (key.name, key.kind.example());
-    format!("{what} needs '{name}': {}; write {name} = {example}", key.about)
+    let name = key.name;
+    let example = match key.range {
+        Range::OneOf([first, ..]) => format!("\"{first}\""),
+        _ => key.kind.example().to_owned(),
+    };
+    format!("{what} needs '{name}' ({}); write {name} = {example}", key.about)
 }

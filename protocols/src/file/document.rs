@@ -85,10 +85,13 @@ fn check_language(root: &DocumentTable, problems: &mut Problems) -> Option<()> {
         Some(DocumentNode { line, value: DocumentValue::Number(number) }) => {
             (*line, number.as_str())
         }
-        Some(node) => (node.line, node.kind()),
+        Some(node) => {
+            let kind = node.kind();
+            problems.error(node.line, format!("'palpate' must be the version of the language, not {kind}; write palpate = {LANGUAGE}"));
+            return None;
+        }
         None => {
-            let first = format!("palpate = {LANGUAGE}");
-            problems.error(1, format!("this does not say that it is a palpate protocol; write {first} on its first line"));
+            problems.error(1, format!("the protocol does not name its language version; write palpate = {LANGUAGE} on the first line"));
             return None;
         }
     };
@@ -97,7 +100,7 @@ fn check_language(root: &DocumentTable, problems: &mut Problems) -> Option<()> {
     }
     problems.error(
         line,
-        format!("the protocol is written in version {found} of the language, this program reads version {LANGUAGE}; use the palpate it was written for, or write palpate = {LANGUAGE} and check it again"),
+        format!("the protocol is written in version {found} of the language, but this program reads version {LANGUAGE}; use a palpate that reads version {found}, or write palpate = {LANGUAGE} and check the protocol again"),
     );
     None
 }
@@ -110,7 +113,7 @@ fn check_name(root: &DocumentTable, name: &str, problems: &mut Problems) {
         problems.error(
             line,
             format!(
-                "the name '{name}' cannot be typed everywhere; use small letters, digits and '-'"
+                "the name '{name}' has characters that are not allowed; use small letters, digits and '-'"
             ),
         );
     }
@@ -146,12 +149,13 @@ fn read_ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
             DocumentValue::Text(key) if ask.contains(key) => {}
             DocumentValue::Text(key) if known.contains(&key.as_str()) => ask.push(key.clone()),
             DocumentValue::Text(key) => {
-                let message = format!("'{key}' cannot be asked for; {}", suggestion(key, &known));
-                problems.error(item.line, message);
+                let hint = suggestion(key, &known);
+                problems.error(item.line, format!("'ask' knows no key '{key}'; {hint}"));
             }
             _ => {
                 let kind = item.kind();
-                let message = format!("{kind} cannot be asked for; write a text in quotes");
+                let message =
+                    format!("'ask' takes keys in quotes, not {kind}; write ask = [\"operator\"]");
                 problems.error(item.line, message);
             }
         }
@@ -167,14 +171,15 @@ fn find_procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode
     let Some(node) = root.get("procedure") else {
         // Steps in the wrong table are reported there.
         if !is_misplaced {
-            problems.error(1, "the protocol has no steps; write [procedure] and below it steps = [ { do = \"self-test\" }, ... ]");
+            problems.error(1, "the protocol has no steps; write [procedure] and, on the next line, steps = [ { do = \"self-test\" }, ... ]");
         }
         return nothing;
     };
     let steps = match &node.value {
         DocumentValue::Table(table) => {
             for entry in table.entries.iter().filter(|entry| entry.key != "steps") {
-                let message = format!("[procedure] has only the key 'steps', not '{}'", entry.key);
+                let message =
+                    format!("[procedure] has no key '{}'; write only 'steps' in it", entry.key);
                 problems.error(entry.line, message);
             }
             table.get("steps")
@@ -183,7 +188,7 @@ fn find_procedure(root: &DocumentTable, problems: &mut Problems) -> DocumentNode
     };
     match steps {
         Some(DocumentNode { line, value: DocumentValue::List(items) }) if items.is_empty() => {
-            problems.error(*line, "the protocol has no steps; write { do = \"self-test\" } and so on between the brackets");
+            problems.error(*line, "the list of steps is empty; write steps such as { do = \"self-test\" } between the brackets");
             nothing
         }
         Some(steps @ DocumentNode { value: DocumentValue::List(_), .. }) => steps.clone(),
@@ -210,7 +215,7 @@ fn check_used(protocol: &Protocol, problems: &mut Problems) {
         let name = &parameter.name;
         problems.error(
             parameter.line,
-            format!("parameter '{name}' is not used by any step; write \"${name}\" where its value belongs or take it out"),
+            format!("parameter '{name}' is not used; write \"${name}\" where its value belongs, or remove the parameter"),
         );
     }
 }

@@ -82,17 +82,13 @@ pub(super) const COMMON: [Key; 3] = [
     Key::optional(
         "checkpoint",
         QuantityKind::Text,
-        "name of a checkpoint after the step, where the run may pause",
+        "name of the checkpoint after the step; the run may pause at a checkpoint",
     ),
     Key::usual(
         "on_failure",
         QuantityKind::Text,
         "abort",
-        "`abort`, `skip`, or `retry 2`: what follows if the step cannot be done",
+        "what follows if the step fails: `abort`, `skip`, or `retry 2` for two retries",
     ),
-    Key::optional(
-        "only_if",
-        QuantityKind::Flag,
-        "skips the step where this is `false` or `\"none\"`",
-    ),
+    Key::optional("only_if", QuantityKind::Flag, "`false` or `\"none\"` skips the step"),
 ];

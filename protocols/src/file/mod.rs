@@ -135,7 +135,10 @@ impl Protocol {
         let is_nothing =
             matches!(&self.procedure.value, DocumentValue::List(items) if items.is_empty());
         if steps.is_empty() && !is_nothing && problems.count() == before {
-            problems.error(self.procedure.line, "with these values no step is left; choose others");
+            problems.error(
+                self.procedure.line,
+                "the protocol has no steps with these values; choose other values",
+            );
         }
         let (steps, lines) = steps.into_iter().map(|placed| (placed.planned, placed.line)).unzip();
         let plan = Plan {
@@ -170,6 +173,10 @@ impl Protocol {
         if open.is_empty() {
             return Ok(());
         }
-        Err(format!("protocol {} needs these before it starts: {}", self.name, open.join(", ")))
+        Err(format!(
+            "protocol {} needs these labels before the start: {}",
+            self.name,
+            open.join(", ")
+        ))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::args::{Args, check_range};
 use super::keys::{Key, Range};
-use super::problem::{Problems, ProtocolProblem};
+use super::problem::Problems;
 use super::quantity::QuantityKind;
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
@@ -13,12 +13,12 @@ const LIMIT_KEYS: [Key; 2] = [
     Key::optional(
         "force_max",
         QuantityKind::Force,
-        "highest force above tare; the rig's own limit holds too",
+        "highest force above tare; the rig's own limit also applies",
     ),
     Key::optional(
         "travel_max",
         QuantityKind::Length,
-        "furthest position from home, such as a little before the base; the rig's own end holds too",
+        "furthest position from home, such as a little before the base; the rig's own limit also applies",
     ),
 ];
 
@@ -62,18 +62,26 @@ const ACTIONS: [(&str, MonitorAction); 5] = [
 
 /// Keys of a monitor beside the values, whose unit depends on what is watched.
 pub(super) const MONITOR_KEYS: [Key; 4] = [
-    Key::needed("watch", QuantityKind::Text, "`force`, `depth`, `signal` or `position`")
-        .one_of(&["force", "depth", "signal", "position"]),
+    Key::needed(
+        "watch",
+        QuantityKind::Text,
+        "watched quantity: `force`, `depth`, `signal` or `position`",
+    )
+    .one_of(&["force", "depth", "signal", "position"]),
     Key::usual(
         "settle",
         QuantityKind::Time,
         "1 s",
-        "how long the value must be in range before a paused run goes on",
+        "time that the value must stay in range before a paused run goes on",
     )
     .zero_allowed(),
-    Key::needed("action", QuantityKind::Text, "`note`, `pause`, `stop`, `retract` or `halt`")
-        .one_of(&["note", "pause", "stop", "retract", "halt"]),
-    Key::needed("message", QuantityKind::Text, "what the operator reads"),
+    Key::needed(
+        "action",
+        QuantityKind::Text,
+        "what follows: `note`, `pause`, `stop`, `retract` or `halt`",
+    )
+    .one_of(&["note", "pause", "stop", "retract", "halt"]),
+    Key::needed("message", QuantityKind::Text, "text that the operator reads"),
 ];
 
 pub(super) fn read_monitors(
@@ -85,7 +93,7 @@ pub(super) fn read_monitors(
         return Vec::new();
     };
     let DocumentValue::List(items) = &node.value else {
-        problems.error(node.line, "write [[monitor]] in double brackets, once for each monitor");
+        problems.error(node.line, "'monitor' must be a list of tables; write [[monitor]] in double brackets above each monitor");
         return Vec::new();
     };
     let tables = items.iter().filter_map(|item| match &item.value {
@@ -104,7 +112,9 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
         let node = table.get(key)?;
         let number = scope.value(node, kind).and_then(|given| {
             let number = given.number(kind)?;
-            check_range(kind, Range::Any, number).map(|()| number)
+            check_range(kind, Range::Any, number)
+                .map_err(|reason| format!("{} is out of range; {reason}", given.text))?;
+            Ok(number)
         });
         problems.take(node.line, number.map_err(|reason| format!("'{key}' of a monitor: {reason}")))
     };
@@ -113,7 +123,8 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
         (true, false) => (ThresholdSide::Above, above?),
         (false, true) => (ThresholdSide::Below, below?),
         _ => {
-            let message = "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"";
+            let message =
+                "a monitor needs exactly one threshold; write above = \"6 N\" or below = \"6 N\"";
             problems.error(table.line, message);
             return None;
         }
@@ -130,10 +141,7 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
     };
     if let Err(reason) = monitor.check() {
         let line = table.get("resume").map_or(table.line, |node| node.line);
-        problems.push(ProtocolProblem::error(
-            line,
-            format!("{reason}; give a 'resume' on the other side of the threshold"),
-        ));
+        problems.error(line, reason);
     }
     Some(monitor)
 }

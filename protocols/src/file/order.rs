@@ -30,14 +30,14 @@ pub(super) fn check(steps: &[PlacedStep], problems: &mut Problems) {
         {
             problems.push(ProtocolProblem::warning(
                 placed.line,
-                format!("at the checkpoint '{checkpoint}' the probe is in the tissue, which goes on relaxing in a pause; put the checkpoint behind a retract or unload if that matters"),
+                format!("the probe is in the tissue at checkpoint '{checkpoint}', and the tissue goes on relaxing during a pause; put the checkpoint after a retract or unload if this matters"),
             ));
         }
     }
     if let Some(last) = steps.last().filter(|_| known.is_inside) {
         problems.push(ProtocolProblem::warning(
             last.line,
-            "the protocol ends with the probe in the tissue; end it with { do = \"retract\" } if that is not meant",
+            "the protocol ends with the probe in the tissue; add { do = \"retract\" } at the end unless this is intended",
         ));
     }
 }

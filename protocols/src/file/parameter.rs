@@ -97,7 +97,7 @@ pub(super) fn read_parameters(
             }
             problems.error(
                 entry.line,
-                format!("parameter '{name}' must say more than a value; write {name} = {{ default = \"20 mm\", about = \"...\", source = \"...\" }}"),
+                format!("parameter '{name}' must be a table in braces; write {name} = {{ default = \"20 mm\", about = \"...\", source = \"...\" }}"),
             );
             return None;
         };
@@ -135,14 +135,14 @@ fn read_parameter(
     };
     let (about, source) = (text_of("about"), text_of("source"));
     if about.is_empty() {
-        let message = format!("parameter '{name}' does not say what it is; write about = \"...\"");
+        let message = format!("parameter '{name}' has no description; write about = \"...\"");
         problems.error(line, message);
     }
     let Some(default) = keys.get("default") else {
         problems.error(
             line,
             format!(
-                "parameter '{name}' has no default; write default = \"20 mm\" or whatever is usual"
+                "parameter '{name}' has no default; write its usual value, such as default = \"20 mm\""
             ),
         );
         return None;
@@ -152,7 +152,10 @@ fn read_parameter(
     let mut bound = |key: &str| {
         let node = keys.get(key)?;
         let number = ProtocolValue::of_node(node).and_then(|given| given.number(kind));
-        problems.take(node.line, number.map_err(|reason| format!("'{key}' of '{name}': {reason}")))
+        problems.take(
+            node.line,
+            number.map_err(|reason| format!("'{key}' of parameter '{name}': {reason}")),
+        )
     };
     let parameter = ProtocolParameter {
         name: name.to_owned(),
@@ -166,8 +169,7 @@ fn read_parameter(
         line,
     };
     if let Err(reason) = parameter.check(&parameter.default) {
-        problems
-            .error(line, format!("the default of '{name}' does not pass its own check: {reason}"));
+        problems.error(line, format!("the default of parameter '{name}' is not valid: {reason}"));
     }
     Some(parameter)
 }
@@ -177,16 +179,17 @@ fn kind_of(name: &str, default: &ProtocolValue, unit: &str) -> Result<QuantityKi
     match (default.kind(), unit) {
         (Some(kind), "") => Ok(kind),
         (None, "") => Err(format!(
-            "the default of '{name}' has no unit; add unit = \"mm\" or the unit it has"
+            "the default of parameter '{name}' has no unit; add the unit, such as unit = \"mm\""
         )),
         (found, unit) => {
             match QuantityKind::of_unit(unit).or((unit == "text").then_some(QuantityKind::Text)) {
                 Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
-                Some(kind) => {
-                    Err(format!("the default of '{name}' is wrong: {}", default.is_not(kind)))
-                }
+                Some(kind) => Err(format!(
+                    "the default of parameter '{name}' does not fit its unit: {}",
+                    default.is_not(kind)
+                )),
                 None => Err(format!(
-                    "'{unit}' of '{name}' is not a unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
+                    "unit '{unit}' of parameter '{name}' is not known; write mm, mm/s, N, s, g, Hz, N/min, V or text"
                 )),
             }
         }

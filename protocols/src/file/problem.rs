@@ -99,7 +99,8 @@ impl Problems {
     pub fn into_list(mut self) -> Vec<ProtocolProblem> {
         self.found.sort_by_key(|problem| problem.line);
         if self.dropped > 0 {
-            let message = "there are more problems than these; correct these and check again";
+            let message =
+                format!("only {PROBLEMS_MAX} problems are listed; correct these and check again");
             self.found.push(ProtocolProblem::error(0, message));
         }
         self.found
@@ -118,7 +119,7 @@ pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 pub fn suggestion(word: &str, known: &[&str]) -> String {
     match nearest(word, known.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
-        None if known.is_empty() => "there is none here".into(),
+        None if known.is_empty() => "none is defined here".into(),
         None => format!("choose from {}", known.join(", ")),
     }
 }

@@ -19,9 +19,9 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
         QuantityKind::Text,
-        "name for the number of the pass, from 1: `$name` in values, `{name}` in texts",
+        "name of the pass number, which counts from 1: `$name` in values, `{name}` in texts",
     ),
-    Key::optional("reverse", QuantityKind::Flag, "`true` runs through the values backwards"),
+    Key::optional("reverse", QuantityKind::Flag, "`true` takes the values in reverse order"),
     Key::optional(
         "cycle",
         QuantityKind::Flag,
@@ -30,13 +30,9 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "checkpoint",
         QuantityKind::Text,
-        "name of a checkpoint after each pass, where the run may pause",
+        "name of the checkpoint after each pass; the run may pause at a checkpoint",
     ),
-    Key::optional(
-        "only_if",
-        QuantityKind::Flag,
-        "skips the loop where this is `false` or `\"none\"`",
-    ),
+    Key::optional("only_if", QuantityKind::Flag, "`false` or `\"none\"` skips the loop"),
 ];
 
 pub(super) struct PlacedStep {
@@ -98,10 +94,10 @@ impl Writer<'_> {
             }
             (false, false) => "a loop needs 'repeat' or 'for_each'; write repeat = 10",
             (true, true) => {
-                "a loop has 'repeat' or 'for_each', not both; put one loop into the other"
+                "a loop cannot have both 'repeat' and 'for_each'; put one loop into the other"
             }
             _ if has("do") => {
-                "one step cannot repeat itself; put it into a loop: { repeat = 10, steps = [ { do = ... } ] }"
+                "a step cannot have 'repeat' or 'for_each'; put the step into a loop: { repeat = 10, steps = [ { do = ... } ] }"
             }
             _ => return self.run_loop(table, cycle, depth),
         };
@@ -110,11 +106,11 @@ impl Writer<'_> {
 
     fn step(&mut self, table: &DocumentTable, cycle: u32) -> Result<(), String> {
         let Some(DocumentValue::Text(name)) = table.get("do").map(|node| &node.value) else {
-            return Err("a step must say what to do; write do = \"ramp\" or repeat = 10".into());
+            return Err("a step needs 'do' with a name in quotes; write do = \"ramp\", or repeat = 10 for a loop".into());
         };
         let Some((kind, build)) = kinds().find(|(kind, _)| kind.word == name) else {
             let known: Vec<&str> = kinds().map(|(kind, _)| kind.word).collect();
-            return Err(format!("there is no step '{name}'; {}", suggestion(name, &known)));
+            return Err(format!("'{name}' is not a known step; {}", suggestion(name, &known)));
         };
         let before = self.problems.count();
         let what = format!("'{name}'");
@@ -139,11 +135,11 @@ impl Writer<'_> {
         let mistake = |message: &str| Err((table.line, message.to_owned()));
         if depth == LOOPS_MAX {
             return mistake(&format!(
-                "loops can stand in one another {LOOPS_MAX} deep, not deeper; write some steps out"
+                "loops are nested more than {LOOPS_MAX} deep; write some steps out"
             ));
         }
         let Some(steps) = table.get("steps") else {
-            return mistake("a loop needs steps; write steps = [ { do = \"ramp\", ... } ]");
+            return mistake("a loop needs 'steps'; write steps = [ { do = \"ramp\", ... } ]");
         };
         let other_keys = ["repeat", "for_each", "steps"];
         // The name of a checkpoint may use the loop's own names, so it is read in each pass.
@@ -163,7 +159,7 @@ impl Writer<'_> {
         for name in [name.as_str(), number].into_iter().filter(|name| !name.is_empty()) {
             if self.scope.has(name) {
                 return mistake(&format!(
-                    "the name '{name}' is taken already; give the loop another"
+                    "the name '{name}' is already used; give the loop another name"
                 ));
             }
         }
@@ -191,7 +187,9 @@ impl Writer<'_> {
             self.scope.shorten(outside);
         }
         if count > 0 && matches!(&steps.value, DocumentValue::List(items) if items.is_empty()) {
-            return mistake("the loop has no steps; put some between its brackets or take it out");
+            return mistake(
+                "the loop has no steps; write some between its brackets, or remove the loop",
+            );
         }
         Ok(())
     }
@@ -218,7 +216,7 @@ impl Writer<'_> {
                 count.map_err(|reason| (node.line, format!("'repeat' of a loop: {reason}")))?;
             if !(1.0..=COUNT_MAX).contains(&count) {
                 let message = format!(
-                    "a loop cannot be repeated {count} times; give 1 to {COUNT_MAX}, or take it out"
+                    "a loop cannot be repeated {count} times; give 1 to {COUNT_MAX}, or remove the loop"
                 );
                 return Err((node.line, message));
             }
@@ -244,7 +242,9 @@ impl Writer<'_> {
         };
         if let Some(odd) = values.iter().find(is_odd) {
             let text = &odd.text;
-            return Err(mistake(format!("'{text}' is not a single value; write each by itself")));
+            return Err(mistake(format!(
+                "'{text}' is not a single value; write each value separately"
+            )));
         }
         Ok((entry.key.clone(), values))
     }
@@ -256,7 +256,7 @@ impl Writer<'_> {
         if !self.is_too_long {
             self.is_too_long = true;
             let message = format!(
-                "with its repeats written out, the protocol has more than {STEPS_MAX} steps; use fewer repeats or split it"
+                "the protocol has more than {STEPS_MAX} steps with all repeats written out; use fewer repeats, or split the protocol"
             );
             self.problems.error(line, message);
         }
@@ -277,8 +277,8 @@ fn on_failure(text: &str) -> Result<OnFailure, String> {
         // More than nine retries of one specimen do not help.
         ("retry", count) => match count.trim().parse() {
             Ok(count @ 1..=9) => Ok(OnFailure::Retry(count)),
-            _ => Err("a step can be tried again 1 to 9 times; write \"retry 2\"".into()),
+            _ => Err("a step can be retried 1 to 9 times; write a number from 1 to 9, such as \"retry 2\"".into()),
         },
-        _ => Err(format!("'{text}' is not known; {form}")),
+        _ => Err(format!("'{text}' is not allowed; {form}")),
     }
 }

@@ -35,7 +35,7 @@ const KINDS: [(QuantityKind, &str, &str, &str); 12] = [
     (QuantityKind::Time, "a time", "s", "\"50 s\" or \"3 min\""),
     (QuantityKind::Mass, "a mass", "g", "\"240 g\""),
     (QuantityKind::Frequency, "a frequency", "Hz", "\"0.5 Hz\""),
-    (QuantityKind::ForceRate, "a force over time", "N/s", "\"0.01 N/min\""),
+    (QuantityKind::ForceRate, "a force rate", "N/s", "\"0.01 N/min\""),
     (QuantityKind::Voltage, "a voltage", "V", "\"1.8 V\""),
     (QuantityKind::Temperature, "a temperature", "°C", "\"37 °C\""),
     (QuantityKind::Count, "a whole number", "", "10"),
@@ -180,10 +180,13 @@ impl ProtocolValue {
 
     pub(super) fn is_not(&self, kind: QuantityKind) -> String {
         let text = &self.text;
-        let write = format!("write {} like {}", kind.name(), kind.example());
+        let write = match kind {
+            QuantityKind::Flag => "write true or false".to_owned(),
+            _ => format!("write {} like {}", kind.name(), kind.example()),
+        };
         match &self.content {
             ValueContent::Number(found, number) if *found == kind && !number.is_finite() => {
-                format!("\"{text}\" is too large to count with; {write}")
+                format!("\"{text}\" is too large for a number; {write}")
             }
             ValueContent::Number(QuantityKind::Count, _) => format!("{text} has no unit; {write}"),
             ValueContent::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
@@ -192,7 +195,7 @@ impl ProtocolValue {
             }
             ValueContent::List(_) => format!("[{text}] is a list; {write}"),
             ValueContent::Text if is_overflow(text) => {
-                format!("\"{text}\" is too large to count with; {write}")
+                format!("\"{text}\" is too large for a number; {write}")
             }
             ValueContent::Text => match split(text) {
                 Some((_, "")) if kind == QuantityKind::Count => {
@@ -207,7 +210,8 @@ impl ProtocolValue {
                 }
                 Some((_, unit)) if !kind.units().is_empty() => {
                     let known = suggestion(unit, &kind.units());
-                    format!("'{unit}' in \"{text}\" is not a unit of {}; {known}", kind.name())
+                    let name = kind.name().trim_start_matches("a ");
+                    format!("'{unit}' in \"{text}\" is not a unit of {name}; {known}")
                 }
                 _ => format!("\"{text}\" is not {}; {write}", kind.name()),
             },
@@ -268,7 +272,7 @@ mod tests {
             ("", QuantityKind::Time, "is not a time"),
             ("--1 s", QuantityKind::Time, "is not a time"),
             ("none", QuantityKind::Time, "not a value here"),
-            ("2e s", QuantityKind::Time, "of a time"),
+            ("2e s", QuantityKind::Time, "of time"),
         ] {
             let message = ProtocolValue::of_text(text).number(kind).unwrap_err();
             assert!(message.contains(words), "{text}: {message}");

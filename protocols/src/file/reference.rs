@@ -18,17 +18,17 @@ pub fn reference() -> String {
             text.push_str(&note());
         }
     }
-    section(&mut text, "Every step", "These keys go with any step.", &COMMON);
-    let about = "`repeat = 10` or `for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }`, and `steps = [ ... ]`.";
+    section(&mut text, "Every step", "Every step may have these keys.", &COMMON);
+    let about = "A loop has `steps = [ ... ]` and either `repeat = 10` or `for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }`.";
     section(&mut text, "Loops", about, &LOOP_KEYS);
-    let about = "`above` or `below` is the threshold and `resume` the value at which the monitor resets, in the unit of what is watched.";
+    let about = "`above` or `below` is the threshold; `resume` is the value at which the monitor resets. Both have the unit of the watched quantity.";
     section(&mut text, "`[[monitor]]`", about, &MONITOR_KEYS);
     text.push_str("### Units\n\n| kind | units |\n|---|---|\n");
     for kind in QuantityKind::with_units() {
         let units = kind.units().join(", ");
         let _ = writeln!(text, "| {} | {units} |", kind.name().trim_start_matches("a "));
     }
-    text.push_str("\n### What `ask` knows\n\n| key | meaning |\n|---|---|\n");
+    text.push_str("\n### Keys of `ask`\n\n| key | meaning |\n|---|---|\n");
     for key in METADATA_KEYS {
         let _ = writeln!(text, "| `{}` | {} |", key.name, key.meaning);
     }
@@ -39,11 +39,11 @@ fn section(text: &mut String, title: &str, about: &str, keys: &[Key]) {
     // Writing to a string does not fail.
     let _ = writeln!(
         text,
-        "### {title}\n\n{about}\n\n| key | kind | without it | meaning |\n|---|---|---|---|"
+        "### {title}\n\n{about}\n\n| key | kind | default | meaning |\n|---|---|---|---|"
     );
     for key in keys {
         let without = match key.need {
-            KeyNeed::Required => "needed".to_owned(),
+            KeyNeed::Required => "required".to_owned(),
             KeyNeed::Optional => String::new(),
             KeyNeed::Usual(usual) => format!("`{usual}`"),
         };

@@ -29,7 +29,7 @@ impl Scope {
         found.map(|(_, given)| given).ok_or_else(|| {
             let known: Vec<&str> = self.0.iter().map(|(known, _)| known.as_str()).collect();
             let hint = suggestion(name, &known);
-            format!("there is no parameter or loop called '{name}'; {hint}")
+            format!("no parameter or loop is called '{name}'; {hint}")
         })
     }
 
@@ -89,12 +89,12 @@ impl Scope {
         };
         match given.content {
             ValueContent::List(items) if items.is_empty() => {
-                Err("the list is empty; give it a value".into())
+                Err("the list is empty; write at least one value".into())
             }
             ValueContent::List(ref items) if given.kind().is_none() => {
                 let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
                 Err(format!(
-                    "[{}] has values of different kinds; give them one kind of unit",
+                    "[{}] has values of different kinds; give all of them units of one kind",
                     texts.join(", ")
                 ))
             }
@@ -113,7 +113,8 @@ impl Scope {
         while let Some((before, behind)) = rest.split_once('{') {
             let Some((name, after)) = behind.split_once('}') else {
                 return Err(
-                    "a brace is opened and not closed; write {name} for the value of a name".into(),
+                    "an opening brace has no closing brace; write {name} for the value of a name"
+                        .into(),
                 );
             };
             filled.push_str(before);

@@ -24,7 +24,7 @@ impl HoldRate {
         // 0.2 s holds ten points of the fit at 20 ms; an hour is longer than any published window.
         if !(0.2..=3600.0).contains(&self.over.0) {
             return Err(format!(
-                "a slope cannot be judged over {}; give a window of 0.2 to 3600 s",
+                "a slope cannot be measured over {}; give a window of 0.2 to 3600 s",
                 self.over
             ));
         }

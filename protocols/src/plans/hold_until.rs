@@ -39,7 +39,7 @@ impl HoldUntil {
     pub fn check(&self) -> Result<(), String> {
         if !(self.relative > 0.0 && self.relative < 1.0) {
             return Err(format!(
-                "a hold cannot end at an interval of {} %; choose above 0 and below 100 %",
+                "a hold cannot end at an interval of {} % of the value; give a share above 0 and below 100 %",
                 self.relative * 100.0
             ));
         }
@@ -54,7 +54,7 @@ impl HoldUntil {
 
     /// Reads `tau=1%` or `mu1=0.02`; `tau` is short for `tau_eps`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let form = "write it like tau=1% or tau_eps=0.01";
+        let form = "write the rule like tau=1% or tau_eps=0.01";
         let Some((name, share)) = text.split_once('=') else {
             return Err(format!("'{text}' has no '='; {form}"));
         };
@@ -64,7 +64,7 @@ impl HoldUntil {
         };
         let Some(parameter) = BodyParameter::ALL.into_iter().find(|p| p.name() == name) else {
             let known = BodyParameter::ALL.map(BodyParameter::name).join(", ");
-            return Err(format!("the body has no parameter '{name}'; it has {known}"));
+            return Err(format!("the model has no parameter '{name}'; choose from {known}"));
         };
         let share = share.trim();
         let (number, unit) = match share.strip_suffix('%') {
@@ -73,7 +73,7 @@ impl HoldUntil {
         };
         let relative = match number.parse::<f64>() {
             Ok(value) => value * unit,
-            Err(_) => return Err(format!("'{share}' is not a share; {form}")),
+            Err(_) => return Err(format!("'{share}' is not a share of a value; {form}")),
         };
         let rule = Self::new(parameter, relative);
         rule.check().map(|()| rule)
@@ -82,7 +82,7 @@ impl HoldUntil {
 
 impl fmt::Display for HoldUntil {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is known to {} %", self.parameter.name(), percent(self.relative))
+        write!(f, "{} is known to within {} %", self.parameter.name(), percent(self.relative))
     }
 }
 
@@ -133,7 +133,7 @@ mod tests {
     #[test]
     fn hold_rule_prints_as_a_sentence() {
         let rule = HoldUntil::new(BodyParameter::TauEps, 0.01);
-        assert_eq!(rule.to_string(), "tau_eps is known to 1 %");
+        assert_eq!(rule.to_string(), "tau_eps is known to within 1 %");
         assert_eq!(percent(0.12345), "12.3");
         assert_eq!(percent(0.002), "0.2");
         assert_eq!(percent(0.2), "20");

@@ -94,7 +94,7 @@ impl PlanLimits {
     pub fn unused(&self, rig: &Limits) -> Vec<String> {
         let sentence = |name, own: &dyn Display, rigs: &dyn Display| {
             format!(
-                "{name} = {own} in [limits] changes nothing, because the rig stops at {rigs} in any case and a protocol's limits can only be tighter; give less, or leave it out"
+                "{name} = {own} in [limits] has no effect, because the rig already stops at {rigs}; give less than {rigs}, or remove {name}"
             )
         };
         let force = self.force_max.filter(|own| *own >= rig.force_max);

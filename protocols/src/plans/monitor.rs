@@ -80,24 +80,24 @@ impl Monitor {
         if !(self.threshold.is_finite() && self.resume.is_finite()) {
             return Err("a monitor's threshold and resume value must be numbers".into());
         }
-        let is_apart = match self.side {
-            ThresholdSide::Above => self.resume <= self.threshold,
-            ThresholdSide::Below => self.resume >= self.threshold,
+        let (is_apart, side, reset) = match self.side {
+            ThresholdSide::Above => (self.resume <= self.threshold, "above", "less"),
+            ThresholdSide::Below => (self.resume >= self.threshold, "below", "more"),
         };
         if !is_apart {
+            let (threshold, resume, unit) = (self.threshold, self.resume, self.source.unit());
             return Err(format!(
-                "a monitor that trips at {} cannot be past at {}, which still trips it",
-                self.threshold, self.resume
+                "a monitor that trips {side} {threshold} {unit} cannot reset at {resume} {unit}; give a 'resume' of {threshold} {unit} or {reset}"
             ));
         }
         if !(0.0..=3600.0).contains(&self.settle.0) {
             return Err(format!(
-                "a settle time of {} is not possible; give 0 to 3600 s",
+                "a monitor cannot have a settle time of {}; give 0 to 3600 s",
                 self.settle
             ));
         }
         if self.message.trim().is_empty() {
-            return Err("a monitor needs a message that names what tripped".into());
+            return Err("a monitor has no message; write the text that the operator reads".into());
         }
         Ok(())
     }

@@ -21,7 +21,9 @@ impl Walk<'_> {
     /// Distances and forces of a plan are finite and no larger than any rig.
     pub fn check_sizes(&mut self, sizes: &[f64]) {
         if let Some(size) = sizes.iter().find(|size| size.is_nan() || size.abs() > 1000.0) {
-            self.refusals.push(format!("{size} is not possible; give a size up to 1000"));
+            self.refusals.push(format!(
+                "a distance or force of {size} is not possible; give at most 1000 mm or N"
+            ));
         }
     }
 
@@ -29,11 +31,11 @@ impl Walk<'_> {
         let most = self.limits.force_max;
         if !(force.0 > 0.0 && force < most) {
             self.refusals.push(format!(
-                "a force of {force:.2} is not possible; give a force above 0 N and below the interlock at {most:.1}"
+                "a force of {force:.2} is not possible; give a force above 0 N and below the force limit of {most:.1}"
             ));
         } else if force.0 <= FORCE_FLOOR {
             self.note(format!(
-                "a force of {force:.4} is within the tolerance of {FORCE_FLOOR} N, so nothing shows whether it was reached; use a larger force"
+                "a force of {force:.4} is not above the tolerance of {FORCE_FLOOR} N, so the record cannot show whether it was reached; use a larger force"
             ));
         }
     }
@@ -52,7 +54,7 @@ impl Walk<'_> {
                 .push(format!("a depth of {depth} is not possible; give a depth above 0 mm"));
         } else if depth.0 > travel.0 {
             self.refusals.push(format!(
-                "a depth of {depth} is beyond the travel of rig {}; it ends at {travel}",
+                "a depth of {depth} is beyond the travel of rig {}, which ends at {travel}; give a smaller depth",
                 self.rig.name
             ));
         }

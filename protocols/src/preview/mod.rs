@@ -115,7 +115,7 @@ fn walk(
     }
     let (mut refusals, mut notes) = (walk.refusals, walk.notes);
     if plan.steps.is_empty() {
-        refusals.push("the plan has no steps".into());
+        refusals.push("the plan has no steps; add at least one".into());
     }
     let total =
         |of: fn(&StepPreview) -> Seconds| Seconds(steps.iter().map(|step| of(step).0).sum());
@@ -126,7 +126,7 @@ fn walk(
     let mut acknowledgements = Vec::new();
     if force_band[1] > calibrated_max {
         acknowledgements.push(format!(
-            "forces of {:.1} to {:.1} are expected, but the load cell is calibrated only up to {calibrated_max:.1}; beyond it force is extrapolated",
+            "forces of {:.1} to {:.1} are expected, but the load cell is calibrated only up to {calibrated_max:.1}; larger forces are extrapolated",
             force_band[0], force_band[1]
         ));
     }

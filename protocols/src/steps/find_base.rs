@@ -24,12 +24,17 @@ pub struct FindBase {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Find the base the specimen lay on, with the specimen taken away: its thickness.",
+    about: "Find the base without a specimen on it. A contact point found before gives the thickness of the specimen.",
     keys: &[
-        Key::usual("speed", QuantityKind::Speed, "0.6 mm/s", "of the first touch"),
+        Key::usual("speed", QuantityKind::Speed, "0.6 mm/s", "speed of the first touch"),
         Key::usual("criterion", QuantityKind::Force, "0.05 N", "force that ends the first touch"),
-        Key::usual("retreat", QuantityKind::Length, "0.3 mm", "retract before the second touch"),
-        Key::usual("pass_speed", QuantityKind::Speed, "0.03 mm/s", "of the second touch"),
+        Key::usual(
+            "retreat",
+            QuantityKind::Length,
+            "0.3 mm",
+            "distance of the retract before the second touch",
+        ),
+        Key::usual("pass_speed", QuantityKind::Speed, "0.03 mm/s", "speed of the second touch"),
         Key::usual("pass_force", QuantityKind::Force, "0.4 N", "force that ends the second touch"),
     ],
     build: Some(|args| {

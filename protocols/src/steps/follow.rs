@@ -19,7 +19,7 @@ pub struct Follow {
 
 /// No protocol asks for it: what leads is a program.
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Go where a lead from outside says.",
+    about: "Follow a lead from outside.",
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
@@ -40,7 +40,7 @@ impl StepKind for Follow {
         walk.expected.stay(walk.phase, (duration - there).max(0.0));
         walk.reach = Reach { low: -walk.limits.travel_max.0, high: way };
         walk.note(format!(
-            "the slave follows its lead at no more than {} and no deeper than {}",
+            "the slave follows its lead no faster than {} and no deeper than {}",
             self.speed, self.depth_max
         ));
         // The move under way is braked first.

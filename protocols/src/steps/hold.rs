@@ -21,21 +21,21 @@ pub struct Hold {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Stay at depth while the force relaxes.",
     keys: &[
-        Key::needed("for", QuantityKind::Time, "how long, at most").zero_allowed(),
+        Key::needed("for", QuantityKind::Time, "longest duration").zero_allowed(),
         Key::optional(
             "until",
             QuantityKind::Text,
-            "ends the hold once a parameter is known this well, such as `\"tau=1%\"`",
+            "ends the hold once a parameter is known within this share of its value, such as `\"tau=1%\"`",
         ),
         Key::optional(
             "slope",
             QuantityKind::ForceRate,
-            "ends the hold once the force changes by less",
+            "ends the hold once the force changes more slowly than this",
         ),
         Key::optional(
             "over",
             QuantityKind::Time,
-            "time over which the slope is judged; goes with `slope`",
+            "time over which the slope is measured; required with `slope`",
         ),
     ],
     build: Some(read),
@@ -50,7 +50,7 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, None) => None,
         _ => {
             let message =
-                "'slope' and 'over' go together: how little the force changes, and over how long";
+                "'slope' and 'over' need each other; give both the slope and the time, or neither";
             return Err(message.into());
         }
     };
@@ -73,7 +73,7 @@ impl Hold {
                 rule.at_least
             )),
             Ok(()) => walk.notes.push(format!(
-                "the hold is too short to end early: that takes {:.0} at least",
+                "the hold is too short to end early; an early end needs at least {:.0}",
                 rule.at_least
             )),
         }

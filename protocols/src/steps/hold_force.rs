@@ -15,11 +15,11 @@ pub struct HoldForce {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Keep the force and let the depth creep.",
+    about: "Keep the force constant while the depth creeps.",
     keys: &[
-        Key::needed("force", QuantityKind::Force, "above tare"),
-        Key::needed("for", QuantityKind::Time, "how long").zero_allowed(),
-        Key::usual("speed", QuantityKind::Speed, "0.75 mm/s", "of the corrections"),
+        Key::needed("force", QuantityKind::Force, "force above tare"),
+        Key::needed("for", QuantityKind::Time, "duration").zero_allowed(),
+        Key::usual("speed", QuantityKind::Speed, "0.75 mm/s", "speed of the corrections"),
         Key::needed("deepest", QuantityKind::Length, "depth at which the step fails"),
     ],
     build: Some(|args| {

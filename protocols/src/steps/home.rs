@@ -12,12 +12,12 @@ pub struct Home {
 }
 
 pub(super) const KEYS: &[Key] = &[
-    Key::usual("speed", QuantityKind::Speed, "9 mm/s", "of the search"),
+    Key::usual("speed", QuantityKind::Speed, "9 mm/s", "speed of the search"),
     Key::usual(
         "touch_speed",
         QuantityKind::Speed,
         "0.3 mm/s",
-        "of the second touch, which defines position zero",
+        "speed of the second touch, which defines position zero",
     ),
 ];
 

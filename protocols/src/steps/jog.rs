@@ -12,10 +12,15 @@ pub struct Jog {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Move by a distance, positive towards the tissue. Allowed before homing.",
+    about: "Move by a signed distance. The axis need not be homed.",
     keys: &[
-        Key::needed("distance", QuantityKind::Length, "signed").any(),
-        Key::needed("speed", QuantityKind::Speed, "of the move"),
+        Key::needed(
+            "distance",
+            QuantityKind::Length,
+            "signed distance, positive towards the tissue",
+        )
+        .any(),
+        Key::needed("speed", QuantityKind::Speed, "speed of the move"),
     ],
     build: Some(|args| {
         Ok(Jog { distance_mm: args.number("distance")?, speed: args.speed("speed")? }.into())
@@ -39,7 +44,7 @@ impl StepKind for Jog {
         walk.check_sizes(&[self.distance_mm]);
         if self.distance_mm.abs() > travel {
             walk.refuse(format!(
-                "a jog of {} mm is longer than the travel of {travel:.1} mm",
+                "a jog of {} mm is longer than the travel of {travel:.1} mm; give a shorter distance",
                 self.distance_mm
             ));
         }

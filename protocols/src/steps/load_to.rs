@@ -22,12 +22,12 @@ pub(super) const FACTS: StepFacts = StepFacts {
     about: "Indent at constant speed until a force is reached.",
     keys: &[
         Key::needed("to", QuantityKind::Force, "force above tare"),
-        Key::needed("speed", QuantityKind::Speed, "of the indentation"),
+        Key::needed("speed", QuantityKind::Speed, "indentation speed"),
         Key::needed("deepest", QuantityKind::Length, "depth at which the step fails"),
         Key::optional(
             "brake",
             QuantityKind::Force,
-            "force before the target at which the speed falls to a tenth, later to a hundredth",
+            "force that remains to the target when the speed falls to a tenth; at a tenth of this force the speed falls to a hundredth",
         ),
     ],
     build: Some(|args| {
@@ -73,7 +73,7 @@ impl StepKind for LoadTo {
             && !(brake.0 > 0.0 && brake < self.force)
         {
             walk.refuse(format!(
-                "a brake {brake} before a target of {:.2} is not possible; give less than the target",
+                "a brake of {brake} before a target of {:.2} is not possible; give more than 0 N and less than the target",
                 self.force
             ));
         }

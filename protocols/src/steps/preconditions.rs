@@ -24,7 +24,9 @@ impl Need {
         match self {
             Self::Home => Some(NOT_HOMED),
             Self::Tare => Some(NOT_TARED),
-            Self::Contact => Some("contact is not known here; put find-contact before it"),
+            Self::Contact => {
+                Some("the contact point is not known at this step; put find-contact before it")
+            }
             Self::Motor | Self::Inside | Self::Specimen | Self::Outside => None,
         }
     }
@@ -33,10 +35,10 @@ impl Need {
     pub fn message(self) -> &'static str {
         match self {
             Self::Motor => {
-                "moves the axis, but the motor is not on yet; begin with { do = \"self-test\" }"
+                "moves the axis, but the motor is not on yet; put { do = \"self-test\" } before it"
             }
             Self::Home => {
-                "needs a homed axis; put { do = \"home\" } before it, which is left out where the axis is homed already"
+                "needs a homed axis; put { do = \"home\" } before it (no motion if the axis is homed already)"
             }
             Self::Tare => {
                 "compares forces, but the load cell is not tared yet; put { do = \"tare\" } before it"
@@ -45,13 +47,13 @@ impl Need {
                 "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it"
             }
             Self::Inside => {
-                "keeps the force that the probe exerts already, and there is none yet; put { do = \"load\", to = \"1 N\", ... } before it"
+                "keeps the force of the probe on the tissue, but the probe does not press yet; put { do = \"load\", to = \"1 N\", ... } before it"
             }
             Self::Specimen => {
-                "would run into the base, because the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
+                "would run into the base, because no specimen is mounted; clip a specimen in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
             }
             Self::Outside => {
-                "must not be done while the probe is in the tissue; put { do = \"retract\" } before it"
+                "needs the probe outside the tissue; put { do = \"retract\" } before it"
             }
         }
     }

@@ -40,30 +40,34 @@ impl OnTimeout {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Ask a person for something and wait. A simulated rig does the hand's work when the answer comes.",
+    about: "Ask a person to do something and wait for the answer. After the answer, a simulated rig does the manual work itself.",
     keys: &[
         Key::needed("message", QuantityKind::Text, "what to do, as one sentence"),
-        Key::usual("timeout", QuantityKind::Time, "10 min", "how long the run waits"),
+        Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait for the answer"),
         Key::usual(
             "on_timeout",
             QuantityKind::Text,
             "stop",
-            "`stop` or `continue`: what follows without an answer",
+            "what follows without an answer: `stop` or `continue`",
         )
         .one_of(OnTimeout::WORDS),
         Key::optional(
             "cell_mass",
             QuantityKind::Mass,
-            "by hand: total mass to put on the load cell, `\"0 g\"` for none",
+            "manual work: total mass to put on the load cell, `\"0 g\"` for none",
         )
         .zero_allowed(),
         Key::optional(
             "mount",
             QuantityKind::Count,
-            "by hand: the number of the specimen to clip in",
+            "manual work: number of the specimen to clip in",
         )
         .zero_allowed(),
-        Key::optional("unmount", QuantityKind::Flag, "by hand: `true` takes the specimen out"),
+        Key::optional(
+            "unmount",
+            QuantityKind::Flag,
+            "manual work: `true` to take the specimen out",
+        ),
     ],
     build: Some(read),
     may_touch: false,
@@ -78,8 +82,7 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, Some(specimen), false) => Some(HandAction::Mount { specimen: specimen.into() }),
         (None, None, true) => Some(HandAction::Unmount),
         _ => {
-            let message =
-                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'";
+            let message = "a prompt can ask for one manual task only; give one of 'cell_mass', 'mount' and 'unmount'";
             return Err(message.into());
         }
     };
@@ -111,7 +114,7 @@ impl StepKind for Prompt {
     fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.timeout);
         if self.message.trim().is_empty() {
-            walk.refuse("a prompt must say what it asks for".into());
+            walk.refuse("a prompt has no message; write what the person is to do".into());
         }
         // An operator beside the rig answers within half a minute.
         walk.unknown(self.timeout.0.min(30.0), self.timeout.0)

@@ -12,8 +12,8 @@ pub struct Ramp {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Indent to a depth at constant speed.",
     keys: &[
-        Key::needed("speed", QuantityKind::Speed, "of the indentation"),
-        Key::needed("depth", QuantityKind::Length, "from contact"),
+        Key::needed("speed", QuantityKind::Speed, "indentation speed"),
+        Key::needed("depth", QuantityKind::Length, "depth from contact"),
     ],
     build: Some(|args| {
         Ok(Ramp { speed: args.speed("speed")?, depth: Depth(args.number("depth")?) }.into())

@@ -11,7 +11,7 @@ pub struct Rest {
 
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Stay where the probe is and let the tissue recover.",
-    keys: &[Key::needed("for", QuantityKind::Time, "how long").zero_allowed()],
+    keys: &[Key::needed("for", QuantityKind::Time, "duration").zero_allowed()],
     build: Some(|args| Ok(Rest { duration: args.seconds("for")? }.into())),
     may_touch: false,
     ..StepFacts::of("rest", Phase::Rest, PauseBehaviour::Wait)

@@ -12,12 +12,12 @@ pub struct Retract {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Leave the tissue.",
     keys: &[
-        Key::usual("speed", QuantityKind::Speed, "6 mm/s", "of the retract"),
+        Key::usual("speed", QuantityKind::Speed, "6 mm/s", "speed of the retract"),
         Key::usual(
             "clearance",
             QuantityKind::Length,
             "10 mm",
-            "distance from the surface to stop at",
+            "distance from the surface at which the probe stops",
         )
         .zero_allowed(),
     ],

@@ -12,8 +12,13 @@ pub struct SelfTest {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
-    keys: &[Key::usual("for", QuantityKind::Time, "0.5 s", "how long the signal is watched")],
+    about: "Check the link, the signal and the stop command, and switch the motor on. The axis moves only after this step.",
+    keys: &[Key::usual(
+        "for",
+        QuantityKind::Time,
+        "0.5 s",
+        "time over which the signal is checked",
+    )],
     build: Some(|args| Ok(SelfTest { duration: args.seconds("for")? }.into())),
     may_touch: false,
     label: "self-test",

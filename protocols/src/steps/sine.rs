@@ -15,15 +15,15 @@ pub struct Sine {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Oscillate from the present depth to deeper and back; begins and ends at rest.",
+    about: "Oscillate between the present depth and twice the amplitude deeper. The motion begins and ends at rest.",
     keys: &[
         Key::needed(
             "amplitude",
             QuantityKind::Length,
             "half of the distance between the turning points",
         ),
-        Key::needed("frequency", QuantityKind::Frequency, "of the oscillation"),
-        Key::needed("cycles", QuantityKind::Count, "whole cycles"),
+        Key::needed("frequency", QuantityKind::Frequency, "frequency of the oscillation"),
+        Key::needed("cycles", QuantityKind::Count, "number of whole cycles"),
     ],
     build: Some(|args| {
         Ok(Sine {
@@ -66,7 +66,7 @@ impl StepKind for Sine {
         walk.check_span(Seconds(f64::from(self.cycles) / self.frequency_hz));
         walk.check_sizes(&[self.amplitude_mm]);
         if self.cycles == 0 || self.amplitude_mm <= 0.0 {
-            walk.refuse("a sine needs a cycle and an amplitude above 0 mm".into());
+            walk.refuse("a sine needs at least one cycle and an amplitude above 0 mm".into());
         }
         if walk.is_refused() {
             return DurationEstimate(0.0, 0.0, true);
@@ -80,7 +80,7 @@ impl StepKind for Sine {
         let from = Depth(walk.expected.depth());
         if walk.expected.oscillate(walk.phase, self).0 <= 0.0 {
             walk.note(format!(
-                "the expected tissue exerts too little force at {from:.1} for an amplitude of {} mm: the force would fall to zero and the probe would lose contact; go deeper or reduce the amplitude",
+                "the expected tissue exerts too little force at a depth of {from:.1} for an amplitude of {} mm: the force would fall to zero and the probe would lose contact; go deeper or reduce the amplitude",
                 self.amplitude_mm
             ));
         }

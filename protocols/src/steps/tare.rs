@@ -12,12 +12,12 @@ pub struct Tare {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Average the unloaded signal. The probe touches nothing.",
+    about: "Average the signal without load. The probe must touch nothing.",
     keys: &[Key::usual(
         "for",
         QuantityKind::Time,
         "4 s",
-        "whole mains cycles: whole seconds; from 2 s on the drift is measured too",
+        "duration in whole seconds, which contain whole mains cycles; from 2 s the drift is measured too",
     )],
     build: Some(|args| Ok(Tare { duration: args.seconds("for")? }.into())),
     needs: &[Need::Outside],

@@ -241,7 +241,7 @@ impl StepResult<'_> {
 pub(super) fn doubt_force(force: Newtons) -> Option<String> {
     (force.0 <= FORCE_FLOOR).then(|| {
         format!(
-            "a force of {:.4} N is within the tolerance of {FORCE_FLOOR} N, so nothing shows whether it was reached",
+            "a force of {:.4} N is not above the tolerance of {FORCE_FLOOR} N, so the record cannot show whether it was reached",
             force.0
         )
     })

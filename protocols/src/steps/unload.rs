@@ -10,14 +10,14 @@ pub struct Unload {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Unload to the surface at constant speed, recorded like the loading.",
+    about: "Unload to the surface at constant speed. The unloading is recorded like the loading.",
     keys: &[
-        Key::needed("speed", QuantityKind::Speed, "of the unloading"),
+        Key::needed("speed", QuantityKind::Speed, "unloading speed"),
         Key::usual(
             "clearance",
             QuantityKind::Length,
             "0.5 mm",
-            "distance from the surface to stop at",
+            "distance from the surface at which the probe stops",
         )
         .zero_allowed(),
     ],

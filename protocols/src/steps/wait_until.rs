@@ -34,28 +34,32 @@ pub enum WaitCondition {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Wait at rest until a digital input of the rig has a level, or its bath a temperature.",
+    about: "Wait at rest until a digital input of the rig has a given level, or the bath has a given temperature.",
     keys: &[
         Key::optional("input", QuantityKind::Count, "number of the digital input, from 1"),
         Key::usual(
             "level",
             QuantityKind::Text,
             "high",
-            "`high` or `low`: the level of the input to wait for",
+            "level of the input that ends the wait: `high` or `low`",
         )
         .one_of(&["high", "low"]),
         Key::optional(
             "bath_from",
             QuantityKind::Temperature,
-            "lowest temperature of the bath; goes with `bath_to`",
+            "lowest temperature of the bath that ends the wait; required with `bath_to`",
         ),
-        Key::optional("bath_to", QuantityKind::Temperature, "highest temperature of the bath"),
+        Key::optional(
+            "bath_to",
+            QuantityKind::Temperature,
+            "highest temperature of the bath that ends the wait",
+        ),
         Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait"),
         Key::usual(
             "on_timeout",
             QuantityKind::Text,
             "stop",
-            "`stop` or `continue`: what follows if it does not come",
+            "what follows when the longest wait is over: `stop` or `continue`",
         )
         .one_of(OnTimeout::WORDS),
     ],
@@ -74,7 +78,10 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, Some(from_celsius), Some(to_celsius)) => {
             WaitCondition::Bath { from_celsius, to_celsius }
         }
-        _ => return Err("give either 'input', or 'bath_from' and 'bath_to'".into()),
+        _ => return Err(
+            "a wait needs one condition; give either 'input', or both 'bath_from' and 'bath_to'"
+                .into(),
+        ),
     };
     condition.check()?;
     Ok(WaitUntil {
@@ -91,12 +98,16 @@ impl WaitCondition {
             Self::DigitalInput { number, .. }
                 if !(1..=DIGITAL_INPUTS_MAX).contains(&usize::from(number)) =>
             {
-                Err(format!("there is no digital input {number}; give 1 to {DIGITAL_INPUTS_MAX}"))
+                Err(format!(
+                    "digital input {number} does not exist; give 1 to {DIGITAL_INPUTS_MAX}"
+                ))
             }
             Self::Bath { from_celsius: from, to_celsius: to }
                 if from >= to || from.is_nan() || to.is_nan() =>
             {
-                Err(format!("no temperature is from {from} to {to} °C; give the lower end first"))
+                Err(format!(
+                    "the bath cannot be between {from} and {to} °C; give the lower temperature as 'bath_from'"
+                ))
             }
             _ => Ok(()),
         }

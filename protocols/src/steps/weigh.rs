@@ -28,20 +28,26 @@ pub struct SettleLimits {
 pub(super) const FACTS: StepFacts = StepFacts {
     about: "Read the load cell under a known mass, once the signal has settled.",
     keys: &[
-        Key::needed("mass", QuantityKind::Mass, "total mass, the platform included").zero_allowed(),
+        Key::needed("mass", QuantityKind::Mass, "total mass on the load cell, platform included")
+            .zero_allowed(),
         Key::usual(
             "masses_go",
             QuantityKind::Text,
             "up",
-            "`up` or `down`: whether weights were put on or taken off",
+            "`up` after weights were put on, `down` after weights were taken off",
         )
         .one_of(&["up", "down"]),
-        Key::usual("pass", QuantityKind::Count, "1", "which pass through the masses"),
+        Key::usual(
+            "pass",
+            QuantityKind::Count,
+            "1",
+            "number of the pass through the masses, from 1",
+        ),
         Key::usual(
             "window",
             QuantityKind::Time,
             "2 s",
-            "time that must be steady, and is averaged",
+            "time over which the signal must be steady and is averaged",
         ),
         Key::usual("timeout", QuantityKind::Time, "30 s", "longest wait"),
     ],
@@ -64,7 +70,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
 impl StepKind for Weigh {
     fn warning(&self, known: &Preconditions) -> Option<&'static str> {
         known.motor.then_some(
-            "'weigh' with the motor on ends at the force limit of the rig; leave { do = \"self-test\" } out of a protocol that only weighs",
+            "'weigh' with the motor on stops at the force limit of the rig; remove { do = \"self-test\" } from a protocol that only weighs",
         )
     }
 

@@ -73,29 +73,29 @@ impl Default for ContactPress {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Find the surface of the tissue and stop there. Depths count from it.",
+    about: "Find the surface of the tissue and stop there. Depths count from the surface.",
     keys: &[
-        Key::optional("speed", QuantityKind::Speed, "of the first pass"),
-        Key::optional("criterion", QuantityKind::Force, "force that ends the first pass"),
-        Key::optional("retreat", QuantityKind::Length, "retract before the second pass"),
-        Key::optional("pass_speed", QuantityKind::Speed, "of the second pass"),
+        Key::optional("speed", QuantityKind::Speed, "speed of the first pass"),
+        Key::optional("criterion", QuantityKind::Force, "force that counts as contact in the first pass"),
+        Key::optional("retreat", QuantityKind::Length, "distance of the retract before the second pass"),
+        Key::optional("pass_speed", QuantityKind::Speed, "speed of the second pass"),
         Key::optional("pass_force", QuantityKind::Force, "force that ends the second pass"),
         Key::optional("recovery", QuantityKind::Time, "rest after each pass").zero_allowed(),
         Key::optional(
             "std_error_max",
             QuantityKind::Length,
-            "widest accepted standard error of the position found",
+            "largest accepted standard error of the contact point",
         ),
         Key::optional(
             "press_force",
             QuantityKind::Force,
-            "force to which the first pass goes on to learn how the tissue answers; `0 N` ends it at the criterion",
+            "force to which the first pass presses after contact, to measure the response of the tissue; `0 N` ends the pass at the criterion",
         )
         .zero_allowed(),
         Key::optional(
             "press_dwell",
             QuantityKind::Time,
-            "time at the end of each pass while the force relaxes",
+            "dwell at the end of each pass, in which the force relaxes",
         )
         .zero_allowed(),
     ],
@@ -131,12 +131,13 @@ fn read(args: &Args) -> Result<Step, String> {
 /// What a search for contact does without keys.
 fn usual_search() -> String {
     let search = FindContact::default();
-    let press = search.press.map_or("no press".to_owned(), |press| {
-        format!("a press to {} and a dwell of {}", press.force, press.dwell)
+    let press = search.press.map_or("does not press".to_owned(), |press| {
+        format!("presses to {} and dwells for {}", press.force, press.dwell)
     });
     format!(
-        "Without keys: a first pass at {}, triggered at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
-         recovery of {}, a standard error of {} mm at most.\n\n",
+        "Without keys, the first pass goes at {}, detects contact at {}, {press}. The probe then retracts by {} mm. The \
+         second pass goes at {} to {}. The probe rests for {} after each pass. The standard error may be {} mm at \
+         most.\n\n",
         search.approach_speed,
         search.criterion,
         search.retreat_mm,
@@ -156,12 +157,12 @@ impl ContactPress {
         let most = walk.limits.force_max;
         if !(self.force.0 > 0.0 && self.force <= PRESS_MAX) {
             walk.refuse(format!(
-                "finding contact cannot press to {}; give above 0 and up to {PRESS_MAX}",
+                "find-contact cannot press to {}; give a force above 0 N and up to {PRESS_MAX}",
                 self.force
             ));
         } else if self.force >= most {
             walk.refuse(format!(
-                "finding contact presses to {}, where the limit of {most} ends every run; allow more force or press less",
+                "find-contact presses to {}, but the force limit of {most} stops the run; allow more force or press less",
                 self.force
             ));
         }
