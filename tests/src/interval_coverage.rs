@@ -1,18 +1,22 @@
 //! How often the intervals of a fit hold the truth: sessions recorded on simulated rigs, one a seed.
 
-use palpate_analysis::fit::SourceFit;
+use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
+use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
-use palpate_drivers::sim::{SimRig, SimSettings, SimTruth};
+use palpate_drivers::sim::{SimCell, SimRig, SimSettings, SimTruth};
 use palpate_drivers::{Rig, RigEvent};
-use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
 use palpate_model::rig::{HandAction, RigCommand, RigDescription, SensorReading};
+use palpate_model::{MmPerS, Nanos};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
-use palpate_rheology::fit::{FitOptions, fit};
+use palpate_rheology::fit::{FitOptions, FitReport, JointReport, fit_joint};
+use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
 use std::sync::{Arc, Mutex};
 
-use crate::recorded_runs::record_ramp_hold;
+use crate::built_in_plan;
+use crate::recorded_runs::{record_plan, record_ramp_hold};
 
 /// What is looked at, in the order of all tables.
 pub const NAMES: [&str; 6] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "x_contact"];
@@ -22,14 +26,30 @@ pub const NAMES: [&str; 6] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "x_cont
 pub struct CoverageDraw {
     pub error: f64,
     pub std_error: f64,
+    /// Standard uncertainty of everything.
+    pub total_error: f64,
     pub is_covered: bool,
+    pub is_covered_in_total: bool,
 }
 
-/// The fit in volts, and the fit in newtons beside it.
-#[derive(Clone, Debug, Default)]
-pub struct CoverageDraws {
-    pub signal: Vec<[CoverageDraw; 6]>,
-    pub force: Vec<[CoverageDraw; 6]>,
+/// Draws of all parameters of one seed.
+pub type CoverageDraws = [CoverageDraw; 6];
+
+/// What is measured, and on which rig.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CoverageCase {
+    pub settings: SimSettings,
+    /// Weights that the calibration of a cell of its own leaves out.
+    pub is_short_of_weights: bool,
+    /// A second run at this speed in mm/s on the same specimen, the body shared.
+    pub second_speed: Option<f64>,
+}
+
+/// Fits of one seed: in volts, and in newtons beside it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SeedDraws {
+    pub signal: CoverageDraws,
+    pub force: CoverageDraws,
 }
 
 /// A rig whose truth can be looked at while another thread holds it.
@@ -72,84 +92,162 @@ fn contact_of(session: &Session) -> f64 {
         .expect("a contact position")
 }
 
-/// Records a ramp and hold and fits it as it would be by `palpate fit`.
+/// The calibration that the protocol measures on the rig of these settings.
+fn measured_calibration(case: &CoverageCase) -> Calibration {
+    let masses: &[_] = match case.is_short_of_weights {
+        true => &[("masses", "140 g, 340 g, 440 g, 640 g, 740 g, 940 g")],
+        false => &[],
+    };
+    let rig = SimRig::new(case.settings);
+    let document = rig.calibration();
+    let plan = built_in_plan("load-cell-calibration", masses);
+    let session = record_plan(Box::new(rig), document, plan);
+    calibration_from_session(&session, "measured").expect("a calibration")
+}
+
+/// One ramp and hold as a recording, and what was true.
+fn recorded(
+    settings: SimSettings,
+    calibration: &Calibration,
+    speed: Option<f64>,
+) -> (Recording, [f64; 6]) {
+    let rig = SimRig::new(settings);
+    let truth = Arc::new(Mutex::new(rig.truth()));
+    let watched = Box::new(WatchedRig(rig, Arc::clone(&truth)));
+    let mut params = RampHold::default();
+    if let Some(speed) = speed {
+        params.speed = MmPerS(speed);
+    }
+    let session = record_ramp_hold(watched, calibration.clone(), params);
+    let truth = *truth.lock().expect("the run is over");
+    let contact = contact_of(&session);
+    let source = source::of_session(session, RecordStretch::RampHold, &[]).expect("a session");
+    let body = truth.body;
+    let contact_error = truth.surface_counted().0 - contact;
+    let [mu1, mu2, mu3] = body.mu;
+    let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig, contact_error];
+    (Recording::of(format!("{speed:?}"), source, None), values)
+}
+
+/// Records what the case asks for and fits it as `palpate fit` does.
 ///
 /// # Panics
 /// If the run or the fit fails.
 #[must_use]
-pub fn draw(settings: SimSettings) -> [[CoverageDraw; 6]; 2] {
-    let rig = SimRig::new(settings);
-    let calibration = rig.calibration();
-    let truth = Arc::new(Mutex::new(rig.truth()));
-    let watched = Box::new(WatchedRig(rig, Arc::clone(&truth)));
-    let session = record_ramp_hold(watched, calibration, RampHold::default());
-    let truth = *truth.lock().expect("the run is over");
-    let contact = contact_of(&session);
-    let source = source::of_session(session, RecordStretch::RampHold, &[]).expect("a session");
+pub fn draw(case: &CoverageCase) -> SeedDraws {
+    let calibration = match case.settings.cell {
+        SimCell::Own => measured_calibration(case),
+        SimCell::Document => SimRig::new(case.settings).calibration(),
+    };
+    let (first, truth) = recorded(case.settings, &calibration, None);
+    let mut all = vec![first];
+    if case.second_speed.is_some() {
+        all.push(recorded(case.settings, &calibration, case.second_speed).0);
+    }
     let options = FitOptions::default();
-    let body = truth.body;
-    let true_values = [
-        body.tau_eps,
-        body.mu[0],
-        body.mu[1],
-        body.mu[2],
-        body.tau_sig,
-        truth.surface_counted().0 - contact,
-    ];
-    let force = fit(&source.samples, &options).expect("a fit");
-    let signal = SourceFit::of(source, &options).result.expect("a fit");
-    [signal, force].map(|report| {
-        std::array::from_fn(|k| {
-            let one = report.parameter(NAMES[k]).expect("a parameter");
-            let scale = if k < 5 { true_values[k].abs() } else { 1.0 };
-            let [low, high] = one.ci95.unwrap_or([one.value; 2]);
-            CoverageDraw {
-                error: (one.value - true_values[k]) / scale,
-                std_error: one.std_error.unwrap_or(0.0) / scale,
-                is_covered: (low..=high).contains(&true_values[k]),
-            }
-        })
+    let shared = if all.len() > 1 { vec!["body"] } else { Vec::new() };
+    let records = Recordings { all, notes: Vec::new() };
+    let borrowed = records.borrowed();
+    let body = if shared.is_empty() { Vec::new() } else { options.body_names() };
+    let force = fit_joint(&borrowed, &options, &body).expect("a fit");
+    let request = JointFitRequest {
+        options: &options,
+        shared,
+        is_systematic: true,
+        intervals: IntervalRequest::default(),
+    };
+    let signal = fit_together(&records, &request, |_, _| ()).expect("a fit");
+    let of = |report: &JointReport| draws_of(&report.records[0].report, &truth);
+    SeedDraws { signal: of(&signal.report), force: of(&force) }
+}
+
+fn draws_of(report: &FitReport, truth: &[f64; 6]) -> CoverageDraws {
+    std::array::from_fn(|k| {
+        let one = report.parameter(NAMES[k]).expect("a parameter");
+        let scale = if k < 5 { truth[k].abs() } else { 1.0 };
+        let std_error = one.std_error.unwrap_or(0.0);
+        let holds = |interval: Option<[f64; 2]>| {
+            interval.is_some_and(|[low, high]| (low..=high).contains(&truth[k]))
+        };
+        CoverageDraw {
+            error: (one.value - truth[k]) / scale,
+            std_error: std_error / scale,
+            total_error: std_error.hypot(one.systematic_error.unwrap_or(0.0)) / scale,
+            is_covered: holds(one.ci95),
+            is_covered_in_total: holds(one.total95.or(one.ci95)),
+        }
     })
 }
 
 /// Draws of these seeds on two threads.
 #[must_use]
-pub fn draws(settings: SimSettings, seeds: std::ops::Range<u64>) -> CoverageDraws {
+pub fn draws(case: CoverageCase, seeds: std::ops::Range<u64>) -> Vec<SeedDraws> {
     let halves =
         [0, 1].map(|half| seeds.clone().filter(move |seed| seed % 2 == half).collect::<Vec<_>>());
-    let mut all = CoverageDraws::default();
+    let of = |seed| {
+        let settings = SimSettings { seed, ..case.settings };
+        draw(&CoverageCase { settings, ..case })
+    };
     std::thread::scope(|scope| {
-        let handles = halves.map(|own| {
-            scope.spawn(move || {
-                own.into_iter()
-                    .map(|seed| draw(SimSettings { seed, ..settings }))
-                    .collect::<Vec<_>>()
-            })
-        });
-        for handle in handles {
-            for [signal, force] in handle.join().expect("draws") {
-                all.signal.push(signal);
-                all.force.push(force);
-            }
-        }
-    });
-    all
+        let handles =
+            halves.map(|own| scope.spawn(move || own.into_iter().map(of).collect::<Vec<_>>()));
+        handles.into_iter().flat_map(|one| one.join().expect("draws")).collect()
+    })
 }
 
-/// Bias, spread, mean standard uncertainty in percent (contact: um) and coverage, a line for each parameter.
-pub fn print_table(title: &str, draws: &[[CoverageDraw; 6]]) {
-    println!("{title}, {} seeds", draws.len());
-    let count = draws.len() as f64;
-    for (k, name) in NAMES.iter().enumerate() {
+/// What many draws of a parameter come to.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CoverageSummary {
+    pub bias: f64,
+    pub spread: f64,
+    pub stated: f64,
+    pub total: f64,
+    pub covered: usize,
+    pub covered_in_total: usize,
+    pub count: usize,
+}
+
+/// For each parameter, in percent of its value; contact in um.
+#[must_use]
+pub fn summarise(draws: &[CoverageDraws]) -> [CoverageSummary; 6] {
+    std::array::from_fn(|k| {
         let unit = if k < 5 { 100.0 } else { 1000.0 };
-        let errors = || draws.iter().map(|one| unit * one[k].error);
-        let mean = errors().sum::<f64>() / count;
-        let spread = (errors().map(|one| (one - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
-        let stated = draws.iter().map(|one| unit * one[k].std_error).sum::<f64>() / count;
-        let covered = draws.iter().filter(|one| one[k].is_covered).count() as f64;
+        let count = draws.len() as f64;
+        let mean = |of: &dyn Fn(&CoverageDraw) -> f64| {
+            draws.iter().map(|one| unit * of(&one[k])).sum::<f64>() / count
+        };
+        let bias = mean(&|one| one.error);
+        let square = draws.iter().map(|one| (unit * one[k].error - bias).powi(2)).sum::<f64>();
+        CoverageSummary {
+            bias,
+            spread: (square / (count - 1.0)).sqrt(),
+            stated: mean(&|one| one.std_error),
+            total: mean(&|one| one.total_error),
+            covered: draws.iter().filter(|one| one[k].is_covered).count(),
+            covered_in_total: draws.iter().filter(|one| one[k].is_covered_in_total).count(),
+            count: draws.len(),
+        }
+    })
+}
+
+/// A table in Markdown.
+pub fn print_table(title: &str, draws: &[CoverageDraws]) {
+    println!("{title}, {} seeds\n", draws.len());
+    println!(
+        "| parameter | bias | spread | stated | `ci95` covers | in total | `total95` covers |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for (name, one) in NAMES.iter().zip(summarise(draws)) {
+        let percent = |count: usize| 100.0 * count as f64 / one.count as f64;
         println!(
-            "  {name:<10} bias {mean:+9.4}  spread {spread:8.4}  stated {stated:8.4}  covers {:5.1} %",
-            100.0 * covered / count
+            "| {name} | {:+.4} | {:.4} | {:.4} | {:.1} % | {:.4} | {:.1} % |",
+            one.bias,
+            one.spread,
+            one.stated,
+            percent(one.covered),
+            one.total,
+            percent(one.covered_in_total)
         );
     }
+    println!();
 }

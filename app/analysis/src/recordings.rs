@@ -9,7 +9,7 @@ use crate::exports::remove_recovered_originals;
 use crate::fit::Origin;
 use crate::source::{self, FitSource, SourceError, SourceSelection};
 use palpate_model::calibration::{Calibration, CalibrationError};
-use palpate_rheology::fit::{FitError, FitSample, TracedRecord};
+use palpate_rheology::fit::{FitError, FitSample, Signal, SignalRecord, TracedRecord};
 use palpate_sessions::folder::is_session_folder;
 use palpate_sessions::log::ReadError;
 use palpate_tables::import::ColumnNames;
@@ -181,6 +181,8 @@ pub struct Recording {
     pub compliance: Option<ComplianceCorrection>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
+    /// What the load cell reported, where it was recorded.
+    pub signal: Option<Signal>,
 }
 
 impl Recording {
@@ -191,6 +193,7 @@ impl Recording {
             samples: source.samples,
             specimen: source.specimen,
             calibration: source.calibration,
+            signal: source.signal,
             compliance,
         }
     }
@@ -256,6 +259,15 @@ pub fn read(paths: &[PathBuf], how: RecordingOptions<'_>) -> Result<Recordings, 
 impl Recordings {
     pub fn borrowed(&self) -> Vec<(&str, &[FitSample])> {
         self.all.iter().map(Recording::borrowed).collect()
+    }
+
+    /// All of them with their signals, where they have one.
+    pub fn signals(&self) -> Vec<SignalRecord<'_>> {
+        fn of(one: &Recording) -> SignalRecord<'_> {
+            let Recording { name, samples, signal, .. } = one;
+            SignalRecord { name, samples, signal: signal.as_ref() }
+        }
+        self.all.iter().map(of).collect()
     }
 
     /// Systematic uncertainty by `find`; `None` where no record has a calibration or compliance.

@@ -51,6 +51,7 @@ mod support_bundle;
 mod tag;
 mod terminal;
 mod trade;
+mod truth;
 mod verdict;
 mod window;
 mod wired;

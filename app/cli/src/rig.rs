@@ -1,18 +1,20 @@
 //! The rig and its pace, shared by all commands that need one.
 
-use super::Failure;
 use super::calibration::source::CalibrationSource;
+use super::truth::RigWithTruth;
+use super::{Failure, new_file};
 use clap::{Args, Parser};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
-    SimBath, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile, SimRate,
-    SimSettings, SimSoftening, SimStiffness, SimThickness,
+    SimBath, SimCell, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile,
+    SimRate, SimRig, SimSettings, SimSoftening, SimStiffness, SimThickness,
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position, Volts};
 use palpate_runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
+use std::path::PathBuf;
 
 /// The bench of a simulated rig or behind an emulated device.
 #[derive(Clone, Debug, Args)]
@@ -20,6 +22,10 @@ pub struct BenchArgs {
     /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
     #[arg(long, default_value = "lab")]
     pub profile: SimProfile,
+    /// Simulated rig: its load cell, document (exactly as its calibration says) or own (drawn by the seed, with hysteresis
+    /// and weights that are not exact)
+    #[arg(long, default_value = "document")]
+    pub cell: SimCell,
     /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -54,6 +60,7 @@ impl BenchArgs {
     pub fn settings(&self) -> SimSettings {
         SimSettings {
             profile: self.profile,
+            cell: self.cell,
             seed: self.seed,
             softening: self.softening,
             noise: self.noise,
@@ -87,6 +94,9 @@ pub struct RigArgs {
     /// Read forces with this calibration: a name or id of the library, or a file
     #[arg(long, value_name = "NAME|FILE")]
     pub calibration: Option<String>,
+    /// Simulated rig: write what was true, parameters, contact position and the cell's curve, to this new file at the end
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -130,7 +140,14 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     if palpate_drivers::is_rig_file(&args.rig) {
         return open_wired(args);
     }
-    let rig = palpate_drivers::open(&args.rig, &settings).map_err(Failure::usage)?;
+    let mut rig = palpate_drivers::open(&args.rig, &settings).map_err(Failure::usage)?;
+    if let Some(to) = &args.truth {
+        new_file::check("truth of the rig", Some(to))?;
+        let file = std::fs::File::create_new(to).map_err(|err| {
+            Failure::failed(format!("cannot create {} ({err}); check the folder", to.display()))
+        })?;
+        rig = Box::new(RigWithTruth::new(SimRig::named(&args.rig, settings), file));
+    }
     // A plain `sim` lives and dies with its program; a named one is shared like a real rig.
     let locks = match args.rig.split_once(':') {
         Some((_, name)) => vec![rig_lock(name)?],
@@ -151,6 +168,9 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
 
 /// Opens the rig that a file describes.
 fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
+    if args.truth.is_some() {
+        return Err(Failure::usage("--truth is for simulated rigs; leave it out"));
+    }
     if args.time_scale != TimeScale::Factor(1.0) {
         return Err(Failure::usage(
             "--time-scale applies only to simulated rigs; leave out --time-scale",

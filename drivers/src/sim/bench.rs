@@ -1,6 +1,7 @@
 //! The bench before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
 //! cell. The rig gives way in between: the probe is not quite where the axis is.
 
+use super::own_cell::OwnWeights;
 use super::random::Random;
 use super::settings::SimSettings;
 use super::tissue::Tissue;
@@ -33,6 +34,7 @@ pub struct SimBench {
     base: Position,
     body: ModifiedKelvin,
     weights: Newtons,
+    set: OwnWeights,
     probe: Position,
 }
 
@@ -46,6 +48,7 @@ impl SimBench {
             body: specimen.body(),
             specimen: Some(specimen),
             weights: Newtons(0.0),
+            set: OwnWeights::of(settings),
             probe,
         }
     }
@@ -72,7 +75,7 @@ impl SimBench {
     pub fn apply_hand_action(&mut self, action: HandAction) {
         match action {
             HandAction::LoadCell { mass_g } if mass_g >= 0.0 && mass_g.is_finite() => {
-                self.weights = HandAction::weight(mass_g);
+                self.weights = HandAction::weight(self.set.true_mass(mass_g));
             }
             HandAction::LoadCell { .. } => {}
             HandAction::Mount { specimen } => {

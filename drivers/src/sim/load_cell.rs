@@ -1,5 +1,6 @@
 //! The simulated load cell: force to volts, with the faults of the cell it stands for.
 
+use super::own_cell::OwnCell;
 use super::random::{Random, RandomStream};
 use super::settings::{SimProfile, SimSettings};
 use palpate_model::calibration::{Calibration, CalibrationCurve};
@@ -55,6 +56,7 @@ pub fn noise_expected(settings: &SimSettings) -> Volts {
 #[derive(Clone, Debug)]
 pub struct LoadCell {
     curve: CalibrationCurve,
+    own: Option<OwnCell>,
     noise: Random,
     error: CellError,
 }
@@ -86,7 +88,14 @@ impl LoadCell {
             }
             SimProfile::Ideal => CellError::Ideal { noise: settings.noise.newtons() },
         };
-        Self { curve, noise: Random::new(settings.seed, RandomStream::Noise), error }
+        let own = OwnCell::of(settings, &curve);
+        let curve = own.as_ref().map_or(curve, |own| own.curve.clone());
+        Self { curve, own, noise: Random::new(settings.seed, RandomStream::Noise), error }
+    }
+
+    /// Volts of newtons as they truly are.
+    pub fn true_curve(&self) -> &CalibrationCurve {
+        &self.curve
     }
 
     /// The signal under a force at the next tick, as counts where there is a converter.
@@ -104,6 +113,7 @@ impl LoadCell {
     /// The amplified signal under a force at the next tick, before any converter.
     pub fn signal(&mut self, force: Newtons) -> Volts {
         let noise = self.noise.normal();
+        let force = self.own.as_mut().map_or(force, |own| own.lagged(force));
         match &mut self.error {
             CellError::Ideal { noise: rms } => {
                 let noisy = Newtons(force.0 + rms.0 * noise);

@@ -10,6 +10,7 @@ mod amounts;
 mod bench;
 mod clock;
 mod load_cell;
+mod own_cell;
 mod preconditioning;
 mod random;
 mod sensors;
@@ -24,12 +25,12 @@ pub use amounts::{
 pub use bench::SimBench;
 pub use load_cell::{LoadCell, calibration, counts_from_volts, volts_from_counts};
 pub use random::{Random, RandomStream};
-pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
+pub use settings::{SimCell, SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::{HandAction, Reading, RigCommand, RigDescription, SensorReading};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{MmPerS, MmPerS2, Nanos, Newtons, Position, Seconds};
@@ -160,6 +161,11 @@ impl SimRig {
             body: self.bench.body(),
             force: self.force,
         }
+    }
+
+    /// Volts of newtons of its load cell as they truly are.
+    pub fn true_curve(&self) -> &CalibrationCurve {
+        self.load_cell.true_curve()
     }
 
     /// One tick of the controller: commands that have arrived, motion, tissue, sample.

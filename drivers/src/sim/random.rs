@@ -15,6 +15,7 @@ pub enum RandomStream {
     Drift = 4,
     Link = 5,
     Fault = 6,
+    Cell = 7,
 }
 
 #[derive(Clone, Debug)]

@@ -32,6 +32,19 @@ palpate_model::named! {
     }
 }
 
+palpate_model::named! {
+    /// The load cell that a simulated rig has.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    pub enum SimCell {
+        /// Exactly the curve that the profile's calibration document holds.
+        #[default]
+        Document = "document",
+        /// A cell drawn by the seed: its curve differs from the document's, it has hysteresis, and the weights that a
+        /// person puts on it differ from what is engraved on them.
+        Own = "own",
+    }
+}
+
 impl SimClock {
     /// True length of one tick in nanoseconds, at the usual rate.
     #[must_use]
@@ -46,6 +59,7 @@ impl SimClock {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SimSettings {
     pub profile: SimProfile,
+    pub cell: SimCell,
     pub seed: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
@@ -84,7 +98,7 @@ impl SimSettings {
     }
 
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
-    /// are not the usual ones, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
+    /// are not the usual ones, `cell`, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
     /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C)
     /// and `input` (s).
     pub fn to_map(&self) -> BTreeMap<String, String> {
@@ -95,6 +109,7 @@ impl SimSettings {
         ]);
         let usual = Self::default();
         let amounts = [
+            ("cell", self.cell.to_string(), usual.cell.to_string()),
             ("rate", self.rate.to_string(), usual.rate.to_string()),
             ("softening", self.softening.to_string(), usual.softening.to_string()),
             ("noise", self.noise.to_string(), usual.noise.to_string()),
@@ -124,6 +139,14 @@ impl FromStr for SimProfile {
     }
 }
 
+impl FromStr for SimCell {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let found = Self::ALL.into_iter().find(|cell| cell.name() == text);
+        found.ok_or_else(|| SimSettingError::new("cell", text, "'document' or 'own'"))
+    }
+}
+
 impl FromStr for SimClock {
     type Err = SimSettingError;
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -145,6 +168,7 @@ mod tests {
         assert_eq!(usual, [("clock", "nominal"), ("profile", "lab"), ("seed", "0")]);
         let settings = SimSettings {
             profile: "ideal".parse().unwrap(),
+            cell: "own".parse().unwrap(),
             seed: u64::MAX - 3,
             clock: "galil".parse().unwrap(),
             rate: "20000".parse().unwrap(),
@@ -161,6 +185,7 @@ mod tests {
         let map: Vec<_> = map.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
         let all = [
             ("bath", "37"),
+            ("cell", "own"),
             ("clock", "galil"),
             ("compliance", "41"),
             ("input", "30"),

@@ -109,6 +109,7 @@ fn recorded_on(um_per_n: &str) -> Session {
 fn source(session: &Session) -> FitSource {
     FitSource {
         samples: fit_samples(session, RecordStretch::RampHold).unwrap(),
+        signal: None,
         start: Seconds(0.0),
         notes: Vec::new(),
         specimen: None,

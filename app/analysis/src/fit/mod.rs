@@ -200,7 +200,9 @@ impl SourceFit {
         if wanted == IntervalRequest::default() {
             return Ok(FitIntervals::default());
         }
-        let exact = fit::FitSolution::of(&self.samples, options)?;
+        let signal = self.signal.as_ref();
+        let record = SignalRecord { name: "the record", samples: &self.samples, signal };
+        let exact = FitSolution::fit_signals(&[record], options, &[])?;
         wanted.find(&exact, 0, progress)
     }
 }

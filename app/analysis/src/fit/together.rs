@@ -4,8 +4,8 @@ use super::{FitIntervals, IntervalRequest, no_systematic};
 use crate::recordings::Recordings;
 use crate::report::fit_json::{FitDetails, FitOverlay, JointObject};
 use palpate_rheology::fit::{
-    FitError, FitOptions, FitSolution, JointReport, SystematicUncertainty, TracedRecord,
-    estimate_systematic_jointly,
+    FitError, FitOptions, FitSolution, JointReport, SignalRecord, SystematicUncertainty,
+    TracedRecord,
 };
 use palpate_runner::Stopwatch;
 
@@ -53,12 +53,12 @@ pub fn fit_together(
     let shared: Vec<&str> = names.collect();
     let borrowed = records.borrowed();
     let watch = Stopwatch::start();
-    let fitted = FitSolution::fit_jointly(&borrowed, request.options, &shared)?;
+    let signals: Vec<SignalRecord<'_>> = records.signals();
+    let fitted = FitSolution::fit_signals(&signals, request.options, &shared)?;
     let mut report = fitted.joint_report();
     let seconds = watch.seconds();
     let mut notes = Vec::new();
-    let find =
-        |traced: &[TracedRecord<'_>]| estimate_systematic_jointly(traced, request.options, &shared);
+    let find = |traced: &[TracedRecord<'_>]| fitted.systematic(traced);
     let found = request.is_systematic.then(|| records.systematic(find));
     let systematic = found.and_then(|found| {
         found.unwrap_or_else(|reason| {

@@ -57,9 +57,11 @@ impl FitSolution<'_> {
         if let Some(short) = sources.iter().find(|source| source.blocks() < BLOCKS_MIN) {
             return Err(FitError::TooFewBlocks { blocks: short.blocks(), needed: BLOCKS_MIN });
         }
-        let free: Vec<usize> = (0..self.system.layout().count())
-            .filter(|&k| self.system.fixed(record, k).is_none())
-            .collect();
+        // Shuffled residuals are of forces: where a signal was fitted, an offset stands for its zero again.
+        let base = self.system.without_signals();
+        let start = base.at_fixed_contacts(&self.refined.points);
+        let free: Vec<usize> =
+            (0..base.layout().count()).filter(|&k| base.fixed(record, k).is_none()).collect();
         let mut random = SplitMix::seeded(choice.seed);
         let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(choice.repeats); free.len()];
         for done in 0..choice.repeats {
@@ -68,8 +70,8 @@ impl FitSolution<'_> {
                 .zip(&self.system.records)
                 .map(|(source, record)| source.shuffled(record.samples, &mut random))
                 .collect();
-            let system = self.system.with_samples(&shuffled);
-            let refined = refine(&system, &self.refined.points, Rows::All, StopRule::Noise);
+            let system = base.with_samples(&shuffled);
+            let refined = refine(&system, &start, Rows::All, StopRule::Noise);
             let refined = refined.ok_or(FitError::Overflow)?;
             let values = system.physical_values(record, &refined.points[record]);
             for (list, &parameter) in found.iter_mut().zip(&free) {

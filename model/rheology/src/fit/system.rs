@@ -261,6 +261,31 @@ impl<'a> System<'a> {
         self.list_unknowns()
     }
 
+    /// The same records without their signals.
+    pub fn without_signals(&self) -> Self {
+        if !self.has_signal() {
+            return self.clone();
+        }
+        let mut system = self.clone();
+        system.fixed = vec![self.options.fixed.clone(); self.records.len()];
+        system.signals = vec![None; self.records.len()];
+        for record in 0..self.records.len() {
+            system.ranges[record].contact = self.range(record).contact;
+        }
+        system.list_unknowns()
+    }
+
+    /// Points with contact positions where they are kept.
+    pub fn at_fixed_contacts(&self, points: &[ParameterPoint]) -> Vec<ParameterPoint> {
+        let mut points = points.to_vec();
+        for (record, point) in points.iter_mut().enumerate() {
+            if let Some(contact) = self.fixed_contact(record) {
+                point.outer.contact = contact;
+            }
+        }
+        points
+    }
+
     pub fn has_signal(&self) -> bool {
         self.signals.iter().any(Option::is_some)
     }
