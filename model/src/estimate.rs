@@ -23,6 +23,17 @@ pub struct FittedParameter {
     /// 95 % interval of everything that is known to be uncertain: the statistical interval and the systematic error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub total95: Option<[f64; 2]>,
+    /// The independent sources of its uncertainty; empty where they are not told apart.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub budget: Vec<BudgetEntry>,
+}
+
+/// One source of a parameter's uncertainty (JCGM 100:2008, "uncertainty budget").
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BudgetEntry {
+    pub source: String,
+    /// Its standard uncertainty, in the unit of the parameter.
+    pub error: f64,
 }
 
 /// Whether the record so far determines one parameter.

@@ -3,7 +3,7 @@
 use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
-use palpate_drivers::sim::{SimCell, SimRig, SimSettings, SimTruth};
+use palpate_drivers::sim::{SimCell, SimProfile, SimRig, SimSettings, SimTruth};
 use palpate_drivers::{Rig, RigEvent};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{HandAction, RigCommand, RigDescription, SensorReading};
@@ -43,6 +43,31 @@ pub struct CoverageCase {
     pub is_short_of_weights: bool,
     /// A second run at this speed in mm/s on the same specimen, the body shared.
     pub second_speed: Option<f64>,
+}
+
+impl CoverageCase {
+    /// Names of all cases.
+    pub const NAMES: [&str; 6] = ["ideal", "lab", "fast", "speeds", "own", "few-weights"];
+
+    /// The case of a name.
+    ///
+    /// # Panics
+    /// If there is none.
+    #[must_use]
+    pub fn named(name: &str) -> Self {
+        let lab = SimSettings::default();
+        let own = SimSettings { cell: SimCell::Own, ..lab };
+        let of = |settings| Self { settings, ..Self::default() };
+        match name {
+            "ideal" => of(SimSettings { profile: SimProfile::Ideal, ..lab }),
+            "lab" => of(lab),
+            "fast" => of(SimSettings { rate: "20000".parse().expect("a rate"), ..lab }),
+            "speeds" => Self { second_speed: Some(1.5), ..of(lab) },
+            "own" => of(own),
+            "few-weights" => Self { is_short_of_weights: true, ..of(own) },
+            other => panic!("there is no case {other}; give any of {:?}", Self::NAMES),
+        }
+    }
 }
 
 /// Fits of one seed: in volts, and in newtons beside it.

@@ -187,7 +187,7 @@ mod tests {
         }
         for (text, expected) in [
             ("[device]\ndrive = \"steam\"", "line 2: device.drive"),
-            ("", "device.period_ns: is missing"),
+            ("", "device.period_ns: this key is missing"),
         ] {
             let found = parse("settings.toml", text).unwrap_err();
             assert!(found.contains(expected), "{found}");

@@ -24,7 +24,7 @@ pub struct BenchArgs {
     pub profile: SimProfile,
     /// Simulated rig: its load cell, document (exactly as its calibration says) or own (drawn by the seed, with hysteresis
     /// and weights that are not exact)
-    #[arg(long, default_value = "document")]
+    #[arg(long = "load-cell", default_value = "document", value_name = "CELL")]
     pub cell: SimCell,
     /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]

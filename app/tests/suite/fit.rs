@@ -153,7 +153,7 @@ fn tables_without_header_or_unit_are_read_when_reported_how() {
     assert!(stderr(&time).contains("seconds"));
     assert_eq!(json(&named)["parameters"], json(&time)["parameters"]);
     let wrong = palpate(at, &["fit", "bare.csv", "--columns", "t_s,x_mm"]);
-    assert_refused(&wrong, 2, "is the force");
+    assert_refused(&wrong, 2, "recognised as the force");
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
     let fitted = objects.iter().filter(|object| object["r2"].is_f64()).count();
     let not_begun = |object: &&Value| {
         let error = object["error"].as_str();
-        error.is_some_and(|error| error.starts_with("not begun"))
+        error.is_some_and(|error| error.starts_with("the fit was not begun"))
     };
     let left = objects.iter().filter(not_begun).count();
     assert!(fitted >= 1 && left >= 1, "{fitted} {left}");

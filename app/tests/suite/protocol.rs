@@ -108,7 +108,7 @@ fn check_tells_every_mistake_with_its_line() {
     assert_eq!(check.status.code(), Some(2));
     let text = stdout(&check);
     for words in [
-        "'rmap'; did you mean 'ramp'?",
+        "'rmap' is not a known step; did you mean 'ramp'?",
         "spoilt.toml, line 20: 'speed' of 'unload': \"3 mm\" is a length",
         "deep.toml, line 19: a depth of 400 mm",
     ] {

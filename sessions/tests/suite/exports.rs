@@ -364,7 +364,7 @@ fn dictionary_describes_every_column_of_the_table() {
         // Every column has a type, a meaning and an origin.
         assert!(rows.iter().all(|row| row.len() == 5 && !row[2..].contains(&"")));
         assert!(dictionary.contains("a \\| b c"), "{dictionary}");
-        assert_eq!(dictionary.contains("every 100th"), selection.every.is_some());
+        assert_eq!(dictionary.contains("one of every 100 "), selection.every.is_some());
     }
 }
 

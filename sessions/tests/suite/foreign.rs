@@ -194,7 +194,7 @@ fn skipped_rows_are_counted_and_gaps_are_reported() {
     for (option, value) in all {
         let others: Vec<(&str, &str)> = all.into_iter().filter(|one| one.1 != value).collect();
         let reason = refused(&text, &parse_options(&others));
-        assert!(reason.ends_with(value), "{option} {value}: {reason}");
+        assert!(reason.ends_with(&format!("'{value}'")), "{option} {value}: {reason}");
     }
     let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &detect_all());
     assert!(

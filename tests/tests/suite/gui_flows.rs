@@ -93,6 +93,7 @@ fn every_sentence_of_a_report_is_on_the_screen() {
         is_fixed: false,
         systematic_error: None,
         total95: None,
+        budget: Vec::new(),
     };
     let report = FitReport {
         model: "a model".into(),

@@ -70,7 +70,7 @@ fn sessions_are_found_by_words_conditions_and_choices() {
     flow.wait_for_words("'depth>=deep'");
     assert!(flow.says("3 sessions, found in"));
     flow.type_into("find", "thickness>=3");
-    flow.wait_for_words("called thickness");
+    flow.wait_for_words("named thickness");
     flow.type_into("find", "");
     flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     flow.type_into("from", "yesterday");

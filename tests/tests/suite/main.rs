@@ -23,6 +23,7 @@ mod gui_tape;
 mod gui_tutorial;
 mod gui_workbench;
 mod hold_until;
+mod interval_coverage;
 mod on_wires;
 mod pausing;
 mod preview;

@@ -184,6 +184,7 @@ mod tests {
             is_fixed,
             systematic_error: None,
             total95: None,
+            budget: Vec::new(),
         };
         assert!(!is_poorly_identified(&[tau(Some(0.01), false)]));
         assert!(!is_poorly_identified(&[tau(None, true)]));

@@ -296,7 +296,7 @@ mod tests {
         assert!(force_loss_reasons(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
         let all = force_loss_reasons(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
         assert_eq!(all.len(), 4);
-        for words in ["no contact", "after the start", "at its limit", "1 tick passed"] {
+        for words in ["no contact", "after the start", "at its limit", "missed 1 tick"] {
             assert!(all.iter().any(|one| one.contains(words)), "{words}: {all:?}");
         }
     }

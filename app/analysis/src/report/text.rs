@@ -1,6 +1,7 @@
 //! The strings of a fit. Window, command line and picture print these and no others, so that a
 //! number never reads differently in two places.
 
+use super::budget::budget_lines;
 use super::fit_json::{FitDetails, FitOverlay};
 use crate::fit::{FitIntervals, JointFit};
 use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_interval};
@@ -101,6 +102,7 @@ pub fn fit_text(report: &FitReport, details: FitDetails<'_>) -> String {
     lines.extend(equation(report).map(|text| format!("  {text}")));
     lines.extend(parameter_lines(&report.parameters));
     lines.extend([quality(report), energy(details.overlay)]);
+    lines.extend(budget_lines(&report.parameters));
     let sentences = report.sentences().map(str::to_owned).chain(limit(report));
     lines.extend(sentences.map(|sentence| format!("- {sentence}")));
     lines.extend(interval_lines(details.intervals, report));
@@ -127,6 +129,7 @@ pub fn joint_fit_text(fitted: &JointFit, details: &[FitDetails<'_>]) -> String {
         lines.push(named.record.clone());
         lines.extend(part(named, false));
         let own = [quality(&named.report), energy(details.overlay)].into_iter();
+        let own = own.chain(budget_lines(&named.report.parameters));
         let own = own.chain(interval_lines(details.intervals, &named.report));
         let own = own.chain(named.report.sentences().map(|sentence| format!("- {sentence}")));
         lines.extend(own.map(|line| format!("  {line}")));
@@ -229,6 +232,7 @@ mod tests {
             is_fixed,
             systematic_error: None,
             total95: None,
+            budget: Vec::new(),
         }
     }
 

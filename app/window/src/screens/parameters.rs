@@ -216,6 +216,7 @@ mod tests {
             is_fixed: false,
             systematic_error: None,
             total95: None,
+            budget: Vec::new(),
         }
     }
 

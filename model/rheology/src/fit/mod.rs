@@ -36,7 +36,9 @@ pub use live::{LiveFit, ResidualBlocks};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
-pub use report::{FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate};
+pub use report::{
+    BudgetEntry, FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate,
+};
 pub use sample::{FitError, FitSample};
 pub use signal::{Signal, SignalRecord, UnloadedMean};
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};

@@ -14,7 +14,7 @@ use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::{Deserialize, Serialize};
 
-pub use palpate_model::estimate::FittedParameter;
+pub use palpate_model::estimate::{BudgetEntry, FittedParameter};
 
 /// Autocorrelation of the residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -297,9 +297,21 @@ impl FitSolution<'_> {
             is_fixed,
             systematic_error: None,
             total95: None,
+            budget: error.map_or_else(Vec::new, statistical_budget),
         })
         .collect()
     }
+}
+
+/// Noise, drift and contact position, where these are told apart.
+fn statistical_budget(error: UncertaintyEstimate) -> Vec<BudgetEntry> {
+    let Some([drift, contact]) = error.shares else { return Vec::new() };
+    let entry = |source: &str, share: f64| BudgetEntry {
+        source: source.to_owned(),
+        error: error.std_error * share.sqrt(),
+    };
+    let noise = (1.0 - drift - contact).max(0.0);
+    vec![entry("noise", noise), entry("drift", drift), entry("contact position", contact)]
 }
 
 /// The 95 % interval of a value.

@@ -320,7 +320,8 @@ impl<'a> System<'a> {
     /// The rows from which a solution is found many times cheaper, and a small share of a standard error from it; all of
     /// them where these cost as little.
     pub fn search_rows(&self) -> Rows {
-        match self.source.is_fast() {
+        // Thinned records know neither the zero nor the curve of a signal.
+        match self.source.is_fast() || self.has_signal() {
             true => Rows::All,
             false => Rows::Thin,
         }

@@ -27,6 +27,8 @@ pub(super) struct Uncertainty {
     block_factor: Factor,
     /// The joint triangle with drift of a larger variance, and how well that variance is known; where signals are fitted.
     drift: Option<(Factor, f64)>,
+    /// Unknowns of which something was known before, and their weights.
+    contacts: Vec<(usize, f64)>,
 }
 
 /// Factor on the variance of drift from whose effect its share is taken.
@@ -50,6 +52,8 @@ pub(super) struct UncertaintyEstimate {
     pub inflation: f64,
     /// Degrees of freedom of Student's t.
     pub freedom: f64,
+    /// Shares of the variance that the drift of the zero and the contact position have; `None` where no signal was fitted.
+    pub shares: Option<[f64; 2]>,
 }
 
 impl Uncertainty {
@@ -88,7 +92,8 @@ impl Uncertainty {
             })
             .collect();
         let drift = system.has_signal().then(|| more_drift(system, refined)).flatten();
-        Self { scatter, records, block_factor, drift }
+        let contacts = system.known_contacts();
+        Self { scatter, records, block_factor, drift, contacts }
     }
 
     /// Samples in a block of a record.
@@ -132,13 +137,22 @@ impl Uncertainty {
         let std_error = independent * inflation.sqrt();
         // The drift's share of the variance is no better known than the drift (Welch and Satterthwaite, JCGM 100:2008,
         // G.4).
-        let drift = self.drift.as_ref().map_or(0.0, |(factor, known)| {
+        let shares = self.drift.as_ref().map(|(factor, _)| {
             let more = (scatter * factor.deviation(combination) / independent).powi(2) - 1.0;
-            known * (more / (DRIFT_STEP - 1.0)).clamp(0.0, 1.0).powi(2)
+            let influence = refined.pass.joint.influence(combination);
+            let prior = self.contacts.iter().map(|(k, weight)| (weight * influence[*k]).powi(2));
+            let contact = prior.sum::<f64>() * (scatter / independent).powi(2);
+            [(more / (DRIFT_STEP - 1.0)).clamp(0.0, 1.0), contact.clamp(0.0, 1.0)]
         });
-        let uncertainty = uncertainty + drift;
+        let known = self.drift.as_ref().map_or(0.0, |(_, known)| *known);
+        let uncertainty = uncertainty + shares.map_or(0.0, |[drift, _]| known * drift * drift);
         let freedom = if uncertainty > 0.0 { spare.min(2.0 / uncertainty) } else { spare };
-        std_error.is_finite().then_some(UncertaintyEstimate { std_error, inflation, freedom })
+        std_error.is_finite().then_some(UncertaintyEstimate {
+            std_error,
+            inflation,
+            freedom,
+            shares,
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! A 95 % interval covers the truth 95 times in a hundred, also where the noise remembers.
 //!
 //! On the thesis protocol (0.75 mm/s to 30 mm, 50 s of hold, 1 kHz) with noise of 0.02 N. The suite
-//! takes a few draws and allows for their chance; `scripts/soak coverage` takes
+//! takes a few draws and allows for their chance; `scripts/soak noise` takes
 //! `PALPATE_COVERAGE_DRAWS` of them and asks for 92 to 97 %.
 
 use palpate_model::viscoelastic::ModifiedKelvin;

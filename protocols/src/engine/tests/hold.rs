@@ -17,6 +17,7 @@ fn answer(relative: f64, is_identified: bool) -> EngineInput {
             is_fixed: false,
             systematic_error: None,
             total95: None,
+            budget: Vec::new(),
         }],
         rmse_weighted_n: 0.02,
         samples: 1000,

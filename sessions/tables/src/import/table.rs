@@ -307,8 +307,8 @@ mod tests {
         };
         check("", "empty");
         check("0,0,0\n1,1,1\n", "no header");
-        check("t_s depth_mm force_N\n", "names no columns");
-        check("t_s,depth_mm\n0,0\n", "is the force");
+        check("t_s depth_mm force_N\n", "no delimiter");
+        check("t_s,depth_mm\n0,0\n", "recognised as the force");
         check("t_s,depth_mm,force\n0,0,0\n", "'force'");
         check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "'depth_mm' and 'x_mm'");
         check("t_s,depth_mm,force_N\n0,0,0\n1,one,1\n", "line 3: the depth 'one'");

@@ -12,7 +12,7 @@ use super::text::{parameter_lines, table};
 use crate::cycles::of_session;
 use crate::edited_session;
 use crate::fit::SourceFit;
-use crate::source::{self, FitSource, RecordStretch};
+use crate::source::{self, RecordStretch};
 use palpate_figures::page::{HtmlBody, document};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -258,12 +258,10 @@ impl TaskPart {
         if report.cycles.len() > 1 || !report.sines.is_empty() {
             self.line(&cycles_text(&report));
             self.figures.push(cycles_picture(&report));
-        } else if let Ok(samples) = source::fit_samples(session, RecordStretch::RampHold)
+        } else if let Ok(source) = source::of_session(session.clone(), RecordStretch::RampHold, &[])
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
-            let calibration = source::calibration_of(session).ok();
-            let source = FitSource { samples, calibration, ..FitSource::default() };
             let fitted = SourceFit::of(source, &options).with_systematic(&options);
             match &fitted.result {
                 Ok(report) => self.fit(task, name, (&fitted, report), bodies),

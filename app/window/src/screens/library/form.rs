@@ -145,7 +145,7 @@ mod tests {
             assert!(form.query().is_ok(), "{word}");
         }
         form.since = "yesterday".into();
-        assert!(form.query().unwrap_err().starts_with("from: write a day"));
+        assert!(form.query().unwrap_err().starts_with("from: this is neither a day nor a time"));
         form.line = "depth>=".into();
         assert!(form.query().unwrap_err().contains("is not a condition"));
     }

@@ -323,5 +323,6 @@ fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> FittedParam
         is_fixed: false,
         systematic_error: None,
         total95: None,
+        budget: Vec::new(),
     }
 }

@@ -281,21 +281,31 @@ impl System<'_> {
         others: usize,
         joint: &mut Triangle,
     ) {
-        let contact = self.layout().contact();
         let last = self.unknowns.len() + others;
         let mut row = vec![0.0; last + 1];
-        for (k, unknown) in self.unknowns.iter().enumerate() {
-            let Some(record) = unknown.record.or((self.records.len() == 1).then_some(0)) else {
-                continue;
-            };
-            let term = self.signals[record].as_ref().filter(|_| unknown.parameter == contact);
-            let Some(term) = term else { continue };
-            let Some(error) = term.contact_error_mm else { continue };
+        for (k, record, error) in self.contact_errors() {
+            let Some(term) = &self.signals[record] else { continue };
             row.fill(0.0);
             row[k] = self.depth_mm;
             row[last] = term.contact_mm - points[record].outer.contact * self.depth_mm;
             joint.push(&row, self.sigma_scale / error);
         }
+    }
+
+    /// Unknown contact positions of which something is known: which unknown, of which record, with which uncertainty in mm.
+    fn contact_errors(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        let contact = self.layout().contact();
+        self.unknowns.iter().enumerate().filter_map(move |(k, unknown)| {
+            let record = unknown.record.or((self.records.len() == 1).then_some(0))?;
+            let term = self.signals[record].as_ref().filter(|_| unknown.parameter == contact)?;
+            Some((k, record, term.contact_error_mm?))
+        })
+    }
+
+    /// These unknowns, and the weights of what is known of them.
+    pub(in super::super) fn known_contacts(&self) -> Vec<(usize, f64)> {
+        let weight = |error: f64| self.depth_mm * self.sigma_scale / error;
+        self.contact_errors().map(|(k, _, error)| (k, weight(error))).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Systematic errors in a sentence, and in a report next to the statistical ones.
 
-use super::super::report::{FitReport, JointReport};
+use super::super::report::{BudgetEntry, FitReport, JointReport};
 use super::{StatedTerms, SystematicUncertainty};
 use palpate_model::calibration::UncertaintyTerm;
 
@@ -73,6 +73,17 @@ impl SystematicUncertainty {
         )
     }
 
+    /// What contributes to the error of a parameter.
+    fn budget(&self, name: &str) -> Vec<BudgetEntry> {
+        let Some(own) = self.parameters.iter().find(|one| one.name == name) else {
+            return Vec::new();
+        };
+        let entry = |source: &str, error: f64| BudgetEntry { source: source.to_owned(), error };
+        let terms = own.terms.iter().map(|one| entry(one.term.name(), one.error));
+        let compliance = own.compliance.map(|error| entry("machine compliance", error));
+        terms.chain(compliance).filter(|one| one.error > 0.0).collect()
+    }
+
     /// The error of a parameter, where there is one.
     fn error(&self, name: &str) -> Option<f64> {
         let own = self.parameters.iter().find(|one| one.name == name);
@@ -93,6 +104,9 @@ impl FitReport {
         let known = self.parameters.iter_mut();
         for parameter in known.filter(|one| one.std_error.is_some()) {
             parameter.systematic_error = systematic.error(&parameter.name);
+            if !parameter.budget.is_empty() {
+                parameter.budget.extend(systematic.budget(&parameter.name));
+            }
             let (Some(own), Some([low, high])) = (parameter.systematic_error, parameter.ci95)
             else {
                 continue;

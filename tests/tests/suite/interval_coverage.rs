@@ -1,0 +1,49 @@
+//! Intervals hold the truth as often as they say: seeds of the simulated rig against its true parameters.
+//! `scripts/soak coverage` counts 1000 seeds of more cases, and its table is in `docs/explanation/accuracy.md`.
+use palpate_tests::interval_coverage::{CoverageCase, CoverageDraws, NAMES, draws, summarise};
+
+/// Of 60 intervals that each hold the truth with a probability of 95 %, fewer than this do once in 1700 times.
+const SEEDS: u64 = 60;
+const HELD_MIN: usize = 51;
+/// The spread of 60 draws is uncertain by 9 %; three times that, on the 1.3 that an interval may be too wide.
+const WIDTH_MAX: f64 = 1.3 * 1.28;
+/// The same on a spread of which the limit is stated.
+const SPREAD_SLACK: f64 = 1.28;
+
+fn signal_draws(case: &str) -> Vec<CoverageDraws> {
+    draws(CoverageCase::named(case), 1..SEEDS + 1).iter().map(|one| one.signal).collect()
+}
+
+#[test]
+fn statistical_intervals_on_the_lab_rig_hold_the_truth() {
+    // Spreads of the five parameters in percent, of a prototype that knew the sizes of drift.
+    let limits = [0.15, 0.09, 0.035, 0.02, 0.1];
+    for (k, one) in summarise(&signal_draws("lab")).iter().enumerate() {
+        println!("{}: {one:?}", NAMES[k]);
+        assert!(one.covered >= HELD_MIN, "{}: {one:?}", NAMES[k]);
+        assert!(one.stated < WIDTH_MAX * one.spread, "{}: {one:?}", NAMES[k]);
+        if let Some(limit) = limits.get(k) {
+            assert!(one.spread < SPREAD_SLACK * limit, "{}: {one:?}", NAMES[k]);
+        }
+    }
+}
+
+#[test]
+fn statistical_intervals_on_the_ideal_rig_hold_the_truth() {
+    for (k, one) in summarise(&signal_draws("ideal")).iter().enumerate() {
+        println!("{}: {one:?}", NAMES[k]);
+        assert!(one.covered >= HELD_MIN, "{}: {one:?}", NAMES[k]);
+        assert!(one.stated < WIDTH_MAX * one.spread, "{}: {one:?}", NAMES[k]);
+    }
+}
+
+#[test]
+fn total_intervals_hold_the_truth_after_a_calibration_of_the_rigs_own_cell() {
+    let found = summarise(&signal_draws("own"));
+    for (k, one) in found.iter().enumerate() {
+        println!("{}: {one:?}", NAMES[k]);
+        assert!(one.covered_in_total >= HELD_MIN, "{}: {one:?}", NAMES[k]);
+    }
+    // Without the calibration's part some would not.
+    assert!(found.iter().any(|one| one.covered < HELD_MIN), "{found:?}");
+}
