@@ -9,7 +9,7 @@ fn main() {
         names = CoverageCase::NAMES.map(str::to_owned).to_vec();
     }
     for name in names {
-        let found = draws(CoverageCase::named(&name), 1..seeds + 1);
+        let found = draws(CoverageCase::named(&name), 1..seeds + 1, 2);
         let signal: Vec<CoverageDraws> = found.iter().map(|one| one.signal).collect();
         let force: Vec<CoverageDraws> = found.iter().map(|one| one.force).collect();
         print_table(&format!("{name}, fitted in volts"), &signal);

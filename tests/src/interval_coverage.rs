@@ -204,18 +204,19 @@ fn draws_of(report: &FitReport, truth: &[f64; 6]) -> CoverageDraws {
     })
 }
 
-/// Draws of these seeds on two threads.
+/// Draws of these seeds on so many threads.
 #[must_use]
-pub fn draws(case: CoverageCase, seeds: std::ops::Range<u64>) -> Vec<SeedDraws> {
-    let halves =
-        [0, 1].map(|half| seeds.clone().filter(move |seed| seed % 2 == half).collect::<Vec<_>>());
+pub fn draws(case: CoverageCase, seeds: std::ops::Range<u64>, threads: u64) -> Vec<SeedDraws> {
     let of = |seed| {
         let settings = SimSettings { seed, ..case.settings };
         draw(&CoverageCase { settings, ..case })
     };
+    let part = |k| seeds.clone().filter(move |seed| seed % threads == k);
+    let (part, of) = (&part, &of);
     std::thread::scope(|scope| {
-        let handles =
-            halves.map(|own| scope.spawn(move || own.into_iter().map(of).collect::<Vec<_>>()));
+        let handles: Vec<_> = (0..threads)
+            .map(|k| scope.spawn(move || part(k).map(of).collect::<Vec<_>>()))
+            .collect();
         handles.into_iter().flat_map(|one| one.join().expect("draws")).collect()
     })
 }

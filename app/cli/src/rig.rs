@@ -24,8 +24,8 @@ pub struct BenchArgs {
     pub profile: SimProfile,
     /// Simulated rig: its load cell, document (exactly as its calibration says) or own (drawn by the seed, with hysteresis
     /// and weights that are not exact)
-    #[arg(long = "load-cell", default_value = "document", value_name = "CELL")]
-    pub cell: SimCell,
+    #[arg(long, default_value = "document", value_name = "CELL")]
+    pub load_cell: SimCell,
     /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -60,7 +60,7 @@ impl BenchArgs {
     pub fn settings(&self) -> SimSettings {
         SimSettings {
             profile: self.profile,
-            cell: self.cell,
+            cell: self.load_cell,
             seed: self.seed,
             softening: self.softening,
             noise: self.noise,

@@ -167,7 +167,7 @@ fn wrong_wishes_are_refused_in_one_sentence() {
         (&["--force-max", "30"], 2, "interlock"),
         (&["--rate", "NaN"], 2, "sampling rate"),
         (&["--memory", "3"], 2, "is not SD,TIME"),
-        (&["--known", "mu1"], 2, "f0 and f_offset"),
+        (&["--known", "mu1"], 2, "give f0 or f_offset"),
         (&["--like", "empty.json"], 2, "not a fit"),
     ];
     for (more, code, words) in cases {
