@@ -1,5 +1,5 @@
 //! How often intervals hold the truth, as tables in Markdown: `interval_coverage SEEDS [CASE]...`
-use palpate_tests::interval_coverage::{CoverageCase, CoverageDraws, draws, print_table};
+use palpate_tests::interval_coverage::{CoverageCase, CoverageDraws, draws, table};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -12,7 +12,7 @@ fn main() {
         let found = draws(CoverageCase::named(&name), 1..seeds + 1, 2);
         let signal: Vec<CoverageDraws> = found.iter().map(|one| one.signal).collect();
         let force: Vec<CoverageDraws> = found.iter().map(|one| one.force).collect();
-        print_table(&format!("{name}, fitted in volts"), &signal);
-        print_table(&format!("{name}, fitted in newtons"), &force);
+        println!("{}", table(&format!("{name}, fitted in volts"), &signal));
+        println!("{}", table(&format!("{name}, fitted in newtons"), &force));
     }
 }

@@ -3,17 +3,16 @@
 use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
-use palpate_drivers::sim::{SimCell, SimProfile, SimRig, SimSettings, SimTruth};
-use palpate_drivers::{Rig, RigEvent};
+use palpate_drivers::sim::{RigWithTruth, SimCell, SimProfile, SimRig, SimSettings};
+use palpate_model::MmPerS;
 use palpate_model::calibration::Calibration;
-use palpate_model::rig::{HandAction, RigCommand, RigDescription, SensorReading};
-use palpate_model::{MmPerS, Nanos};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{FitOptions, FitReport, JointReport, fit_joint};
 use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
-use std::sync::{Arc, Mutex};
+use std::fmt::Write;
+use std::sync::mpsc::sync_channel;
 
 use crate::built_in_plan;
 use crate::recorded_runs::{record_plan, record_ramp_hold};
@@ -77,34 +76,6 @@ pub struct SeedDraws {
     pub force: CoverageDraws,
 }
 
-/// A rig whose truth can be looked at while another thread holds it.
-struct WatchedRig(SimRig, Arc<Mutex<SimTruth>>);
-
-impl Rig for WatchedRig {
-    fn description(&self) -> &RigDescription {
-        self.0.description()
-    }
-    fn send(&mut self, command: RigCommand) {
-        self.0.send(command);
-    }
-    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let event = self.0.next_event(until);
-        if let Ok(mut truth) = self.1.lock() {
-            *truth = self.0.truth();
-        }
-        event
-    }
-    fn is_virtual(&self) -> bool {
-        true
-    }
-    fn take_sensors(&mut self) -> Vec<SensorReading> {
-        self.0.take_sensors()
-    }
-    fn apply_hand_action(&mut self, action: HandAction) {
-        self.0.apply_hand_action(action);
-    }
-}
-
 /// The contact position that depths count from, in mm from home.
 fn contact_of(session: &Session) -> f64 {
     let effects = session.entries.iter().rev();
@@ -137,14 +108,19 @@ fn recorded(
     speed: Option<f64>,
 ) -> (Recording, [f64; 6]) {
     let rig = SimRig::new(settings);
-    let truth = Arc::new(Mutex::new(rig.truth()));
-    let watched = Box::new(WatchedRig(rig, Arc::clone(&truth)));
+    let (sender, truths) = sync_channel(1);
+    let watched = Box::new(RigWithTruth::new(
+        rig,
+        Box::new(move |rig| {
+            let _ = sender.send(rig.truth());
+        }),
+    ));
     let mut params = RampHold::default();
     if let Some(speed) = speed {
         params.speed = MmPerS(speed);
     }
     let session = record_ramp_hold(watched, calibration.clone(), params);
-    let truth = *truth.lock().expect("the run is over");
+    let truth = truths.recv().expect("the rig is switched off");
     let contact = contact_of(&session);
     let source = source::of_session(session, RecordStretch::RampHold, &[]).expect("a session");
     let body = truth.body;
@@ -257,15 +233,16 @@ pub fn summarise(draws: &[CoverageDraws]) -> [CoverageSummary; 6] {
 }
 
 /// A table in Markdown.
-pub fn print_table(title: &str, draws: &[CoverageDraws]) {
-    println!("{title}, {} seeds\n", draws.len());
-    println!(
-        "| parameter | bias | spread | stated | `ci95` covers | in total | `total95` covers |"
+#[must_use]
+pub fn table(title: &str, draws: &[CoverageDraws]) -> String {
+    let mut text = format!(
+        "{title}, {} seeds\n\n| parameter | bias | spread | stated | `ci95` covers | in total | `total95` covers |\n|---|---|---|---|---|---|---|\n",
+        draws.len()
     );
-    println!("|---|---|---|---|---|---|---|");
     for (name, one) in NAMES.iter().zip(summarise(draws)) {
         let percent = |count: usize| 100.0 * count as f64 / one.count as f64;
-        println!(
+        let _ = writeln!(
+            text,
             "| {name} | {:+.4} | {:.4} | {:.4} | {:.1} % | {:.4} | {:.1} % |",
             one.bias,
             one.spread,
@@ -275,5 +252,5 @@ pub fn print_table(title: &str, draws: &[CoverageDraws]) {
             percent(one.covered_in_total)
         );
     }
-    println!();
+    text
 }

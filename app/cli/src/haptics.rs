@@ -32,7 +32,7 @@ pub enum HapticsCommand {
     /// Push the master's rack with a simulated slider and compare the force commanded with the force measured
     Follow(HapticsFollowArgs),
     /// Lead the slave of a rig with a simulated master, and compare the force at its handle with the force on the slave's load cell
-    Slave(SlaveArgs),
+    Slave(Box<SlaveArgs>),
     /// Time the loop on this computer at several rates, idle and with busy threads
     Bench(HapticsBenchArgs),
 }

@@ -1,7 +1,7 @@
 //! The rig and its pace, shared by all commands that need one.
 
 use super::calibration::source::CalibrationSource;
-use super::truth::RigWithTruth;
+use super::truth::write_at_end;
 use super::{Failure, new_file};
 use clap::{Args, Parser};
 use palpate_drivers::Rig;
@@ -146,7 +146,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         let file = std::fs::File::create_new(to).map_err(|err| {
             Failure::failed(format!("cannot create {} ({err}); check the folder", to.display()))
         })?;
-        rig = Box::new(RigWithTruth::new(SimRig::named(&args.rig, settings), file));
+        rig = Box::new(write_at_end(SimRig::named(&args.rig, settings), file));
     }
     // A plain `sim` lives and dies with its program; a named one is shared like a real rig.
     let locks = match args.rig.split_once(':') {

@@ -17,6 +17,7 @@ mod sensors;
 mod settings;
 mod slider;
 mod tissue;
+mod truth;
 
 pub use amounts::{
     SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
@@ -27,6 +28,7 @@ pub use load_cell::{LoadCell, calibration, counts_from_volts, volts_from_counts}
 pub use random::{Random, RandomStream};
 pub use settings::{SimCell, SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;
+pub use truth::{RigWithTruth, TruthListener};
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};

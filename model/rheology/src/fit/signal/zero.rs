@@ -3,7 +3,7 @@
 //! The zero is straight between nodes; from node to node it takes a random step on top of a steady trend. Rows are
 //! rotated into the triangle of the present two nodes, the trend and the problem's own columns. A node that time
 //! has passed is dropped: its row of the triangle is all that the past knows of it (square-root information
-//! filter: Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977, chapter V). So the cost
+//! filter: Bierman 1977, ISBN 0-12-097350-2, chapter V). So the cost
 //! grows with the number of nodes and not with its cube.
 
 use super::super::triangle::{Factor, Triangle};
@@ -38,7 +38,7 @@ pub(in super::super) struct ZeroSolution {
     nodes: ZeroNodes,
     /// The problem's own columns and right side.
     pub factor: Factor,
-    /// For each node and each of these columns, the zero that explains it best.
+    /// For each of these columns, the zero at each node that explains it best.
     values: Vec<Vec<f64>>,
     /// Sum of the logarithms of the pivots of nodes and trend.
     pub logs: f64,
@@ -103,18 +103,19 @@ impl ZeroFilter {
             known.iter().fold(row[OWN + column], |sum, (k, value)| sum - row[*k] * value)
         };
         let steps = self.passed.len() + 1;
-        let mut values = vec![vec![0.0; columns]; steps + 1];
-        for column in 0..columns {
+        let zero_of = |column: usize| {
             let trend = of(factor.row(2), &[], column) / factor.row(2)[2];
             let last = of(factor.row(1), &[(2, trend)], column) / factor.row(1)[1];
             let before = of(factor.row(0), &[(1, last), (2, trend)], column) / factor.row(0)[0];
-            values[steps][column] = last;
-            values[steps - 1][column] = before;
-            for (node, row) in self.passed.iter().enumerate().rev() {
-                let next = values[node + 1][column];
-                values[node][column] = of(row, &[(1, next), (2, trend)], column) / row[0];
+            let mut values = vec![last, before];
+            for row in self.passed.iter().rev() {
+                let next = values[values.len() - 1];
+                values.push(of(row, &[(1, next), (2, trend)], column) / row[0]);
             }
-        }
+            values.reverse();
+            values
+        };
+        let values = (0..columns).map(zero_of).collect();
         let pivots = self.passed.iter().map(|row| row[0]);
         let pivots = pivots.chain((0..OWN).map(|k| factor.row(k)[k]));
         ZeroSolution {
@@ -131,10 +132,10 @@ impl ZeroSolution {
     /// The part of each column that the zero explains at a time.
     pub fn explained(&self, t: f64, column: usize) -> f64 {
         let place = (t - self.nodes.start) / self.nodes.spacing;
-        let node = (place.max(0.0) as usize).min(self.values.len() - 2);
+        let values = &self.values[column];
+        let node = (place.max(0.0) as usize).min(values.len() - 2);
         let share = place - node as f64;
-        let [before, after] = [node, node + 1].map(|k| self.values[k][column]);
-        before + share * (after - before)
+        values[node] + share * (values[node + 1] - values[node])
     }
 }
 
