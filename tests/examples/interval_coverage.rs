@@ -1,4 +1,5 @@
 //! How often intervals hold the truth, as tables in Markdown: `interval_coverage SEEDS [CASE]...`
+#![expect(clippy::print_stdout, reason = "a program that prints")]
 use palpate_tests::interval_coverage::{CoverageCase, CoverageDraws, draws, table};
 
 fn main() {
