@@ -84,7 +84,7 @@ pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFit
         return Ok(PlanAssumptions {
             body: ModifiedKelvin::THESIS,
             noise: NOISE_ASSUMED,
-            source: "pig stomach of the source thesis, since no fit is remembered".into(),
+            source: "the pig stomach of the source thesis, because no fit is remembered yet".into(),
             is_hardly_known: false,
             notes: Vec::new(),
         });

@@ -51,7 +51,7 @@ pub enum BundleError {
     Read { path: String, source: io::Error },
     #[error("{0}")]
     Session(String),
-    #[error("cannot write the bundle {path} ({source}); choose a folder that may be written")]
+    #[error("cannot write the bundle {path} ({source}); choose a folder that you may write to")]
     Write { path: String, source: io::Error },
 }
 

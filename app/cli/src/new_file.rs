@@ -38,7 +38,7 @@ pub(super) fn write(
 pub(super) fn write_bytes(what: &str, to: &Path, bytes: &[u8]) -> Result<(), Failure> {
     atomic::create(to, bytes).map_err(|err| {
         Failure::failed(format!(
-            "the {what} {} cannot be written ({err}); choose a folder that may be written",
+            "the {what} {} cannot be written ({err}); choose a folder that you may write to",
             to.display()
         ))
     })

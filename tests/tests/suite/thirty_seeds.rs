@@ -1,10 +1,9 @@
-//! What a fit of a simulated run is worth: thirty specimens on each profile, against the truth.
+//! What a fit of forces of a simulated run is worth: thirty specimens on each profile, against the truth.
 //!
 //! On the ideal rig only white noise and the contact position stand between fit and truth. With
 //! contact given, thirty fits must scatter as their standard errors say, and those must be the
 //! ones that follow from the protocol. The lab rig adds a nonlinear cell, a converter and drift;
-//! its bias and spread are printed (`cargo test -p palpate-tests thirty_seeds --
-//! --nocapture`) and stand in `docs/explanation/accuracy.md`.
+//! its bias and spread are printed. What the fit of volts is worth is in `interval_coverage.rs`.
 use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::RampHold;

@@ -106,6 +106,6 @@ pub fn write_document(
 
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {
     palpate_sessions::atomic::create(to, bytes).map_err(|err| {
-        format!("cannot write {} ({err}); choose a folder that may be written", to.display())
+        format!("cannot write {} ({err}); choose a folder that you may write to", to.display())
     })
 }

@@ -82,7 +82,7 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
         palpate_sessions::atomic::replace(file, plan_plot::picture(&report).as_bytes()).map_err(
             |err| {
                 Failure::failed(format!(
-                    "the picture {} cannot be written ({err}); choose a folder that may be written",
+                    "the picture {} cannot be written ({err}); choose a folder that you may write to",
                     file.display()
                 ))
             },

@@ -44,7 +44,7 @@ const NEEDED: [&str; 4] = [
     "palpate-programme = 1 on its first line",
     "name = \"my-day\"",
     "title = \"What is done, in a few words\"",
-    "[[task]] and below it name = \"press\" and protocol = \"ramp-hold\"",
+    "[[task]], then the lines name = \"press\" and protocol = \"ramp-hold\"",
 ];
 
 /// Keys of a task, the required ones first.

@@ -134,7 +134,7 @@ fn bad(reason: impl ToString) -> PolarsError {
 
 fn session_of(frame: &DataFrame) -> PolarsResult<(Manifest, StoredOutline, Option<String>)> {
     if frame.height() != 1 {
-        return Err(bad(format!("it has {} rows, not one", frame.height())));
+        return Err(bad(format!("it has {} rows; exactly one is expected", frame.height())));
     }
     let text = |name: &str| -> PolarsResult<Option<&str>> { Ok(frame.column(name)?.str()?.get(0)) };
     let needed = |name: &str| text(name)?.ok_or_else(|| bad(format!("it has no {name}")));

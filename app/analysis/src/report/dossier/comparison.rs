@@ -40,7 +40,7 @@ pub(super) fn comparison(body: &mut HtmlBody, subjects: &[ReportSubject], align:
             align.word()
         ),
     );
-    let caption = "Force over depth. Every sample is within half a pixel of the line.";
+    let caption = "Force over depth. The line has fewer points than the recording; every sample is within half a pixel of it.";
     body.figure(&depth.svg(), caption);
     parameters(body, subjects);
 }

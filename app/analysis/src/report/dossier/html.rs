@@ -140,7 +140,7 @@ fn measured(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
     );
     body.figure(
         &figures::force_depth(traces).svg(),
-        "Force over depth from contact. Every sample is within half a pixel of the line.",
+        "Force over depth from contact. The line has fewer points than the recording; every sample is within half a pixel of it.",
     );
 }
 
