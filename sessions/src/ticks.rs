@@ -267,7 +267,8 @@ impl<const W: usize, const R: usize> TickRecording<W, R> {
             }
             hash = extend_hash(hash, line.as_bytes());
             rows.push(
-                TickRow::of(content).ok_or_else(|| damaged(number, "this line is not a valid tick"))?,
+                TickRow::of(content)
+                    .ok_or_else(|| damaged(number, "this line is not a valid tick"))?,
             );
         }
         Ok(Self { settings, rows, end: TickEnd::CutOff })

@@ -85,7 +85,9 @@ impl GrblCode {
             (true, Some(1)) => {
                 "a limit switch has closed, so the axis was stopped at once; move the axis off the switch by hand, then open the rig again and home the axis"
             }
-            (true, Some(2)) => "the target was outside the travel that is set in the board; open the rig again",
+            (true, Some(2)) => {
+                "the target was outside the travel that is set in the board; open the rig again"
+            }
             (true, Some(3)) => {
                 "the board was reset in motion, so the position is lost; open the rig again and home the axis"
             }

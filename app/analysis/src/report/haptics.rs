@@ -48,7 +48,10 @@ pub fn tried_text(tried: &SimulatedTrial) -> String {
         _ => "no buzz".to_owned(),
     };
     let returned = match tried.energy_min_mj < 0.0 {
-        true => format!("the rendered force returns {:.3} mJ more than it received", -tried.energy_min_mj),
+        true => format!(
+            "the rendered force returns {:.3} mJ more than it received",
+            -tried.energy_min_mj
+        ),
         false => "the rendered force returns no energy".to_owned(),
     };
     format!(
