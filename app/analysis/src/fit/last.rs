@@ -3,9 +3,10 @@
 //! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
 //! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
+use super::SourceFit;
 use crate::source::{self, RecordStretch, SourceError};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_rheology::fit::{FitError, FitOptions, FitReport, FittedParameter, fit};
+use palpate_rheology::fit::{FitError, FitOptions, FitReport, FittedParameter};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
 use palpate_tables::import::ColumnNames;
@@ -84,15 +85,15 @@ impl KnownFit {
             return Ok((Self::read(path)?, Vec::new()));
         }
         let source = source::read_stretch(path, columns, RecordStretch::RampHold)?;
-        let report = fit(&source.samples, &FitOptions::default());
+        let fitted = SourceFit::of(source, &FitOptions::default());
         let report =
-            report.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
+            fitted.result.map_err(|reason| KnownFitError::Fit { path: path.to_owned(), reason })?;
         let known = Self {
             source: Some(path.display().to_string()),
             rmse_n: report.rmse_n,
             parameters: report.parameters,
         };
-        Ok((known, source.notes))
+        Ok((known, fitted.notes))
     }
 
     /// The modified Kelvin body; an error names a missing parameter.

@@ -150,7 +150,7 @@ pub fn of_session(
         return Ok(FitSource { samples, specimen, notes: session.notes, ..FitSource::default() });
     }
     let (rows, mut samples) = fitted_rows(&session, stretch)?;
-    let signal = signal::of_session(&session, &rows)?;
+    let signal = signal::of_session(&session, &rows, left_out_s)?;
     leave_out(left_out_s, since_first(&session, stretch), &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);

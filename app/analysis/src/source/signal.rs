@@ -18,8 +18,13 @@ const MEAN_SECS: f64 = 0.25;
 const AROUND_SECS: f64 = 120.0;
 const AROUND_LENGTHS: f64 = 2.0;
 
-/// The signal at these rows of a session; `None` where a tare or a contact position is missing before them.
-pub(super) fn of_session(session: &Session, rows: &[usize]) -> Result<Option<Signal>, SourceError> {
+/// The signal at these rows of a session. Neither does it count out of contact in the intervals left out, in s since the
+/// session's first sample. `None` where a tare or a contact position is missing before them.
+pub(super) fn of_session(
+    session: &Session,
+    rows: &[usize],
+    left_out_s: &[[f64; 2]],
+) -> Result<Option<Signal>, SourceError> {
     let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(None) };
     let volts: Option<Vec<f64>> = rows.iter().map(|&row| session.rows[row].volts).collect();
     let decisions = decisions(session)?;
@@ -34,7 +39,12 @@ pub(super) fn of_session(session: &Session, rows: &[usize]) -> Result<Option<Sig
     };
     let length = at(&session.rows[last]);
     let around = AROUND_SECS.max(AROUND_LENGTHS * length);
-    let unloaded = session.rows[span.rows.clone()].iter().filter(|row| span.is_unloaded(row));
+    let is_left_out = |row: &SampleRow| {
+        let since = analysed_session::time_between(session, &session.rows[0], row).0;
+        left_out_s.iter().any(|[from, to]| (*from..=*to).contains(&since))
+    };
+    let unloaded = session.rows[span.rows.clone()].iter();
+    let unloaded = unloaded.filter(|row| span.is_unloaded(row) && !is_left_out(row));
     let unloaded = unloaded.filter_map(|row| Some((at(row), row.volts?)));
     let near = unloaded.filter(|(t, _)| (-around..=length + around).contains(t));
     Ok(Some(Signal {

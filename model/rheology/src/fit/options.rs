@@ -92,6 +92,8 @@ pub struct FitOptions {
     pub(super) layout: Layout,
     pub(super) fixed: Vec<Option<f64>>,
     pub(super) is_at_rest: bool,
+    /// Whether the contact position is where depths count from for want of a better one, rather than by choice.
+    pub(super) is_contact_assumed: bool,
 }
 
 impl Default for FitOptions {
@@ -103,7 +105,8 @@ impl Default for FitOptions {
 impl PartialEq for FitOptions {
     fn eq(&self, other: &Self) -> bool {
         self.family.key() == other.family.key()
-            && (&self.fixed, self.is_at_rest) == (&other.fixed, other.is_at_rest)
+            && (&self.fixed, self.is_at_rest, self.is_contact_assumed)
+                == (&other.fixed, other.is_at_rest, other.is_contact_assumed)
     }
 }
 
@@ -131,7 +134,7 @@ impl FitOptions {
         let known: Vec<KnownParameter> = outer.chain(linear).chain(initial).chain(own).collect();
         let mut fixed = vec![None; known.len()];
         fixed[layout.contact()] = Some(0.0);
-        Self { family, known, layout, fixed, is_at_rest: false }
+        Self { family, known, layout, fixed, is_at_rest: false, is_contact_assumed: true }
     }
 
     /// The family of a key such as `prony-2`.
@@ -170,6 +173,7 @@ impl FitOptions {
             None => {}
         }
         self.fixed[index] = Some(value);
+        self.is_contact_assumed &= index != self.layout.contact();
         Ok(())
     }
 
@@ -177,6 +181,7 @@ impl FitOptions {
     pub fn free(&mut self, name: &str) -> Result<(), FitError> {
         let index = self.index_of(name)?;
         self.fixed[index] = None;
+        self.is_contact_assumed &= index != self.layout.contact();
         Ok(())
     }
 

@@ -243,14 +243,19 @@ impl<'a> System<'a> {
     }
 
     /// The same records with their signals: the measured zero takes the place of an offset, and contact is where its
-    /// touch found it, to within the uncertainty of the touch.
+    /// touch found it, to within the uncertainty of the touch. A contact position that was fixed stays, and with a fixed
+    /// offset the forces are fitted: both are the caller's choice.
     pub fn with_signals(mut self, records: &[SignalRecord<'a>]) -> Self {
         let layout = self.layout();
+        if self.options.fixed[layout.offset()].is_some() {
+            return self;
+        }
         for (record, own) in records.iter().enumerate() {
             let known = self.fixed[record][layout.contact()];
             let Some(term) = SignalTerm::new(*own, known) else { continue };
             self.fixed[record][layout.offset()] = Some(0.0);
-            if let Some((contact, error)) = known.zip(term.contact_error_mm) {
+            let assumed = known.filter(|_| self.options.is_contact_assumed);
+            if let Some((contact, error)) = assumed.zip(term.contact_error_mm) {
                 let reach = CONTACT_REACH * error;
                 self.ranges[record].contact =
                     ((contact - reach) / self.depth_mm, (contact + reach) / self.depth_mm);

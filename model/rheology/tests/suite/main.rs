@@ -18,3 +18,4 @@ mod messages;
 mod random_bodies;
 mod real_recordings;
 mod select_picks;
+mod signal;

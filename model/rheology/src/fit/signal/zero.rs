@@ -3,8 +3,8 @@
 //! The zero is straight between nodes; from node to node it takes a random step on top of a steady trend. Rows are
 //! rotated into the triangle of the present two nodes, the trend and the problem's own columns. A node that time
 //! has passed is dropped: its row of the triangle is all that the past knows of it (square-root information
-//! filter: Bierman 1977, ISBN 0-12-097350-2, chapter V). So the cost
-//! grows with the number of nodes and not with its cube.
+//! filter: Bierman 1977, ISBN 0-12-097350-2, chapter V). So the cost grows with the number of nodes and not with
+//! its cube.
 
 use super::super::triangle::{Factor, Triangle};
 

@@ -1,0 +1,86 @@
+//! Fits of what the load cell reported: a zero that wanders is measured, and what the caller fixed stays fixed.
+use palpate_model::calibration::Calibration;
+use palpate_model::units::{Newtons, Seconds, Volts};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::fit::{
+    FitOptions, FitReport, FitSample, FitSolution, Signal, SignalRecord, UnloadedMean, fit,
+};
+use palpate_test_support::record::{Noise, ramp_hold, respond};
+
+const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
+/// White noise of one sample in V.
+const NOISE_V: f64 = 1e-3;
+/// Drift in V/s, three times the lab rig's largest.
+const DRIFT: f64 = 1e-5;
+
+/// A ramp and hold on a straight cell of 0.15 V/N whose zero drifts, with half a minute out of contact before and after.
+fn record(seed: u64) -> (Vec<FitSample>, Signal) {
+    let mut random = Noise::seeded(seed);
+    let calibration = Calibration::linear("straight", Volts(1.28), 0.15, Newtons(10.0));
+    let curve = calibration.curve().unwrap();
+    let zero = |t: f64| DRIFT * (t + 30.0);
+    let mut samples = respond(&THESIS, &ramp_hold(0.75, 20.0, 0.01));
+    let volts: Vec<f64> = samples
+        .iter()
+        .map(|one| {
+            curve.volts_from_newtons(one.force).0 + zero(one.t.0) + NOISE_V * random.normal()
+        })
+        .collect();
+    for (sample, volts) in samples.iter_mut().zip(&volts) {
+        sample.force = curve.newtons_from_volts(Volts(*volts));
+        sample.sigma = Newtons(NOISE_V / 0.15);
+    }
+    let end = samples[samples.len() - 1].t.0;
+    let times = (0..120).map(|k| 0.25 * f64::from(k));
+    let times = times.clone().map(|t| t - 30.0).chain(times.map(|t| end + 1.0 + t));
+    let unloaded = times
+        .map(|t| UnloadedMean {
+            t: Seconds(t),
+            volts: Volts(1.28 + zero(t) + NOISE_V / 5.0 * random.normal()),
+            count: 25,
+        })
+        .collect();
+    (samples, Signal { volts, unloaded, curve, contact_error_mm: 1e-3, search_secs: 20.0 })
+}
+
+fn fitted(samples: &[FitSample], signal: &Signal, options: &FitOptions) -> FitReport {
+    let record = SignalRecord { name: "one", samples, signal: Some(signal) };
+    FitSolution::fit_signals(&[record], options, &[]).unwrap().report()
+}
+
+#[test]
+fn steady_drift_bends_the_fit_of_forces_and_not_that_of_volts() {
+    let (mut by_volts, mut by_forces) = (0.0, 0.0);
+    for seed in 0..8 {
+        let (samples, signal) = record(seed);
+        let options = FitOptions::default();
+        let error = |report: &FitReport| report.value("tau_eps").unwrap() / THESIS.tau_eps - 1.0;
+        let report = fitted(&samples, &signal, &options);
+        by_volts += error(&report).powi(2);
+        by_forces += error(&fit(&samples, &options).unwrap()).powi(2);
+        let z = (report.value("tau_eps").unwrap() - THESIS.tau_eps)
+            / report.parameter("tau_eps").unwrap().std_error.unwrap();
+        // Once in 30 000 by chance.
+        assert!(z.abs() < 4.2, "seed {seed}: {z}");
+    }
+    assert!(by_volts < 0.5 * by_forces, "{by_volts} {by_forces}");
+}
+
+#[test]
+fn fixed_contact_position_stays_and_fixed_offset_fits_forces() {
+    let (samples, signal) = record(3);
+    let found = fitted(&samples, &signal, &FitOptions::default());
+    let contact = found.parameter("x_contact").unwrap();
+    assert!(!contact.is_fixed && contact.std_error.is_some_and(|error| error > 0.0));
+
+    let mut fixed = FitOptions::default();
+    fixed.fix("x_contact", 0.02).unwrap();
+    let contact = fitted(&samples, &signal, &fixed).parameter("x_contact").unwrap().clone();
+    assert!(contact.is_fixed, "{contact:?}");
+    assert_eq!(contact.value, 0.02);
+
+    let mut offset = FitOptions::default();
+    offset.fix("f_offset", 0.003).unwrap();
+    let of_forces = fit(&samples, &offset).unwrap();
+    assert_eq!(fitted(&samples, &signal, &offset), of_forces);
+}
