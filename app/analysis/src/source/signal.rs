@@ -9,8 +9,8 @@ use palpate_protocols::engine::Record;
 use palpate_rheology::fit::{Signal, UnloadedMean};
 use palpate_sessions::{SampleRow, Session};
 
-/// So far before the contact position the probe touches nothing, in mm: tissue that sticks to a probe follows it by
-/// less.
+/// So far before the contact position the probe is taken to touch nothing, in mm: fifty times what a contact position is
+/// uncertain by. Tissue that follows a probe further than this would pass for drift.
 const CLEARANCE_MM: f64 = 1.0;
 /// The zero is averaged over so long, in s: many samples, and a small part of the time in which it drifts.
 const MEAN_SECS: f64 = 0.25;
