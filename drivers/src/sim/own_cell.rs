@@ -3,14 +3,17 @@
 use super::random::{Random, RandomStream};
 use super::settings::{SimCell, SimSettings};
 use palpate_model::Newtons;
-use palpate_model::calibration::{Calibration, CalibrationCurve, WeightStep};
+use palpate_model::calibration::{Calibration, CalibrationCurve, HysteresisLoop, WeightStep};
 use palpate_model::rig::HandAction;
 
 /// Standard deviation of the cell's sensitivity from its document's: what a cell changes by in a year or two.
 const SENSITIVITY_SPREAD: f64 = 0.005;
-/// Standard deviation of its non-linearity, of a half and of a whole wave over the range, as a share of the range.
+/// Standard deviation of its non-linearity as a share of the range: of a half wave over the range, and of each shorter
+/// wave in proportion to its length. The shortest are no longer than the distance of two weights.
 const BEND_SPREAD: f64 = 0.001;
-/// Standard deviation of half the distance between loading and unloading in N: 0.02 % of the range.
+const WAVES: u32 = 9;
+/// Standard deviation of half the distance between loading and unloading in N, in the middle of the range: 0.02 % of the
+/// range. Both ways meet at its ends.
 const HYSTERESIS_SPREAD: f64 = 0.002;
 /// Force over which the cell goes from one side of its loop to the other, in N.
 const TURN: f64 = 0.2;
@@ -21,19 +24,14 @@ const PLATFORM_G: f64 = 140.0;
 const PIECE_G: f64 = 100.0;
 const PIECES: usize = 20;
 /// Points of the drawn curve: far closer together than weights, so that no curve through weights is this one.
-const POINTS: u32 = 60;
+const POINTS: u32 = 120;
 
 /// What differs from the documents.
 #[derive(Clone, Debug)]
 pub(super) struct OwnCell {
     pub curve: CalibrationCurve,
-    hysteresis: Hysteresis,
-}
-
-/// Side of the loop, -1 in unloading to 1 in loading.
-#[derive(Clone, Debug)]
-struct Hysteresis {
-    half: f64,
+    hysteresis: HysteresisLoop,
+    /// Side of the loop, -1 in unloading to 1 in loading.
     side: f64,
     force: f64,
 }
@@ -45,17 +43,20 @@ impl OwnCell {
             return None;
         }
         let mut random = Random::new(settings.seed, RandomStream::Cell);
-        let [sensitivity, half_wave, whole_wave] =
-            [SENSITIVITY_SPREAD, BEND_SPREAD, BEND_SPREAD].map(|spread| spread * random.normal());
-        let half = (HYSTERESIS_SPREAD * random.normal()).abs();
+        let sensitivity = SENSITIVITY_SPREAD * random.normal();
+        let waves: Vec<(f64, f64)> = (1..=WAVES)
+            .map(f64::from)
+            .map(|half_waves| (half_waves, BEND_SPREAD / half_waves * random.normal()))
+            .collect();
+        let half = Newtons((HYSTERESIS_SPREAD * random.normal()).abs());
         let (from, to) = document.force_range();
         let span = to.0 - from.0;
         let [low, high] = [from, to].map(|force| document.volts_from_newtons(force).0);
         let steps = (0..=POINTS).map(|k| {
             let share = f64::from(k) / f64::from(POINTS);
-            let wave = std::f64::consts::PI * share;
-            let error =
-                sensitivity * share + half_wave * wave.sin() + whole_wave * (2.0 * wave).sin();
+            let angle = std::f64::consts::PI * share;
+            let wave = |(half_waves, size): &(f64, f64)| size * (half_waves * angle).sin();
+            let error = sensitivity * share + waves.iter().map(wave).sum::<f64>();
             let force = Newtons(from.0 + share * span);
             let volts = document.volts_from_newtons(force).0 + error * (high - low);
             let mass_g = force.0 / HandAction::weight(1.0).0;
@@ -64,15 +65,16 @@ impl OwnCell {
         let drawn =
             Calibration { name: "drawn".into(), steps: steps.collect(), ..Calibration::default() };
         let curve = drawn.curve().expect("errors of a percent leave a curve that rises");
-        Some(Self { curve, hysteresis: Hysteresis { half, side: 0.0, force: 0.0 } })
+        let hysteresis = HysteresisLoop { half, std_error: Newtons(0.0), range: (from.0, to.0) };
+        Some(Self { curve, hysteresis, side: 0.0, force: 0.0 })
     }
 
     /// The force that the cell's signal stands for under a force: it lags behind.
     pub fn lagged(&mut self, force: Newtons) -> Newtons {
-        let loop_ = &mut self.hysteresis;
-        loop_.side = (loop_.side + 2.0 * (force.0 - loop_.force) / TURN).clamp(-1.0, 1.0);
-        loop_.force = force.0;
-        Newtons(force.0 - loop_.half * loop_.side)
+        self.side = (self.side + 2.0 * (force.0 - self.force) / TURN).clamp(-1.0, 1.0);
+        self.force = force.0;
+        let half = self.hysteresis.half.0 * self.hysteresis.share_at(force.0);
+        Newtons(force.0 - half * self.side)
     }
 }
 
@@ -132,8 +134,9 @@ mod tests {
         let up = own.lagged(Newtons(5.0)).0;
         own.lagged(Newtons(8.0));
         let down = own.lagged(Newtons(5.0)).0;
-        let half = own.hysteresis.half;
+        let half = own.hysteresis.half.0 * own.hysteresis.share_at(5.0);
         assert!((down - up - 2.0 * half).abs() < 1e-12 && half > 0.0, "{up} {down}");
+        assert_eq!(own.lagged(Newtons(0.0)).0, 0.0);
     }
 
     #[test]

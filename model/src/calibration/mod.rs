@@ -6,6 +6,7 @@ mod choice;
 mod curve;
 mod document;
 mod error;
+mod hysteresis;
 mod kind;
 mod quality;
 mod settle;
@@ -24,6 +25,7 @@ pub use document::{
     Direction, NamedWeight, SeriesStep, VALID_DAYS,
 };
 pub use error::CalibrationError;
+pub use hysteresis::HysteresisLoop;
 pub use kind::CurveKind;
 pub use quality::{CalibrationQuality, FlatStretch, Hysteresis, PointQuality};
 pub use settle::{SettleDetector, SettleProgress, SettleRule, SettleState, SteadySignal};
