@@ -17,7 +17,6 @@ use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
     self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample, FitSolution,
     ProfileInterval, Signal, SignalRecord, SystematicUncertainty, TracedRecord,
-    estimate_systematic,
 };
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
@@ -64,8 +63,7 @@ impl FitRecipe {
 
     pub fn fit_read(&self, mut source: FitSource) -> Result<SourceFit, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
-        let fitted = SourceFit { compliance, ..SourceFit::of(source, &self.options) };
-        Ok(if self.is_systematic { fitted.with_systematic(&self.options) } else { fitted })
+        Ok(SourceFit::found(source, compliance, &self.options, self.is_systematic))
     }
 }
 
@@ -121,59 +119,53 @@ pub struct SourceFit {
 }
 
 impl SourceFit {
+    /// Without what calibration and compliance add to the uncertainty.
     #[must_use]
     pub fn of(source: FitSource, options: &FitOptions) -> Self {
-        let watch = Stopwatch::start();
-        let record = SignalRecord {
-            name: "the record",
-            samples: &source.samples,
-            signal: source.signal.as_ref(),
-        };
-        let result = FitSolution::fit_signals(&[record], options, &[]).map(|one| one.report());
-        Self {
-            seconds: watch.seconds(),
-            samples: source.samples,
-            start: source.start,
-            notes: source.notes,
-            calibration: source.calibration,
-            signal: source.signal,
-            systematic: None,
-            compliance: None,
-            result,
-        }
+        Self::found(source, None, options, false)
     }
 
-    /// Adds what the errors of calibration and compliance do to the parameters; a table has none, and a refusal is
-    /// a note. `options` are those of the fit.
+    /// With what the errors of calibration and compliance do to the parameters; a table has none, and a refusal is a note.
     #[must_use]
-    pub fn with_systematic(mut self, options: &FitOptions) -> Self {
-        let Ok(report) = &self.result else { return self };
-        let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
-        let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
-            let traced = origin.traced("", &self.samples);
-            let found = origin.is_known().then(|| self.systematic(traced, options));
-            found.transpose().map_err(|err| err.to_string())
-        });
-        match found {
-            Ok(Some(found)) => {
-                self.result = Ok(report.clone().with_systematic(&found));
-                self.systematic = Some(found);
-            }
-            Ok(None) => {}
-            Err(reason) => self.notes.push(no_systematic(&reason)),
-        }
-        self
+    pub fn with_systematic(
+        source: FitSource,
+        compliance: Option<ComplianceCorrection>,
+        options: &FitOptions,
+    ) -> Self {
+        Self::found(source, compliance, options, true)
     }
 
-    fn systematic(
-        &self,
-        traced: TracedRecord<'_>,
+    fn found(
+        source: FitSource,
+        compliance: Option<ComplianceCorrection>,
         options: &FitOptions,
-    ) -> Result<SystematicUncertainty, FitError> {
-        let Some(signal) = &self.signal else { return estimate_systematic(traced, options) };
-        let record = SignalRecord { name: "", samples: &self.samples, signal: Some(signal) };
-        let fitted = FitSolution::fit_signals(&[record], options, &[])?;
-        Ok(fitted.systematic(&[traced])?.pop().unwrap_or_default())
+        is_systematic: bool,
+    ) -> Self {
+        let FitSource { samples, signal, calibration, start, mut notes, .. } = source;
+        let watch = Stopwatch::start();
+        let record =
+            SignalRecord { name: "the record", samples: &samples, signal: signal.as_ref() };
+        let solution = FitSolution::fit_signals(&[record], options, &[]);
+        let mut result = solution.as_ref().map(FitSolution::report).map_err(Clone::clone);
+        let seconds = watch.seconds();
+        let mut systematic = None;
+        if let (Ok(solution), Ok(report), true) = (&solution, &mut result, is_systematic) {
+            let origin = Origin::of(calibration.as_ref(), compliance.as_ref());
+            let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
+                let traced = origin.traced("", &samples);
+                let found = origin.is_known().then(|| solution.systematic(&[traced]));
+                found.transpose().map_err(|err| err.to_string())
+            });
+            match found {
+                Ok(found) => systematic = found.and_then(|mut found| found.pop()),
+                Err(reason) => notes.push(no_systematic(&reason)),
+            }
+            if let Some(found) = &systematic {
+                *report = std::mem::take(report).with_systematic(found);
+            }
+        }
+        drop(solution);
+        Self { samples, start, notes, result, seconds, calibration, signal, systematic, compliance }
     }
 
     #[must_use]

@@ -123,9 +123,7 @@ impl SessionFitRequest {
         options: &FitOptions,
         progress: &dyn Progress,
     ) -> Result<Value, String> {
-        let fitted = SourceFit::of(source, options);
-        step(progress, 2, 4, "estimating the systematic uncertainty")?;
-        let fitted = fitted.with_systematic(options);
+        let fitted = SourceFit::with_systematic(source, None, options);
         let report = fitted.result.as_ref().map_err(ToString::to_string)?;
         if self.with_profile {
             step(progress, 3, 4, "profile likelihood")?;

@@ -2,7 +2,8 @@
 
 use crate::analysed_session;
 
-use super::{SourceError, curve_of, decisions, records};
+use super::{SourceError, calibration_of, curve_of, decisions, records};
+use palpate_model::calibration::HysteresisLoop;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Seconds, Volts};
 use palpate_protocols::engine::Record;
@@ -51,6 +52,7 @@ pub(super) fn of_session(
         volts,
         unloaded: means(near),
         curve: curve_of(session)?,
+        hysteresis: HysteresisLoop::of(&calibration_of(session)?),
         contact_error_mm: span.contact_error_mm,
         search_secs: span.search_secs(session),
     }))

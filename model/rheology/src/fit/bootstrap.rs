@@ -50,7 +50,7 @@ impl FitSolution<'_> {
         if record >= self.system.records.len() {
             return Ok(Vec::new());
         }
-        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        let uncertainty = self.uncertainty();
         let sources: Vec<ResidualSource> = (0..self.system.records.len())
             .map(|record| self.residual_source(&uncertainty, record))
             .collect();

@@ -17,11 +17,26 @@ pub(super) struct RecordFactor {
     pub blocks: Vec<NoiseBlock>,
 }
 
+impl RecordFactor {
+    /// Subtracts what these errors, whose columns stand before the residual, explain of it.
+    fn subtract_errors(&mut self, errors: &[f64]) {
+        let subtract = |row: &mut [f64]| {
+            let Some((residual, columns)) = row.split_last_mut() else { return };
+            let from = columns.len() - errors.len();
+            *residual -= product(errors, &columns[from..]);
+        };
+        self.factor.rows_mut().for_each(subtract);
+        self.blocks.iter_mut().for_each(|block| subtract(&mut block.sums));
+    }
+}
+
 /// All records, triangularised at a point and stacked.
 #[derive(Clone, Debug)]
 pub(super) struct Pass {
     pub joint: Factor,
     pub records: Vec<RecordFactor>,
+    /// The joint triangle with the errors of the calibration in front, where these are found too.
+    pub with_errors: Option<Factor>,
 }
 
 /// Content of the last column of a record's triangle.
@@ -75,11 +90,25 @@ impl System<'_> {
         let records: Option<Vec<RecordFactor>> = each
             .map(|(record, point)| self.record_factor(record, point, rows, Column::Residual))
             .collect();
-        let records = records?;
+        let mut records = records?;
         let factors = records.iter().map(|record| &record.factor);
         let mut joint = self.stack(factors, Column::Residual);
-        self.push_contacts(points, 0, &mut joint);
-        Some(Pass { joint: joint.finish(), records })
+        self.push_contacts(points, &mut joint);
+        let errors = self.errors.count;
+        if errors == 0 {
+            return Some(Pass { joint: joint.finish(), records, with_errors: None });
+        }
+        let mut row = vec![0.0; errors + self.unknowns.len() + 1];
+        for k in 0..errors {
+            row.fill(0.0);
+            row[k] = 1.0;
+            row[errors + self.unknowns.len()] = -self.errors.found[k];
+            joint.push(&row, self.sigma_scale);
+        }
+        let whole = joint.finish();
+        let found = whole.solve(errors + self.unknowns.len());
+        records.iter_mut().for_each(|record| record.subtract_errors(&found[..errors]));
+        Some(Pass { joint: whole.without_first(errors), records, with_errors: Some(whole) })
     }
 
     /// All records triangularised at given outer parameters, without derivatives.
@@ -141,8 +170,12 @@ impl System<'_> {
             Column::Residual => self.unknowns.len(),
             Column::Force => self.linear,
         };
-        let mut joint = Triangle::new(unknowns + 1);
-        let mut mapped = vec![0.0; unknowns + 1];
+        let errors = match last_is {
+            Column::Residual => self.errors.count,
+            Column::Force => 0,
+        };
+        let mut joint = Triangle::new(errors + unknowns + 1);
+        let mut mapped = vec![0.0; errors + unknowns + 1];
         for (record, factor) in factors.enumerate() {
             let columns = self.map(record, unknowns);
             let fixed = match last_is {
@@ -152,10 +185,11 @@ impl System<'_> {
             let last = factor.width() - 1;
             for i in 0..factor.width() {
                 let row = factor.row(i);
-                for (slot, column) in mapped.iter_mut().zip(&columns) {
+                mapped[..errors].copy_from_slice(&row[last - errors..last]);
+                for (slot, column) in mapped[errors..].iter_mut().zip(&columns) {
                     *slot = column.of(row);
                 }
-                mapped[unknowns] = row[last] - product(&fixed, row);
+                mapped[errors + unknowns] = row[last] - product(&fixed, row);
                 joint.push(&mapped, 1.0);
             }
         }

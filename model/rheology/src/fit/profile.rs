@@ -16,7 +16,7 @@ use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::FitSolution;
 use super::system::Rows;
-use super::uncertainty::{Uncertainty, UncertaintyEstimate};
+use super::uncertainty::UncertaintyEstimate;
 use crate::families::OuterRange;
 use serde::{Deserialize, Serialize};
 
@@ -68,8 +68,8 @@ impl FitSolution<'_> {
             return Ok(Vec::new());
         }
         let system = &self.system;
-        let uncertainty = Uncertainty::of(system, &self.refined);
-        let errors = self.errors(&uncertainty, record);
+        let uncertainty = self.uncertainty();
+        let errors = self.estimates(record);
         let parameters: Vec<usize> =
             (0..system.layout().count()).filter(|&k| system.fixed(record, k).is_none()).collect();
         let scatter = uncertainty.scatter.unwrap_or(0.0);

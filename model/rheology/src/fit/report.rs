@@ -7,7 +7,7 @@ use super::options::Layout;
 use super::sample::FitSample;
 use super::sentences;
 use super::solve::FitSolution;
-use super::uncertainty::{Uncertainty, UncertaintyEstimate};
+use super::uncertainty::UncertaintyEstimate;
 use crate::distinct;
 use crate::families::{Model, ModelParameter, OuterRange, find_family};
 use palpate_model::units::Newtons;
@@ -159,18 +159,18 @@ impl FitReport {
 impl FitSolution<'_> {
     /// The report of a fit of one record; of several, that of the first.
     pub fn report(&self) -> FitReport {
-        self.record_report(&Uncertainty::of(&self.system, &self.refined), 0)
+        self.record_report(0)
     }
 
     /// The reports of all records.
     pub fn joint_report(&self) -> JointReport {
-        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        let uncertainty = self.uncertainty();
         let system = &self.system;
         let known = system.known().iter().enumerate();
         let shared = known.filter(|(k, _)| system.shared[*k]);
         let records = (0..system.records.len()).map(|record| NamedReport {
             record: system.records[record].name.to_owned(),
-            report: self.record_report(&uncertainty, record),
+            report: self.record_report(record),
         });
         let records: Vec<NamedReport> = records.collect();
         let squares = records.iter().map(|one| &one.report);
@@ -214,12 +214,12 @@ impl FitSolution<'_> {
         family.derived(outer, &linear[..layout.coefficients])
     }
 
-    fn record_report(&self, uncertainty: &Uncertainty, record: usize) -> FitReport {
-        let system = &self.system;
+    fn record_report(&self, record: usize) -> FitReport {
+        let (system, uncertainty) = (&self.system, self.uncertainty());
         let samples = system.records[record].samples;
         let measured = system.records[record].measured;
         let (r2, rmse_n) = self.residuals(record);
-        let parameters = self.parameters(uncertainty, record);
+        let parameters = self.parameters(record);
         let noise = uncertainty.memory(record).map(|memory| {
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
             let interval = length / (samples.len() - 1) as f64;
@@ -276,7 +276,7 @@ impl FitSolution<'_> {
     }
 
     /// Values with their errors and intervals.
-    fn parameters(&self, uncertainty: &Uncertainty, record: usize) -> Vec<FittedParameter> {
+    fn parameters(&self, record: usize) -> Vec<FittedParameter> {
         let system = &self.system;
         let values = system.physical_values(record, &self.refined.points[record]);
         let derived = self.derived(&values);
@@ -286,7 +286,7 @@ impl FitSolution<'_> {
             (one.name.clone(), one.unit.to_owned(), *value, one.range, is_fixed)
         });
         let derived = derived.into_iter().map(|one| (one.name, one.unit, one.value, None, false));
-        let errors = self.errors(uncertainty, record);
+        let errors = self.estimates(record);
         let all = own.chain(derived).zip(errors);
         all.map(|((name, unit, value, range, is_fixed), error)| FittedParameter {
             name,

@@ -10,8 +10,9 @@ use super::sample::{FitError, FitSample, NamedSamples};
 use super::search::best_outers;
 use super::signal::SignalRecord;
 use super::system::{Rows, System};
+use super::uncertainty::Uncertainty;
 use crate::families::{Family, Model, ModelError};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Identifies a force model from depth and force alone, by weighted least squares on the exact response. The default of
 /// `options` is the modified Kelvin body
@@ -157,6 +158,7 @@ pub struct FitSolution<'a> {
     pub(super) refined: RefinedFit,
     /// Parameters that the redrawn path hardly separates, although the measured depths hide it.
     pub(super) inseparable: Vec<String>,
+    pub(super) uncertainty: OnceLock<Uncertainty>,
 }
 
 impl<'a> FitSolution<'a> {
@@ -220,7 +222,7 @@ impl<'a> FitSolution<'a> {
         FitSolution::refined(system, &self.refined.points)
     }
 
-    fn refined(system: System<'a>, start: &[ParameterPoint]) -> Result<Self, FitError> {
+    pub(super) fn refined(system: System<'a>, start: &[ParameterPoint]) -> Result<Self, FitError> {
         let refined = refine(&system, start, Rows::All, StopRule::Noise);
         let is_number = |point: &ParameterPoint| {
             let mut values = point.outer.values.iter().chain(&point.at);
@@ -241,7 +243,7 @@ impl<'a> FitSolution<'a> {
                 }
             };
         system.model(&refined.points)?;
-        Ok(Self { system, refined, inseparable })
+        Ok(Self { system, refined, inseparable, uncertainty: OnceLock::new() })
     }
 }
 

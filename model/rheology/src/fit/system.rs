@@ -11,7 +11,7 @@ use super::options::{FitOptions, KnownParameter, Layout};
 use super::parameters::union;
 use super::record::{Record, check};
 use super::sample::{FitError, FitSample, NamedSamples};
-use super::signal::{SignalRecord, SignalTerm};
+use super::signal::{ErrorColumns, SignalRecord, SignalTerm};
 use crate::families::Family;
 use std::sync::Arc;
 
@@ -64,6 +64,7 @@ pub(super) struct System<'a> {
     pub ranges: Vec<Ranges>,
     /// The signal of each record that has one, once the search is over.
     pub signals: Vec<Option<SignalTerm<'a>>>,
+    pub errors: ErrorColumns,
 }
 
 impl<'a> System<'a> {
@@ -107,6 +108,7 @@ impl<'a> System<'a> {
             linear: 0,
             ranges: Vec::new(),
             signals: vec![None; records.len()],
+            errors: ErrorColumns::default(),
         };
         system.ranges = (0..records.len()).map(|k| system.range(k)).collect();
         for k in (0..layout.outers).filter(|&k| several && system.shared[k]) {
@@ -162,6 +164,7 @@ impl<'a> System<'a> {
             fixed: vec![self.fixed[record].clone()],
             ranges: vec![self.range(record)],
             signals: vec![None],
+            errors: ErrorColumns::default(),
             ..self.clone()
         }
         .list_unknowns()
@@ -205,6 +208,7 @@ impl<'a> System<'a> {
             options: options.clone(),
             shared: (0..layout.count()).map(is_body).collect(),
             signals: vec![None; self.records.len()],
+            errors: ErrorColumns::default(),
             ..self.clone()
         }
         .list_unknowns()
@@ -238,6 +242,7 @@ impl<'a> System<'a> {
         System {
             records: pairs.map(|(record, samples)| Record { samples, ..record.clone() }).collect(),
             signals: vec![None; self.records.len()],
+            errors: ErrorColumns::default(),
             ..self.clone()
         }
     }
@@ -274,6 +279,7 @@ impl<'a> System<'a> {
         let mut system = self.clone();
         system.fixed = vec![self.options.fixed.clone(); self.records.len()];
         system.signals = vec![None; self.records.len()];
+        system.errors = ErrorColumns::default();
         for record in 0..self.records.len() {
             system.ranges[record].contact = self.range(record).contact;
         }

@@ -19,6 +19,7 @@ const ROUNDING: f64 = 1e-24;
 const DIFFERENCE: f64 = 1e-6;
 
 /// Scatter and autocorrelation of the residuals of all records.
+#[derive(Clone, Debug)]
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
@@ -39,7 +40,7 @@ fn more_drift(system: &System<'_>, refined: &RefinedFit) -> Option<(Factor, f64)
     let mut known = 0.0f64;
     for term in other.signals.iter_mut().flatten() {
         term.drift.walk *= DRIFT_STEP.sqrt();
-        known = known.max(term.drift.log_variance);
+        known = known.max(term.drift.spread);
     }
     Some((other.pass(&refined.points, Rows::All)?.joint, known))
 }
@@ -217,6 +218,11 @@ pub(super) enum RangeEnd {
 }
 
 impl FitSolution<'_> {
+    /// Scatter and autocorrelation, found once.
+    pub(super) fn uncertainty(&self) -> &Uncertainty {
+        self.uncertainty.get_or_init(|| Uncertainty::of(&self.system, &self.refined))
+    }
+
     /// Which end of its searched range an outer parameter of a record lies at.
     pub(super) fn range_end(&self, record: usize, outer: usize) -> Option<RangeEnd> {
         let (low, high) = self.system.ranges[record].outers[outer];
@@ -239,11 +245,8 @@ impl FitSolution<'_> {
 
     /// The uncertainty of every parameter of a record, `None` where fixed or not determined; then that of what is
     /// derived from them, to first order.
-    pub(super) fn errors(
-        &self,
-        uncertainty: &Uncertainty,
-        record: usize,
-    ) -> Vec<Option<UncertaintyEstimate>> {
+    pub(super) fn estimates(&self, record: usize) -> Vec<Option<UncertaintyEstimate>> {
+        let uncertainty = self.uncertainty();
         let spare = (self.system.measured() - self.system.unknowns.len()) as f64;
         let combinations = self.combinations(record).into_iter();
         combinations.map(|one| uncertainty.error(&self.refined, &one?, spare)).collect()

@@ -40,7 +40,17 @@ fn record(seed: u64) -> (Vec<FitSample>, Signal) {
             count: 25,
         })
         .collect();
-    (samples, Signal { volts, unloaded, curve, contact_error_mm: 1e-3, search_secs: 20.0 })
+    (
+        samples,
+        Signal {
+            volts,
+            unloaded,
+            curve,
+            hysteresis: None,
+            contact_error_mm: 1e-3,
+            search_secs: 20.0,
+        },
+    )
 }
 
 fn fitted(samples: &[FitSample], signal: &Signal, options: &FitOptions) -> FitReport {

@@ -138,7 +138,7 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
     // The page has the notes of the reader beside the session.
     source.notes.clear();
     let options = FitOptions::default();
-    let fitted = SourceFit::of(source, &options).with_systematic(&options);
+    let fitted = SourceFit::with_systematic(source, None, &options);
     let report = fitted.result.map_err(|err| err.to_string())?;
     let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of).and_then(Result::ok);
     Ok(FitPart {

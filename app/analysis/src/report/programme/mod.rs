@@ -262,7 +262,7 @@ impl TaskPart {
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
-            let fitted = SourceFit::of(source, &options).with_systematic(&options);
+            let fitted = SourceFit::with_systematic(source, None, &options);
             match &fitted.result {
                 Ok(report) => self.fit(task, name, (&fitted, report), bodies),
                 Err(err) => {

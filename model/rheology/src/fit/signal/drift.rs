@@ -30,8 +30,8 @@ pub(in super::super) struct Drift {
     /// Time of the first node and time between nodes in s.
     pub start: f64,
     pub spacing: f64,
-    /// Variance of the logarithm of the walk's variance.
-    pub log_variance: f64,
+    /// Variance of the walk's variance, as a share of its square.
+    pub spread: f64,
 }
 
 impl Drift {
@@ -126,19 +126,18 @@ impl DriftSizes {
     pub fn mean(&self) -> Option<Drift> {
         let best = self.best();
         let (mut sum, mut noise, mut walk) = (0.0, 0.0, 0.0);
-        let (mut logs, mut log_squares) = (0.0, 0.0);
+        let mut walk_square = 0.0;
         for one in &self.sizes {
             let weight = (-0.5 * (one.deviance - best)).exp();
             sum += weight;
             noise += weight * one.variance;
-            walk += weight * one.variance * one.ratio.powi(2);
-            let log = 2.0 * one.ratio.ln();
-            logs += weight * log;
-            log_squares += weight * log * log;
+            let square = one.variance * one.ratio.powi(2);
+            walk += weight * square;
+            walk_square += weight * square * square;
         }
+        let spread = (walk_square * sum / (walk * walk) - 1.0).max(0.0);
         let [noise, walk] = [noise, walk].map(|square| (square / sum).sqrt());
-        let log_variance = (log_squares / sum - (logs / sum).powi(2)).max(0.0);
-        let found = Drift { noise, walk, start: self.start, spacing: self.spacing, log_variance };
+        let found = Drift { noise, walk, start: self.start, spacing: self.spacing, spread };
         (noise > 0.0 && walk > 0.0 && walk.is_finite()).then_some(found)
     }
 }

@@ -8,14 +8,17 @@
 //! record, and search, steps, sharing and profiles are the same.
 
 mod drift;
+mod lag;
 mod pass;
 mod zero;
 
 pub(super) use drift::{Drift, DriftSizes};
-use palpate_model::calibration::CalibrationCurve;
+use palpate_model::calibration::{CalibrationCurve, HysteresisLoop};
 use palpate_model::units::{Newtons, Seconds, Volts};
 
 use super::sample::FitSample;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// About the force at which a search for contact ends: enough to be felt, too little to deform.
 const TOUCH_FORCE: Newtons = Newtons(0.15);
@@ -38,6 +41,8 @@ pub struct Signal {
     /// The signal out of contact, in the order of time.
     pub unloaded: Vec<UnloadedMean>,
     pub curve: CalibrationCurve,
+    /// How far the load cell lags behind its force; `None` where its calibration does not tell.
+    pub hysteresis: Option<HysteresisLoop>,
     /// Standard uncertainty in mm of the contact position, from which depths count, if the zero did nothing but
     /// drift steadily while it was searched.
     pub contact_error_mm: f64,
@@ -64,6 +69,28 @@ pub(super) struct SignalTerm<'a> {
     pub contact_mm: f64,
     /// Its standard uncertainty in mm, the wandering of the zero included; `None` where nothing was known of it.
     pub contact_error_mm: Option<f64>,
+}
+
+/// Where an error of the calibration acts.
+#[derive(Clone, Debug)]
+pub(super) struct ErrorPlace {
+    pub record: usize,
+    /// Samples of the record.
+    pub samples: Range<usize>,
+    /// Modelled force in N.
+    pub force: f64,
+    /// What the load cell lags behind it, as a share of half the width of its loop.
+    pub lag: f64,
+}
+
+/// Errors of calibrations and compliances that are found with the parameters, none where these are taken as exact.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ErrorColumns {
+    pub count: usize,
+    /// Changes of the force in N, by record and mean.
+    pub columns: Arc<Vec<Vec<Vec<f64>>>>,
+    /// Each error as found so far: the curve is straight around it.
+    pub found: Vec<f64>,
 }
 
 impl<'a> SignalTerm<'a> {

@@ -4,16 +4,19 @@ use super::super::block_sums::NoiseBlock;
 use super::super::columns::{ParameterPoint, Slope};
 use super::super::design::LANES;
 use super::super::passes::{RecordFactor, UnknownPlace};
-use super::super::system::System;
+use super::super::system::{Rows, System};
 use super::super::triangle::Triangle;
+use super::lag::LaggingCell;
 use super::zero::{ZeroFilter, ZeroSolution};
-use super::{Drift, SignalTerm};
+use super::{Drift, ErrorColumns, ErrorPlace, SignalTerm};
 use palpate_model::units::Newtons;
 use std::ops::Range;
+use std::sync::Arc;
 
-/// Means into which the samples of a record are taken, at most about: within one of them the columns are as good as
-/// straight, so that its mean holds all that it knows.
-const MEANS: usize = 4096;
+/// Samples are averaged over at most this share of a record, and over at most this share of its depths: within a mean the
+/// columns are as good as straight, so that it holds all that they know.
+const MEANS: usize = 1024;
+const DEPTHS: f64 = 512.0;
 /// Blocks in which autocorrelation is estimated, as of records without a signal.
 const NOISE_BLOCKS: usize = 400;
 
@@ -21,12 +24,7 @@ const NOISE_BLOCKS: usize = 400;
 struct SampleMean {
     t: f64,
     count: usize,
-    /// The samples of the record that it is the mean of.
-    samples: Range<usize>,
-    /// Modelled force in N.
-    force: f64,
-    /// Slope of the curve there in V/N.
-    slope: f64,
+    place: ErrorPlace,
     /// In V, the residual behind them.
     columns: Vec<f64>,
 }
@@ -34,7 +32,7 @@ struct SampleMean {
 /// All means of a record.
 struct SignalMeans {
     means: Vec<SampleMean>,
-    /// Squares about the means, in V^2.
+    /// Squares of the noise about its means, in V^2.
     within: f64,
 }
 
@@ -48,7 +46,7 @@ impl System<'_> {
         slopes: &[Slope],
     ) -> Option<RecordFactor> {
         let SignalMeans { means, within } = self.signal_means(record, term, point, slopes)?;
-        let width = self.layout().linear_count() + slopes.len() + 1;
+        let width = self.layout().linear_count() + slopes.len() + self.errors.count + 1;
         let weight = self.sigma_scale / term.drift.noise;
         let solution = self.without_zero(term, &means);
         let mut triangle = Triangle::new(width);
@@ -93,47 +91,33 @@ impl System<'_> {
         filter.finish()
     }
 
-    /// What each of several errors does to the linear and outer unknowns at the end of a fit, to first order. `errors` gives
-    /// for each record the changes of its force in N that the errors make, at a force and at the samples of a mean.
-    pub(in super::super) fn changes_by(
+    /// The same with errors as further unknowns of variance one: `errors` gives the changes of the force read in N that they
+    /// make at a place.
+    pub(in super::super) fn with_errors(
         &self,
         points: &[ParameterPoint],
         count: usize,
-        errors: impl Fn(usize, f64, Range<usize>) -> Vec<f64>,
-    ) -> Option<Vec<Vec<f64>>> {
-        let unknowns = self.unknowns.len();
-        let mut joint = Triangle::new(unknowns + count + 1);
-        for (record, point) in points.iter().enumerate() {
+        errors: impl Fn(&ErrorPlace) -> Vec<f64>,
+    ) -> Option<Self> {
+        let columns = points.iter().enumerate().map(|(record, point)| {
             let term = self.signals[record].as_ref()?;
-            let slopes = self.slopes(record);
-            let own = self.layout().linear_count() + slopes.len();
-            let mut means = self.signal_means(record, term, point, &slopes)?.means;
-            for mean in &mut means {
-                let residual = mean.columns.pop()?;
-                let changes = errors(record, mean.force, mean.samples.clone());
-                mean.columns.extend(changes.iter().map(|change| mean.slope * change));
-                mean.columns.push(residual);
-            }
-            let solution = self.without_zero(term, &means);
-            let map = self.map(record, unknowns);
-            let mut mapped = vec![0.0; unknowns + count + 1];
-            for i in 0..solution.factor.width() {
-                let row = solution.factor.row(i);
-                for (slot, place) in mapped.iter_mut().zip(&map) {
-                    *slot = place.of(row);
-                }
-                mapped[unknowns..].copy_from_slice(&row[own..]);
-                joint.push(&mapped, 1.0);
-            }
-        }
-        self.push_contacts(points, count, &mut joint);
-        let factor = joint.finish();
-        let all: Vec<usize> = (0..unknowns).collect();
-        let columns = (0..count).map(|k| {
-            let columns: Vec<usize> = all.iter().copied().chain([unknowns + k]).collect();
-            factor.select_leading(&columns).solve(unknowns)
+            let means = self.signal_means(record, term, point, &[])?.means;
+            Some(means.iter().map(|mean| errors(&mean.place)).collect::<Vec<_>>())
         });
-        Some(columns.collect())
+        let columns: Option<Vec<_>> = columns.collect();
+        let columns = Arc::new(columns?);
+        let errors = ErrorColumns { count, columns, found: vec![0.0; count] };
+        Some(Self { errors, ..self.clone() })
+    }
+
+    /// The same around the errors that are found at these points.
+    pub(in super::super) fn with_errors_found(mut self, points: &[ParameterPoint]) -> Option<Self> {
+        let count = self.errors.count;
+        let pass = self.pass(points, Rows::All)?;
+        let change = pass.with_errors?.solve(count + self.unknowns.len());
+        let pairs = self.errors.found.iter_mut().zip(&change[..count]);
+        pairs.for_each(|(found, change)| *found += change);
+        Some(self)
     }
 
     /// The same with the sizes of noise and wandering that the records' own rows make likely, too.
@@ -159,7 +143,8 @@ impl System<'_> {
         let map = self.map(record, self.unknowns.len());
         let own: Vec<_> =
             map.iter().filter(|place| !matches!(place, UnknownPlace::Nowhere)).collect();
-        let width = own.len() + 1;
+        let errors = self.errors.count;
+        let width = own.len() + errors + 1;
         let mut rows: Vec<(f64, Vec<f64>, f64)> = Vec::with_capacity(means.len());
         for one in &term.signal.unloaded {
             let mut row = vec![0.0; width];
@@ -168,11 +153,11 @@ impl System<'_> {
         }
         for mean in &means {
             let mut row: Vec<f64> = own.iter().map(|place| place.of(&mean.columns)).collect();
-            row.push(mean.columns[mean.columns.len() - 1]);
+            row.extend_from_slice(&mean.columns[mean.columns.len() - 1 - errors..]);
             rows.push((mean.t, row, (mean.count as f64).sqrt()));
         }
         rows.sort_by(|one, other| one.0.total_cmp(&other.0));
-        let count = rows.len();
+        let count = rows.len() - own.len();
         let contact = self.unknowns.iter().zip(&map);
         let contact = contact.filter(|(_, place)| !matches!(place, UnknownPlace::Nowhere));
         let mut contact = contact.map(|(unknown, _)| unknown.parameter);
@@ -189,10 +174,16 @@ impl System<'_> {
                 row[width - 1] = term.contact_mm - point.outer.contact * self.depth_mm;
                 triangle.push(&row, term.drift.noise / error);
             }
+            for k in own.len()..width - 1 {
+                let mut row = vec![0.0; width];
+                row[k] = 1.0;
+                row[width - 1] = -self.errors.found[k - own.len()];
+                triangle.push(&row, term.drift.noise);
+            }
             let factor = triangle.finish();
             let logs = (0..width - 1).map(|k| factor.row(k)[k].abs().ln()).sum();
             let square = factor.residual_sum(width - 1);
-            (solution, square, logs, count + 1 - width)
+            (solution, square, logs, count)
         });
         judged.mean()
     }
@@ -217,19 +208,35 @@ impl System<'_> {
         let mut sums = vec![0.0; columns];
         let (mut taken, mut count) = (0usize, 0usize);
         // Times and volts from the first sample of a mean: their squares stay small.
-        let (mut origin, mut time, mut volts, mut square) = ((0.0, 0.0), 0.0, 0.0, 0.0);
+        let (mut origin, mut time, mut volts) = ((0.0, 0.0), 0.0, 0.0);
+        // The same with what the modelled force makes of the signal subtracted: noise.
+        let (mut first, mut noise, mut square) = ((0.0, 0.0), 0.0, 0.0);
         let mut place = 0;
+        let (shallowest, deepest) = self.records[record].depths;
+        let (reach, mut depth) = ((deepest - shallowest) / DEPTHS, shallowest);
         let curve = &term.signal.curve;
+        let mut cell = LaggingCell::new(term.signal.hysteresis.as_ref());
+        let mut errors = self.errors.columns.get(record).map(|all| all.iter());
         let mut close =
             |sums: &mut [f64], samples: Range<usize>, count: usize, t: f64, volts: f64| {
                 let over = 1.0 / count as f64;
                 sums.iter_mut().for_each(|sum| *sum *= over);
                 let shares = sums.iter().zip(&point.at);
                 let force = shares.map(|(column, share)| column * share).sum::<f64>();
-                let slope = curve.sensitivity_at(Newtons(force));
+                let lag = cell.lag(force);
+                let changes = errors.as_mut().and_then(Iterator::next);
+                let moved = changes.map_or(0.0, |changes| {
+                    changes.iter().zip(&self.errors.found).map(|(one, found)| one * found).sum()
+                });
+                let felt = Newtons(force - cell.half() * lag + moved);
+                let slope = curve.sensitivity_at(felt);
                 let mut columns: Vec<f64> = sums.iter().map(|column| slope * column).collect();
-                columns.push(volts - curve.volts_from_newtons(Newtons(force)).0);
-                found.means.push(SampleMean { t, count, samples, force, slope, columns });
+                if let Some(changes) = changes {
+                    columns.extend(changes.iter().map(|change| slope * change));
+                }
+                columns.push(volts - curve.volts_from_newtons(felt).0);
+                let place = ErrorPlace { record, samples, force, lag };
+                found.means.push(SampleMean { t, count, place, columns });
                 sums.fill(0.0);
             };
         let mut within = 0.0;
@@ -238,20 +245,31 @@ impl System<'_> {
             for (i, sample) in block.iter().enumerate() {
                 if sample.is_measured() {
                     let signal = term.signal.volts[place];
+                    let shares = lanes.iter().zip(&point.at);
+                    let force = shares.map(|(lane, share)| lane[i] * share).sum::<f64>();
                     if count == 0 {
                         origin = (sample.t.0, signal);
+                        first = (force, curve.sensitivity_at(Newtons(force)));
                     }
                     count += 1;
                     time += sample.t.0 - origin.0;
                     volts += signal - origin.1;
-                    square += (signal - origin.1).powi(2);
+                    let left = signal - origin.1 - first.1 * (force - first.0);
+                    noise += left;
+                    square += left * left;
                     for (sum, lane) in sums.iter_mut().zip(&lanes) {
                         *sum += lane[i];
                     }
                 }
                 place += 1;
                 taken += 1;
-                if (taken == length || place == samples.len()) && count > 0 {
+                let is_far = (sample.depth.0 - depth).abs() >= reach;
+                if taken == length || place == samples.len() || is_far {
+                    depth = sample.depth.0;
+                    if count == 0 {
+                        taken = 0;
+                        continue;
+                    }
                     let over = 1.0 / count as f64;
                     let samples = place - taken..place;
                     close(
@@ -261,11 +279,9 @@ impl System<'_> {
                         origin.0 + over * time,
                         origin.1 + over * volts,
                     );
-                    within += (square - over * volts * volts).max(0.0);
-                    (taken, count, time, volts, square) = (0, 0, 0.0, 0.0, 0.0);
-                }
-                if taken == length {
-                    taken = 0;
+                    within += (square - over * noise * noise).max(0.0);
+                    (taken, count, time, volts) = (0, 0, 0.0, 0.0);
+                    (noise, square) = (0.0, 0.0);
                 }
             }
         })?;
@@ -274,19 +290,15 @@ impl System<'_> {
     }
 
     /// The rows that say where the contact positions were before the records were looked at, for small changes of
-    /// the unknowns, with so many other columns behind these.
-    pub(in super::super) fn push_contacts(
-        &self,
-        points: &[ParameterPoint],
-        others: usize,
-        joint: &mut Triangle,
-    ) {
-        let last = self.unknowns.len() + others;
+    /// the unknowns, which stand behind the errors.
+    pub(in super::super) fn push_contacts(&self, points: &[ParameterPoint], joint: &mut Triangle) {
+        let errors = self.errors.count;
+        let last = errors + self.unknowns.len();
         let mut row = vec![0.0; last + 1];
         for (k, record, error) in self.contact_errors() {
             let Some(term) = &self.signals[record] else { continue };
             row.fill(0.0);
-            row[k] = self.depth_mm;
+            row[errors + k] = self.depth_mm;
             row[last] = term.contact_mm - points[record].outer.contact * self.depth_mm;
             joint.push(&row, self.sigma_scale / error);
         }

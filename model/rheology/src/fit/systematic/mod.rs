@@ -67,7 +67,7 @@ impl StatedTerms {
 }
 
 /// The systematic standard uncertainty of one parameter.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SystematicError {
     pub name: String,
     /// Everything together, in its unit.
@@ -77,6 +77,18 @@ pub struct SystematicError {
     /// The part of the rig's compliance, in its unit; `None` where depths are raw.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub compliance: Option<f64>,
+    /// What becomes of the parameter where these errors are found with it; `None` where they were moved one by one.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointChange>,
+}
+
+/// A parameter that is found together with the errors of its calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct JointChange {
+    /// How far its value moves, in its unit.
+    pub change: f64,
+    /// The statistical standard uncertainty that it then has.
+    pub statistical: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -190,19 +202,9 @@ impl Spread {
         names: &[String],
         first: usize,
     ) -> SystematicUncertainty {
-        let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
-        let compliances = distinct(records.iter().filter_map(|one| one.compliance));
         let is_stated = self.compliance.is_some() || !self.terms.is_empty();
         let parameters = names.iter().zip(first..).filter(|_| is_stated);
         SystematicUncertainty {
-            calibrations: calibrations.iter().copied().map(StatedTerms::of).collect(),
-            compliances: compliances.iter().map(|(name, _)| (*name).to_owned()).collect(),
-            is_extrapolated: records.iter().any(|one| {
-                one.calibration.is_some_and(|(_, uncertainty)| {
-                    let known = one.samples.iter().filter(|sample| sample.is_measured());
-                    known.map(|sample| sample.force).any(|force| force > uncertainty.force_max())
-                })
-            }),
             parameters: parameters
                 .map(|(name, k)| {
                     let compliance = self.compliance.as_ref().map(|sums| sums[k]);
@@ -216,9 +218,30 @@ impl Spread {
                             .map(|(term, sums)| TermError { term: *term, error: sums[k].sqrt() })
                             .collect(),
                         compliance: compliance.map(f64::sqrt),
+                        joint: None,
                     }
                 })
                 .collect(),
+            ..SystematicUncertainty::stated(records)
+        }
+    }
+}
+
+impl SystematicUncertainty {
+    /// What calibrations and compliances of records state, without any parameter.
+    fn stated(records: &[TracedRecord<'_>]) -> Self {
+        let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
+        let compliances = distinct(records.iter().filter_map(|one| one.compliance));
+        Self {
+            calibrations: calibrations.iter().copied().map(StatedTerms::of).collect(),
+            compliances: compliances.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            is_extrapolated: records.iter().any(|one| {
+                one.calibration.is_some_and(|(_, uncertainty)| {
+                    let known = one.samples.iter().filter(|sample| sample.is_measured());
+                    known.map(|sample| sample.force).any(|force| force > uncertainty.force_max())
+                })
+            }),
+            parameters: Vec::new(),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Systematic errors in a sentence, and in a report next to the statistical ones.
 
 use super::super::report::{BudgetEntry, FitReport, JointReport};
-use super::{StatedTerms, SystematicUncertainty};
+use super::{JointChange, StatedTerms, SystematicError, SystematicUncertainty};
 use palpate_model::calibration::UncertaintyTerm;
 
 /// Half of the 95 % interval of a standard normal error.
@@ -72,22 +72,15 @@ impl SystematicUncertainty {
             if is_one { "adds" } else { "add" },
         )
     }
+}
 
-    /// What contributes to the error of a parameter.
-    fn budget(&self, name: &str) -> Vec<BudgetEntry> {
-        let Some(own) = self.parameters.iter().find(|one| one.name == name) else {
-            return Vec::new();
-        };
+impl SystematicError {
+    /// What contributes to it.
+    fn budget(&self) -> Vec<BudgetEntry> {
         let entry = |source: &str, error: f64| BudgetEntry { source: source.to_owned(), error };
-        let terms = own.terms.iter().map(|one| entry(one.term.name(), one.error));
-        let compliance = own.compliance.map(|error| entry("machine compliance", error));
+        let terms = self.terms.iter().map(|one| entry(one.term.name(), one.error));
+        let compliance = self.compliance.map(|error| entry("machine compliance", error));
         terms.chain(compliance).filter(|one| one.error > 0.0).collect()
-    }
-
-    /// The error of a parameter, where there is one.
-    fn error(&self, name: &str) -> Option<f64> {
-        let own = self.parameters.iter().find(|one| one.name == name);
-        own.map(|own| own.error)
     }
 }
 
@@ -103,17 +96,23 @@ impl FitReport {
     fn add_systematic(&mut self, systematic: &SystematicUncertainty) {
         let known = self.parameters.iter_mut();
         for parameter in known.filter(|one| one.std_error.is_some()) {
-            parameter.systematic_error = systematic.error(&parameter.name);
-            if !parameter.budget.is_empty() {
-                parameter.budget.extend(systematic.budget(&parameter.name));
-            }
-            let (Some(own), Some([low, high])) = (parameter.systematic_error, parameter.ci95)
+            let own = systematic.parameters.iter().find(|one| one.name == parameter.name);
+            parameter.systematic_error = own.map(|own| own.error);
+            let (Some(own), Some([low, high]), Some(std_error)) =
+                (own, parameter.ci95, parameter.std_error)
             else {
                 continue;
             };
+            let joint = own.joint.unwrap_or(JointChange { change: 0.0, statistical: std_error });
+            let widening = joint.statistical / std_error;
+            if !parameter.budget.is_empty() {
+                parameter.budget.iter_mut().for_each(|one| one.error *= widening);
+                parameter.budget.extend(own.budget());
+            }
             // Two standard normal errors add in quadrature, and so do the halves of their intervals.
-            let half = (0.5 * (high - low)).hypot(NORMAL975 * own);
-            parameter.total95 = Some([parameter.value - half, parameter.value + half]);
+            let half = (0.5 * widening * (high - low)).hypot(NORMAL975 * own.error);
+            let middle = parameter.value + joint.change;
+            parameter.total95 = Some([middle - half, middle + half]);
         }
     }
 }
