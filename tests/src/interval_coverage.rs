@@ -1,5 +1,8 @@
 //! How often the intervals of a fit hold the truth: sessions recorded on simulated rigs, one a seed.
 
+use palpate_analysis::compliance::{
+    ComplianceCorrections, LATEST_COMPLIANCE, compliance_from_session,
+};
 use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
@@ -11,6 +14,7 @@ use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{FitOptions, FitReport, JointReport, fit_joint};
 use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
+use palpate_sessions::document_store::save_document;
 use std::fmt::Write;
 use std::sync::mpsc::sync_channel;
 
@@ -25,9 +29,10 @@ pub const NAMES: [&str; 6] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "x_cont
 pub struct CoverageDraw {
     pub error: f64,
     pub std_error: f64,
-    /// Standard uncertainty of everything.
-    pub total_error: f64,
     pub is_covered: bool,
+    /// Error of the middle of the total interval, and half of its width.
+    pub total_error: f64,
+    pub total_half: f64,
     pub is_covered_in_total: bool,
 }
 
@@ -42,11 +47,16 @@ pub struct CoverageCase {
     pub is_short_of_weights: bool,
     /// A second run at this speed in mm/s on the same specimen, the body shared.
     pub second_speed: Option<f64>,
+    /// Whether the rig gives way, and how much is measured on a stiff surface before.
+    pub is_soft: bool,
 }
+
+/// The stiff surface gives way by this much itself, in mm/N, which the simulated rig's maker says.
+const SURFACE_MM_PER_N: f64 = 1e-3;
 
 impl CoverageCase {
     /// Names of all cases.
-    pub const NAMES: [&str; 6] = ["ideal", "lab", "fast", "speeds", "own", "few-weights"];
+    pub const NAMES: [&str; 7] = ["ideal", "lab", "soft", "fast", "speeds", "own", "few-weights"];
 
     /// The case of a name.
     ///
@@ -61,6 +71,10 @@ impl CoverageCase {
             "ideal" => of(SimSettings { profile: SimProfile::Ideal, ..lab }),
             "lab" => of(lab),
             "fast" => of(SimSettings { rate: "20000".parse().expect("a rate"), ..lab }),
+            "soft" => Self {
+                is_soft: true,
+                ..of(SimSettings { compliance: "60".parse().expect("a compliance"), ..lab })
+            },
             "speeds" => Self { second_speed: Some(1.5), ..of(lab) },
             "own" => of(own),
             "few-weights" => Self { is_short_of_weights: true, ..of(own) },
@@ -101,12 +115,25 @@ fn measured_calibration(case: &CoverageCase) -> Calibration {
     calibration_from_session(&session, "measured").expect("a calibration")
 }
 
+/// The machine compliance that the protocol measures on the rig of these settings.
+fn measured_compliance(settings: SimSettings) -> ComplianceCorrections {
+    let rig = SimRig::new(settings);
+    let calibration = rig.calibration();
+    let session = record_plan(Box::new(rig), calibration, built_in_plan("stiff-surface", &[]));
+    let mut found = compliance_from_session(&session, None).expect("a compliance");
+    found.mm_per_n -= SURFACE_MM_PER_N;
+    let library = tempfile::tempdir().expect("a folder");
+    save_document(library.path(), &found).expect("a stored compliance");
+    ComplianceCorrections::named(LATEST_COMPLIANCE, Some(library.path())).expect("it is in force")
+}
+
 /// One ramp and hold as a recording, and what was true.
 fn recorded(
-    settings: SimSettings,
+    case: &CoverageCase,
     calibration: &Calibration,
     speed: Option<f64>,
 ) -> (Recording, [f64; 6]) {
+    let settings = case.settings;
     let rig = SimRig::new(settings);
     let (sender, truths) = sync_channel(1);
     let watched = Box::new(RigWithTruth::new(
@@ -122,12 +149,15 @@ fn recorded(
     let session = record_ramp_hold(watched, calibration.clone(), params);
     let truth = truths.recv().expect("the rig is switched off");
     let contact = contact_of(&session);
-    let source = source::of_session(session, RecordStretch::RampHold, &[]).expect("a session");
+    let read = source::of_session(session, RecordStretch::RampHold, &[]);
+    let mut source = read.expect("a session");
+    let compliance = case.is_soft.then(|| measured_compliance(settings));
+    let compliance = compliance.and_then(|known| known.apply(&mut source).expect("it is applied"));
     let body = truth.body;
     let contact_error = truth.surface_counted().0 - contact;
     let [mu1, mu2, mu3] = body.mu;
     let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig, contact_error];
-    (Recording::of(format!("{speed:?}"), source, None), values)
+    (Recording::of(format!("{speed:?}"), source, compliance), values)
 }
 
 /// Records what the case asks for and fits it as `palpate fit` does.
@@ -140,10 +170,10 @@ pub fn draw(case: &CoverageCase) -> SeedDraws {
         SimCell::Own => measured_calibration(case),
         SimCell::Document => SimRig::new(case.settings).calibration(),
     };
-    let (first, truth) = recorded(case.settings, &calibration, None);
+    let (first, truth) = recorded(case, &calibration, None);
     let mut all = vec![first];
     if case.second_speed.is_some() {
-        all.push(recorded(case.settings, &calibration, case.second_speed).0);
+        all.push(recorded(case, &calibration, case.second_speed).0);
     }
     let options = FitOptions::default();
     let shared = if all.len() > 1 { vec!["body"] } else { Vec::new() };
@@ -170,11 +200,13 @@ fn draws_of(report: &FitReport, truth: &[f64; 6]) -> CoverageDraws {
         let holds = |interval: Option<[f64; 2]>| {
             interval.is_some_and(|[low, high]| (low..=high).contains(&truth[k]))
         };
+        let [low, high] = one.total95.or(one.ci95).unwrap_or_default();
         CoverageDraw {
             error: (one.value - truth[k]) / scale,
             std_error: std_error / scale,
-            total_error: std_error.hypot(one.systematic_error.unwrap_or(0.0)) / scale,
             is_covered: holds(one.ci95),
+            total_error: (0.5 * (low + high) - truth[k]) / scale,
+            total_half: 0.5 * (high - low) / scale,
             is_covered_in_total: holds(one.total95.or(one.ci95)),
         }
     })
@@ -203,8 +235,11 @@ pub struct CoverageSummary {
     pub bias: f64,
     pub spread: f64,
     pub stated: f64,
-    pub total: f64,
     pub covered: usize,
+    pub total_bias: f64,
+    pub total_spread: f64,
+    /// A half of the total interval over 1.96, the standard uncertainty of a normal error.
+    pub total_stated: f64,
     pub covered_in_total: usize,
     pub count: usize,
 }
@@ -218,13 +253,18 @@ pub fn summarise(draws: &[CoverageDraws]) -> [CoverageSummary; 6] {
         let mean = |of: &dyn Fn(&CoverageDraw) -> f64| {
             draws.iter().map(|one| unit * of(&one[k])).sum::<f64>() / count
         };
-        let bias = mean(&|one| one.error);
-        let square = draws.iter().map(|one| (unit * one[k].error - bias).powi(2)).sum::<f64>();
+        let spread = |of: &dyn Fn(&CoverageDraw) -> f64| {
+            let middle = mean(of);
+            let square = draws.iter().map(|one| (unit * of(&one[k]) - middle).powi(2));
+            (square.sum::<f64>() / (count - 1.0)).sqrt()
+        };
         CoverageSummary {
-            bias,
-            spread: (square / (count - 1.0)).sqrt(),
+            bias: mean(&|one| one.error),
+            spread: spread(&|one| one.error),
             stated: mean(&|one| one.std_error),
-            total: mean(&|one| one.total_error),
+            total_bias: mean(&|one| one.total_error),
+            total_spread: spread(&|one| one.total_error),
+            total_stated: mean(&|one| one.total_half) / 1.96,
             covered: draws.iter().filter(|one| one[k].is_covered).count(),
             covered_in_total: draws.iter().filter(|one| one[k].is_covered_in_total).count(),
             count: draws.len(),
@@ -236,19 +276,21 @@ pub fn summarise(draws: &[CoverageDraws]) -> [CoverageSummary; 6] {
 #[must_use]
 pub fn table(title: &str, draws: &[CoverageDraws]) -> String {
     let mut text = format!(
-        "{title}, {} seeds\n\n| parameter | bias | spread | stated | `ci95` covers | in total | `total95` covers |\n|---|---|---|---|---|---|---|\n",
+        "{title}, {} seeds\n\n| parameter | bias | spread | stated | `ci95` covers | bias in total | spread | stated | `total95` covers |\n|---|---|---|---|---|---|---|---|---|\n",
         draws.len()
     );
     for (name, one) in NAMES.iter().zip(summarise(draws)) {
         let percent = |count: usize| 100.0 * count as f64 / one.count as f64;
         let _ = writeln!(
             text,
-            "| {name} | {:+.4} | {:.4} | {:.4} | {:.1} % | {:.4} | {:.1} % |",
+            "| {name} | {:+.4} | {:.4} | {:.4} | {:.1} % | {:+.4} | {:.4} | {:.4} | {:.1} % |",
             one.bias,
             one.spread,
             one.stated,
             percent(one.covered),
-            one.total,
+            one.total_bias,
+            one.total_spread,
+            one.total_stated,
             percent(one.covered_in_total)
         );
     }
