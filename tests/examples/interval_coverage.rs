@@ -1,6 +1,8 @@
 //! How often intervals hold the truth, as tables in Markdown: `interval_coverage SEEDS [CASE]...`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
-use palpate_tests::interval_coverage::{CoverageCase, CoverageDraws, draws, table};
+use palpate_tests::interval_coverage::{
+    CoverageCase, CoverageDraws, HELD_OUT_SPEED, HELD_OUT_TIMES, draws, table,
+};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
@@ -15,5 +17,14 @@ fn main() {
         let force: Vec<CoverageDraws> = found.iter().map(|one| one.force).collect();
         println!("{}", table(&format!("{name}, fitted in volts"), &signal));
         println!("{}", table(&format!("{name}, fitted in newtons"), &force));
+        let held = HELD_OUT_TIMES.iter().enumerate().map(|(k, t)| {
+            let count = found.iter().filter(|one| one.held_out[k]).count();
+            format!("{:.1} % at {t} s", 100.0 * count as f64 / found.len() as f64)
+        });
+        let held: Vec<String> = held.collect();
+        println!(
+            "95 % band of the force at {HELD_OUT_SPEED} mm/s, from the fit at half that speed, holds {}\n",
+            held.join(", ")
+        );
     }
 }

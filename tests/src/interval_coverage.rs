@@ -7,11 +7,12 @@ use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
 use palpate_drivers::sim::{RigWithTruth, SimCell, SimProfile, SimRig, SimSettings};
-use palpate_model::MmPerS;
 use palpate_model::calibration::Calibration;
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
-use palpate_rheology::fit::{FitOptions, FitReport, JointReport, fit_joint};
+use palpate_rheology::fit::{FitOptions, FitReport, FitSolution, JointReport, fit_joint};
 use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
 use palpate_sessions::document_store::save_document;
@@ -88,7 +89,15 @@ impl CoverageCase {
 pub struct SeedDraws {
     pub signal: CoverageDraws,
     pub force: CoverageDraws,
+    /// Whether the 95 % band of the fit in volts holds the true force of a run at [`HELD_OUT_SPEED`], at
+    /// [`HELD_OUT_TIMES`].
+    pub held_out: [bool; 4],
 }
+
+/// Speed in mm/s of a run that is predicted, twice that of the run that is fitted.
+pub const HELD_OUT_SPEED: f64 = 1.5;
+/// Times in s of that run: in its middle, at its end, and in the hold of it.
+pub const HELD_OUT_TIMES: [f64; 4] = [10.0, 20.0, 22.0, 60.0];
 
 /// The contact position that depths count from, in mm from home.
 fn contact_of(session: &Session) -> f64 {
@@ -189,7 +198,32 @@ pub fn draw(case: &CoverageCase) -> SeedDraws {
     };
     let signal = fit_together(&records, &request, |_, _| ()).expect("a fit");
     let of = |report: &JointReport| draws_of(&report.records[0].report, &truth);
-    SeedDraws { signal: of(&signal.report), force: of(&force) }
+    let held_out = held_out(&records, &options, &truth);
+    SeedDraws { signal: of(&signal.report), force: of(&force), held_out }
+}
+
+/// Whether the bands of the first record's fit hold true forces at another speed.
+fn held_out(records: &Recordings, options: &FitOptions, truth: &[f64; 6]) -> [bool; 4] {
+    let fitted = FitSolution::fit_signals(&records.signals()[..1], options, &[]).expect("a fit");
+    let path: Vec<(Seconds, Depth)> = (0..=6000)
+        .map(|k| {
+            let t = 0.01 * f64::from(k);
+            (Seconds(t), Depth((HELD_OUT_SPEED * t).min(RampHold::default().depth.0)))
+        })
+        .collect();
+    let [tau_eps, mu1, mu2, mu3, tau_sig, _] = *truth;
+    let body = ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig };
+    let mut state = KelvinState::at_rest();
+    let forces: Vec<f64> = path
+        .iter()
+        .map(|(t, depth)| state.step(&body, *depth, Seconds(if t.0 == 0.0 { 0.0 } else { 0.01 })).0)
+        .collect();
+    let band = fitted.predict_band(0, &path).expect("a band");
+    HELD_OUT_TIMES.map(|t| {
+        let k = (100.0 * t).round() as usize;
+        let [low, high] = band[k].ci95;
+        (low.0..=high.0).contains(&forces[k])
+    })
 }
 
 fn draws_of(report: &FitReport, truth: &[f64; 6]) -> CoverageDraws {

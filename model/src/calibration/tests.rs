@@ -421,3 +421,28 @@ fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     let refusal = coarse.check_refusal(800.0).unwrap().unwrap();
     assert!(refusal.contains("800 g") && !refusal.contains("950 g"), "{refusal}");
 }
+
+#[test]
+fn loop_between_loading_and_unloading_is_found_beside_a_steady_drift() {
+    // 2 mN in the middle of 0 to 900 g, and 0.1 mV from reading to reading.
+    let (half, drift, sensitivity) = (2e-3, 1e-4, 0.2);
+    let lag = |g: f64| {
+        let place = g / 900.0;
+        sensitivity * half * 4.0 * place * (1.0 - place)
+    };
+    let line = |g: f64| 1.0 + sensitivity * newtons_of(g).0;
+    let grams = || (0..10).map(|i| 100.0 * f64::from(i));
+    let up: Vec<(f64, f64)> =
+        grams().enumerate().map(|(i, g)| (g, line(g) - lag(g) + drift * i as f64)).collect();
+    let down: Vec<(f64, f64)> = grams()
+        .rev()
+        .enumerate()
+        .map(|(i, g)| (g, line(g) + lag(g) + drift * (i + 10) as f64))
+        .collect();
+    let both = document(&[(Direction::Loading, 1, &up), (Direction::Unloading, 1, &down)]);
+    let found = HysteresisLoop::of(&both).unwrap();
+    assert!((found.half.0 - half).abs() < 1e-3 * half, "{found:?}");
+    assert!(found.std_error.0 < 0.01 * half, "{found:?}");
+    let up_only = document(&[(Direction::Loading, 1, &up)]);
+    assert_eq!(HysteresisLoop::of(&up_only), None);
+}

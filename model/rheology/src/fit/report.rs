@@ -362,10 +362,15 @@ fn estimate_noise(
 /// Abramowitz & Stegun 26.7.5, good to 1e-2 at 3 and to 1e-4 from 6 on.
 pub(super) fn student_t975(degrees_of_freedom: f64) -> f64 {
     let z: f64 = 1.959_963_984_540_054;
+    let at = |from: f64, [high, low]: [f64; 2]| {
+        let share = (1.0 / from - 1.0 / degrees_of_freedom) * from * (from + 1.0);
+        high * (low / high).powf(share)
+    };
     match degrees_of_freedom.floor() {
         ..1.0 => f64::NAN,
-        ..2.0 => 12.706_204_736,
-        ..3.0 => 4.302_652_730,
+        // Between the exact values of 1, 2 and 3, straight in their logarithm over 1/n; the series is for more.
+        ..2.0 => at(1.0, [12.706_204_736, 4.302_652_730]),
+        ..3.0 => at(2.0, [4.302_652_730, 3.182_446_305]),
         _ => {
             let n = degrees_of_freedom;
             let (z3, z5) = (z.powi(3), z.powi(5));

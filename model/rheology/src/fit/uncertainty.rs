@@ -147,7 +147,8 @@ impl Uncertainty {
         });
         let known = self.drift.as_ref().map_or(0.0, |(_, known)| *known);
         let uncertainty = uncertainty + shares.map_or(0.0, |[drift, _]| known * drift * drift);
-        let freedom = if uncertainty > 0.0 { spare.min(2.0 / uncertainty) } else { spare };
+        let freedom =
+            if uncertainty > 0.0 { spare.min((2.0 / uncertainty).max(1.0)) } else { spare };
         std_error.is_finite().then_some(UncertaintyEstimate {
             std_error,
             inflation,

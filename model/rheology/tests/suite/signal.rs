@@ -1,9 +1,10 @@
 //! Fits of what the load cell reported: a zero that wanders is measured, and what the caller fixed stays fixed.
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, ForceUncertainty, WeightStep};
 use palpate_model::units::{Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{
-    FitOptions, FitReport, FitSample, FitSolution, Signal, SignalRecord, UnloadedMean, fit,
+    FitOptions, FitReport, FitSample, FitSolution, Signal, SignalRecord, TracedRecord,
+    UnloadedMean, fit,
 };
 use palpate_test_support::record::{Noise, ramp_hold, respond};
 
@@ -15,9 +16,17 @@ const DRIFT: f64 = 1e-5;
 
 /// A ramp and hold on a straight cell of 0.15 V/N whose zero drifts, with half a minute out of contact before and after.
 fn record(seed: u64) -> (Vec<FitSample>, Signal) {
+    record_read_with(seed, &straight())
+}
+
+fn straight() -> Calibration {
+    Calibration::linear("straight", Volts(1.28), 0.15, Newtons(10.0))
+}
+
+/// The same cell, its forces read with another document.
+fn record_read_with(seed: u64, document: &Calibration) -> (Vec<FitSample>, Signal) {
     let mut random = Noise::seeded(seed);
-    let calibration = Calibration::linear("straight", Volts(1.28), 0.15, Newtons(10.0));
-    let curve = calibration.curve().unwrap();
+    let curve = straight().curve().unwrap();
     let zero = |t: f64| DRIFT * (t + 30.0);
     let mut samples = respond(&THESIS, &ramp_hold(0.75, 20.0, 0.01));
     let volts: Vec<f64> = samples
@@ -26,6 +35,7 @@ fn record(seed: u64) -> (Vec<FitSample>, Signal) {
             curve.volts_from_newtons(one.force).0 + zero(one.t.0) + NOISE_V * random.normal()
         })
         .collect();
+    let curve = document.curve().unwrap();
     for (sample, volts) in samples.iter_mut().zip(&volts) {
         sample.force = curve.newtons_from_volts(Volts(*volts));
         sample.sigma = Newtons(NOISE_V / 0.15);
@@ -93,4 +103,57 @@ fn fixed_contact_position_stays_and_fixed_offset_fits_forces() {
     offset.fix("f_offset", 0.003).unwrap();
     let of_forces = fit(&samples, &offset).unwrap();
     assert_eq!(fitted(&samples, &signal, &offset), of_forces);
+}
+
+/// Readings of a straight cell, written down with this digit in V, each wrong by up to a half of it.
+fn coarse_document(seed: u64, digit: f64) -> Calibration {
+    let mut random = Noise::seeded(1000 + seed);
+    let steps = (0..=10).map(|k| {
+        let mass_g = 102.0 * f64::from(k);
+        let volts = 1.28 + 0.15 * 9.80665e-3 * mass_g;
+        // Evenly spread, by the normal distribution's own rank.
+        let error = digit * (random.normal().tanh() * 0.5);
+        WeightStep { mass_g, volts: Volts(volts + error) }
+    });
+    Calibration {
+        name: "coarse".into(),
+        steps: steps.collect(),
+        resolution: Some(Volts(digit)),
+        ..Calibration::default()
+    }
+}
+
+#[test]
+fn total_interval_holds_the_truth_of_a_cell_whose_curve_is_known_badly() {
+    let options = FitOptions::default();
+    let (mut taken, mut found, mut held) = (0.0, 0.0, 0);
+    for seed in 0..8 {
+        let document = coarse_document(seed, 4e-3);
+        let known = ForceUncertainty::of(&document).unwrap();
+        let (samples, signal) = record_read_with(seed, &document);
+        let record = SignalRecord { name: "one", samples: &samples, signal: Some(&signal) };
+        let solution = FitSolution::fit_signals(&[record], &options, &[]).unwrap();
+        let traced = TracedRecord {
+            name: "one",
+            samples: &samples,
+            calibration: Some(("coarse", &known)),
+            compliance: None,
+        };
+        let systematic = solution.systematic(&[traced]).unwrap().remove(0);
+        let report = solution.report().with_systematic(&systematic);
+        let tau = report.parameter("tau_eps").unwrap();
+        let error = |value: f64| value / THESIS.tau_eps - 1.0;
+        let holds = |[low, high]: [f64; 2]| low <= THESIS.tau_eps && THESIS.tau_eps <= high;
+        let [low, high] = tau.total95.unwrap();
+        assert!(holds([low, high]), "seed {seed}: {tau:?}");
+        taken += error(tau.value).powi(2);
+        found += error(0.5 * (low + high)).powi(2);
+        held += usize::from(holds(tau.ci95.unwrap()));
+        // The sources are those of the total interval.
+        let budget: f64 = tau.budget.iter().map(|one| one.error.powi(2)).sum();
+        let half = 0.5 * (high - low) / 1.96;
+        assert!((budget.sqrt() / half - 1.0).abs() < 0.1, "{budget} {half} {tau:?}");
+    }
+    // The record knows more of the curve than the document does.
+    assert!(found < 0.25 * taken && held < 8, "{found} {taken} {held}");
 }

@@ -102,15 +102,23 @@ impl<'a> SignalTerm<'a> {
         let (start, end) = (times().fold(first, f64::min), times().fold(last, f64::max));
         let sizes = DriftSizes::of(&signal.unloaded, start, end)?;
         let drift = sizes.mean()?;
-        let error = signal.contact_error_mm.hypot(wander_mm(record.samples, signal, &drift));
-        let whole = Self {
+        let mut whole = Self {
             signal,
             sizes,
             drift,
-            contact_error_mm: contact_mm.map(|_| error),
+            contact_error_mm: contact_mm,
             contact_mm: contact_mm.unwrap_or(0.0),
         };
+        whole.take(drift, record.samples);
         (signal.volts.len() == record.samples.len()).then_some(whole)
+    }
+
+    /// Takes noise and wandering of these sizes, with what they make of the contact position.
+    fn take(&mut self, drift: Drift, samples: &[FitSample]) {
+        self.drift = drift;
+        let wander = wander_mm(samples, self.signal, &drift);
+        let error = self.signal.contact_error_mm.hypot(wander);
+        self.contact_error_mm = self.contact_error_mm.map(|_| error);
     }
 }
 

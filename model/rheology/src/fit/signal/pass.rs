@@ -126,7 +126,7 @@ impl System<'_> {
         for (record, point) in points.iter().enumerate() {
             let Some(term) = &mut system.signals[record] else { continue };
             if let Some(drift) = self.drift_of_record(record, term, point) {
-                term.drift = drift;
+                term.take(drift, self.records[record].samples);
             }
         }
         system

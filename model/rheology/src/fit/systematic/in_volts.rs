@@ -1,9 +1,11 @@
 //! The same for fits of signals: each error is one more unknown of known uncertainty, found with the parameters, so that
 //! what the record itself says of the calibration counts. Zero and contact position are free as in the fit.
 
+use super::super::report::student_t975;
 use super::super::sample::FitError;
 use super::super::signal::ErrorPlace;
 use super::super::solve::FitSolution;
+use super::super::uncertainty::UncertaintyEstimate;
 use super::{
     JointChange, SystematicError, SystematicUncertainty, TermError, TracedRecord, add_compliance,
     estimate_systematic_jointly,
@@ -64,7 +66,7 @@ impl FitSolution<'_> {
             let parameters = each.map(|((name, (combination, estimate)), change)| {
                 let known = combination.zip(estimate);
                 let error = known.map(|(combination, estimate)| {
-                    whole.systematic_error(&errors, &combination, estimate.std_error, *change)
+                    whole.systematic_error(&errors, &combination, estimate, *change)
                 });
                 SystematicError { name: name.clone(), ..error.unwrap_or_default() }
             });
@@ -123,12 +125,12 @@ impl FitSolution<'_> {
         Self::refined(system, &points)
     }
 
-    /// What the errors contribute to the standard uncertainty `all` of a combination of unknowns, which they moved by `change`.
+    /// What the errors contribute to the uncertainty of a combination of unknowns, which they moved by `change`.
     fn systematic_error(
         &self,
         errors: &[SharedError<'_>],
         combination: &[f64],
-        all: f64,
+        estimate: UncertaintyEstimate,
         change: f64,
     ) -> SystematicError {
         let mut found = SystematicError::default();
@@ -150,8 +152,9 @@ impl FitSolution<'_> {
                 None => found.terms.push(TermError { term: *term, error: part }),
             }
         }
-        let statistical = (all.powi(2) - found.error.powi(2)).max(0.0).sqrt();
-        found.joint = Some(JointChange { change, statistical });
+        let statistical = (estimate.std_error.powi(2) - found.error.powi(2)).max(0.0).sqrt();
+        let half = student_t975(estimate.freedom) * statistical;
+        found.joint = Some(JointChange { change, statistical, half });
         found
     }
 

@@ -89,6 +89,9 @@ pub struct JointChange {
     pub change: f64,
     /// The statistical standard uncertainty that it then has.
     pub statistical: f64,
+    /// Half of its statistical 95 % interval.
+    #[serde(skip)]
+    pub half: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -103,14 +103,18 @@ impl FitReport {
             else {
                 continue;
             };
-            let joint = own.joint.unwrap_or(JointChange { change: 0.0, statistical: std_error });
+            let joint = own.joint.unwrap_or(JointChange {
+                change: 0.0,
+                statistical: std_error,
+                half: 0.5 * (high - low),
+            });
             let widening = joint.statistical / std_error;
             if !parameter.budget.is_empty() {
                 parameter.budget.iter_mut().for_each(|one| one.error *= widening);
                 parameter.budget.extend(own.budget());
             }
             // Two standard normal errors add in quadrature, and so do the halves of their intervals.
-            let half = (0.5 * widening * (high - low)).hypot(NORMAL975 * own.error);
+            let half = joint.half.hypot(NORMAL975 * own.error);
             let middle = parameter.value + joint.change;
             parameter.total95 = Some([middle - half, middle + half]);
         }
