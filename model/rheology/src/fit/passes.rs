@@ -312,7 +312,7 @@ fn subtract(columns: &mut [Lane], at: &[f64]) {
 
 /// Inner product of coefficients with the first columns of a row.
 #[inline]
-fn product(coefficients: &[f64], row: &[f64]) -> f64 {
+pub(super) fn product(coefficients: &[f64], row: &[f64]) -> f64 {
     let mut sum = 0.0;
     for (a, b) in coefficients.iter().zip(row) {
         sum += a * b;

@@ -202,6 +202,17 @@ impl Factor {
         triangle.finish()
     }
 
+    /// The triangle of some of the columns, the last of them as the force.
+    pub fn select_leading(&self, columns: &[usize]) -> Self {
+        let mut triangle = Triangle::new(columns.len());
+        for i in 0..self.width {
+            let row = self.row(i);
+            let chosen: Vec<f64> = columns.iter().map(|&k| row[k]).collect();
+            triangle.push(&chosen, 1.0);
+        }
+        triangle.finish()
+    }
+
     /// The triangle without the first columns, whatever these explain subtracted.
     pub fn without_first(&self, count: usize) -> Self {
         let rows = (count..self.width).flat_map(|i| self.row(i)[count..].iter().copied());

@@ -1,10 +1,12 @@
 //! The same for fits of signals: each error is one more unknown of known uncertainty, found with the parameters, so that
 //! what the record itself says of the calibration counts. Zero and contact position are free as in the fit.
 
+use super::super::passes::product;
 use super::super::report::student_t975;
 use super::super::sample::FitError;
 use super::super::signal::ErrorPlace;
 use super::super::solve::FitSolution;
+use super::super::system::{Rows, System};
 use super::super::uncertainty::UncertaintyEstimate;
 use super::{
     JointChange, SystematicError, SystematicUncertainty, TermError, TracedRecord, add_compliance,
@@ -36,7 +38,28 @@ fn shared_errors<'a>(records: &[TracedRecord<'a>]) -> Vec<SharedError<'a>> {
     terms.chain(compliances.into_iter().map(SharedError::Compliance)).collect()
 }
 
-impl FitSolution<'_> {
+/// Errors that come out larger than so many standard uncertainties contradict their statement: of forty, one does so once
+/// in ten records by chance if nothing else were known of it, and what is known of it makes that rarer.
+const CONTRADICTION: f64 = 3.0;
+
+/// The root of the sum of the squares of parts, one for each error, and the same of those of each term.
+fn sum_of_parts(errors: &[SharedError<'_>], parts: impl Iterator<Item = f64>) -> SystematicError {
+    let mut found = SystematicError::default();
+    for (error, part) in errors.iter().zip(parts) {
+        found.error = found.error.hypot(part);
+        let SharedError::Calibration { term, .. } = error else {
+            found.compliance = Some(found.compliance.map_or(part, |sum| sum.hypot(part)));
+            continue;
+        };
+        match found.terms.iter_mut().find(|one| one.term == *term) {
+            Some(one) => one.error = one.error.hypot(part),
+            None => found.terms.push(TermError { term: *term, error: part }),
+        }
+    }
+    found
+}
+
+impl<'a> FitSolution<'a> {
     /// The systematic uncertainty of this fit, for each of its records, which are given with what their forces and
     /// depths were read with.
     pub fn systematic(
@@ -55,8 +78,24 @@ impl FitSolution<'_> {
         if errors.is_empty() {
             return Ok(vec![stated; records.len()]);
         }
-        let whole = self.with_shared_errors(records, &errors)?;
+        let system = self.with_shared_errors(records, &errors)?;
         let names = self.value_names();
+        let Some(whole) = self.with_errors_found(&system) else {
+            let changes = self.changes_by_each(&system)?;
+            let of_record = |record: usize| {
+                let each = names.iter().zip(self.combinations(record));
+                let parameters = each.map(|(name, combination)| {
+                    let parts = combination.iter().flat_map(|one| {
+                        let part = |change: &Vec<f64>| product(one, change).abs();
+                        changes.iter().map(part)
+                    });
+                    SystematicError { name: name.clone(), ..sum_of_parts(&errors, parts) }
+                });
+                let parameters = parameters.collect();
+                SystematicUncertainty { parameters, is_contradicted: true, ..stated.clone() }
+            };
+            return Ok((0..records.len()).map(of_record).collect());
+        };
         let changes = whole.values().into_iter().zip(self.values());
         let changes: Vec<f64> = changes.map(|(after, before)| after - before).collect();
         let of_record = |record: usize| {
@@ -75,12 +114,23 @@ impl FitSolution<'_> {
         Ok((0..records.len()).map(of_record).collect())
     }
 
-    /// The same fit with these errors as further unknowns.
+    /// This fit with the errors of its calibrations and compliances found with it, whose predictions allow for them; the fit
+    /// itself where it has no signals, or where its records contradict what is stated of these errors.
+    pub fn with_traced_errors(self, records: &[TracedRecord<'_>]) -> Result<Self, FitError> {
+        let errors = shared_errors(records);
+        if errors.is_empty() || !self.system.signals.iter().all(Option::is_some) {
+            return Ok(self);
+        }
+        let system = self.with_shared_errors(records, &errors)?;
+        Ok(self.with_errors_found(&system).unwrap_or(self))
+    }
+
+    /// The same records with these errors as further unknowns.
     fn with_shared_errors(
         &self,
         records: &[TracedRecord<'_>],
         errors: &[SharedError<'_>],
-    ) -> Result<Self, FitError> {
+    ) -> Result<System<'a>, FitError> {
         let mut bends = Vec::with_capacity(records.len());
         for (k, record) in records.iter().enumerate() {
             bends.push(match record.compliance {
@@ -111,18 +161,37 @@ impl FitSolution<'_> {
         let system = self.system.with_errors(points, errors.len(), |place| {
             errors.iter().map(|error| change(place, error)).collect()
         });
-        let mut system = system.ok_or(FitError::Overflow)?;
-        let mut points = points.clone();
+        system.ok_or(FitError::Overflow)
+    }
+
+    /// The fit with the errors of a system found; `None` where they come out larger than is stated of them.
+    fn with_errors_found(&self, system: &System<'a>) -> Option<Self> {
+        let mut system = system.clone();
+        let mut points = self.refined.points.clone();
         // The second time around the errors found.
         for _ in 0..2 {
-            system = system.with_errors_found(&points).ok_or(FitError::Overflow)?;
+            system = system.with_errors_found(&points)?;
             // What a wrong curve leaves is no drift.
             system = system.with_drift_of_records(&points);
-            let fitted = Self::refined(system, &points)?;
+            let fitted = Self::refined(system, &points).ok()?;
             (system, points) = (fitted.system, fitted.refined.points);
         }
-        system = system.with_errors_found(&points).ok_or(FitError::Overflow)?;
-        Self::refined(system, &points)
+        system = system.with_errors_found(&points)?;
+        let is_stated = system.errors.found.iter().all(|error| error.abs() < CONTRADICTION);
+        is_stated.then(|| Self::refined(system, &points).ok()).flatten()
+    }
+
+    /// Changes of the unknowns by one standard uncertainty of each error, to first order.
+    fn changes_by_each(&self, system: &System<'a>) -> Result<Vec<Vec<f64>>, FitError> {
+        let pass = system.pass(&self.refined.points, Rows::All);
+        let factor = pass.and_then(|pass| pass.with_errors).ok_or(FitError::Overflow)?;
+        let errors = system.errors.count;
+        let unknowns: Vec<usize> = (errors..errors + system.unknowns.len()).collect();
+        let change = |k| {
+            let columns: Vec<usize> = unknowns.iter().copied().chain([k]).collect();
+            factor.select_leading(&columns).solve(unknowns.len())
+        };
+        Ok((0..errors).map(change).collect())
     }
 
     /// What the errors contribute to the uncertainty of a combination of unknowns, which they moved by `change`.
@@ -133,25 +202,16 @@ impl FitSolution<'_> {
         estimate: UncertaintyEstimate,
         change: f64,
     ) -> SystematicError {
-        let mut found = SystematicError::default();
-        let Some(factor) = &self.refined.pass.with_errors else { return found };
+        let Some(factor) = &self.refined.pass.with_errors else {
+            return SystematicError::default();
+        };
         let mut whole = vec![0.0; errors.len()];
         whole.extend_from_slice(combination);
         let influence = factor.influence(&whole);
         // Rows and errors weigh by the noise of one sample.
         let unit = self.system.sigma_scale.powi(2);
-        for (error, influence) in errors.iter().zip(influence) {
-            let part = unit * influence.abs();
-            found.error = found.error.hypot(part);
-            let SharedError::Calibration { term, .. } = error else {
-                found.compliance = Some(found.compliance.map_or(part, |sum| sum.hypot(part)));
-                continue;
-            };
-            match found.terms.iter_mut().find(|one| one.term == *term) {
-                Some(one) => one.error = one.error.hypot(part),
-                None => found.terms.push(TermError { term: *term, error: part }),
-            }
-        }
+        let parts = influence.iter().map(|influence| unit * influence.abs());
+        let mut found = sum_of_parts(errors, parts);
         let statistical = (estimate.std_error.powi(2) - found.error.powi(2)).max(0.0).sqrt();
         let half = student_t975(estimate.freedom) * statistical;
         found.joint = Some(JointChange { change, statistical, half });

@@ -67,8 +67,14 @@ impl SystematicUncertainty {
             }
             false => "",
         };
+        let doubt = match self.is_contradicted {
+            true => {
+                "; the record contradicts these statements, so either the calibration is wrong or the model does not describe the specimen: check the load cell with known weights, and compare model families"
+            }
+            false => "",
+        };
         format!(
-            "{names} {} a systematic error, stated as one standard uncertainty, which repeats do not reduce ({parts}){beyond}",
+            "{names} {} a systematic error, stated as one standard uncertainty, which repeats do not reduce ({parts}){beyond}{doubt}",
             if is_one { "adds" } else { "add" },
         )
     }
