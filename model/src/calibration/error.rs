@@ -96,7 +96,7 @@ pub enum CalibrationError {
     Tolerance { tolerance_g: f64 },
     /// Straight segments through masses that were not taken.
     #[error(
-        "straight segments through {} do not run from the first to the last weight through measured weights; give masses of the calibration in order", grams(.through_g)
+        "straight segments must begin at the first weight, end at the last and bend only at measured weights, but {} do not; give masses of the calibration in increasing order", grams(.through_g)
     )]
     NoSuchBreak { through_g: Vec<f64> },
     /// A polynomial that turns back or that the points do not determine.

@@ -42,7 +42,9 @@ impl SystematicUncertainty {
                 true => "states nothing about its",
                 false => "state nothing about their",
             };
-            return format!("{names} {states} own errors, so the systematic error is not known");
+            return format!(
+                "{names} {states} own uncertainty, so the systematic uncertainty is not known"
+            );
         };
         let bends = first.compliance.map(|_| "machine compliance".to_owned());
         let is_alike = |pair: &[StatedTerms]| {
@@ -68,7 +70,7 @@ impl SystematicUncertainty {
             false => "",
         };
         format!(
-            "{names} {} a systematic error, stated as one standard uncertainty, which repeats do not reduce ({parts}){beyond}",
+            "{names} {} a systematic standard uncertainty, which repeats do not reduce ({parts}){beyond}",
             if is_one { "adds" } else { "add" },
         )
     }
