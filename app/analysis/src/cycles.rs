@@ -249,7 +249,7 @@ mod tests {
         assert!((source.samples[held].depth.0 - depth - 0.25).abs() < 1e-12);
         assert!((source.own_depth(held).0 - depth).abs() < 1e-12);
         assert!(source.contact_offsets[held - 1].0 == 0.0);
-        assert!(source.notes.iter().any(|note| note.contains("found 2 times")));
+        assert!(source.notes.iter().any(|note| note.contains("2 contact points")));
     }
 
     #[test]

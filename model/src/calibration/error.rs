@@ -63,7 +63,7 @@ pub enum CalibrationError {
     },
     /// Next to no rise between two weights.
     #[error(
-        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or take their steps again"
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or measure both again"
     )]
     TooFlat,
     /// Written by a later version.

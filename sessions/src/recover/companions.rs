@@ -81,7 +81,7 @@ impl CompanionFiles {
                     "its times count from the first sample, which is missing"
                 }
                 AnalysisContent::Recalibration { .. } if !salvage.has_every_decision => {
-                    "its tares may be among the missing decisions"
+                    "the tares that it needs may be among the missing decisions"
                 }
                 AnalysisContent::Fit { .. } => {
                     "it belongs to the samples of the original; fit the recovered session again"
