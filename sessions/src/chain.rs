@@ -37,7 +37,7 @@ pub enum ChainError {
     },
     #[error("{} is incomplete: {}; restore the file from a backup or, to use the recording without this file, move it, {} and the library's catalog elsewhere", path.display(), missing(*found, *written), ChainHead::file_of(path).display())]
     Shortened { path: PathBuf, found: u64, written: u64 },
-    #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere; missing last lines then go unnoticed", path.display())]
+    #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere, although missing last lines are then not detected", path.display())]
     BadHead { path: PathBuf, reason: String },
     #[error("line {line} of {} is {what} of an unknown kind ({detail}); update palpate", path.display())]
     Unknown {

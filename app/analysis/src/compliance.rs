@@ -27,15 +27,15 @@ pub enum ComplianceMeasurementError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "an imported session has no rig and no calibration, so it gives no compliance; run stiff-surface and name that session"
+        "an imported session has no rig and no calibration, so no machine compliance can be computed from it; run stiff-surface and give its session"
     )]
     Imported,
     #[error(
-        "the session found no stiff surface, so it may have pressed tissue; run stiff-surface and name that session"
+        "the session has no contact with a stiff surface and may have pressed tissue; run stiff-surface and give its session"
     )]
     NoSurface,
     #[error(
-        "the session found a stiff surface but did not press it with a known force; run stiff-surface to its end"
+        "the session touched a stiff surface but has no press with a known force; run stiff-surface to its end"
     )]
     NoPress,
     #[error(transparent)]
@@ -110,11 +110,11 @@ pub enum ComplianceCorrectionError {
     )]
     NoneInForce { rig: String },
     #[error(
-        "a table does not say which rig it is from, so its latest compliance is unknown; name the file of a compliance"
+        "a table does not state its rig, so its machine compliance cannot be looked up; give a compliance file"
     )]
     NoRig,
     #[error(
-        "{id} is the compliance of rig {of}, but the record is from rig {rig}; name a compliance of rig {rig}"
+        "{id} is the compliance of rig {of}, but the record is from rig {rig}; give a compliance of rig {rig}"
     )]
     OtherRig { id: String, of: String, rig: String },
 }

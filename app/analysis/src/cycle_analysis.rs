@@ -13,7 +13,7 @@ pub enum CycleAnalysisError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "{} has no loading with at least 20 samples; record a cycle, or name the frequency of a sine", .0.display()
+        "{} has no loading with at least 20 samples; record a full cycle, or give the frequency if the record is a sine", .0.display()
     )]
     NoCycles(PathBuf),
     #[error("cancelled")]

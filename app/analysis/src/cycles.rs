@@ -110,12 +110,12 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
         .collect();
     if left_out > 0 {
         source.notes.push(format!(
-            "{left_out} samples are left out, because the converter was at the end of its range, or an interlock had tripped"
+            "{left_out} samples are excluded, because the converter was saturated or an interlock had tripped"
         ));
     }
     if contacts.len() > 1 {
         source.notes.push(format!(
-            "contact was found {} times; depths count from the first contact",
+            "the session has {} contact points; depths are measured from the first",
             contacts.len()
         ));
     }
@@ -249,7 +249,7 @@ mod tests {
         assert!((source.samples[held].depth.0 - depth - 0.25).abs() < 1e-12);
         assert!((source.own_depth(held).0 - depth).abs() < 1e-12);
         assert!(source.contact_offsets[held - 1].0 == 0.0);
-        assert!(source.notes.iter().any(|note| note.contains("found 2 times")));
+        assert!(source.notes.iter().any(|note| note.contains("2 contact points")));
     }
 
     #[test]

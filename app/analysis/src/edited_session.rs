@@ -164,7 +164,7 @@ fn shifts(entries: &mut [LogEntry], last: u64, edits: &Edits) -> (Vec<Shift>, Ve
             *at = position.0.into();
         }
         notes.push(format!(
-            "contact {number} was corrected from {:.3} mm to {:.3} mm by {} ({}); depths count from the corrected contact",
+            "contact {number} was corrected from {:.3} mm to {:.3} mm by {} ({}); depths are measured from the corrected contact point",
             found.position.0, position.0, edit.by, edit.reason
         ));
     }

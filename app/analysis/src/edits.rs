@@ -227,7 +227,7 @@ fn take_back_one(step: &Step, by: &str) -> Result<Step, String> {
     let (change, reason) = &step.opposite;
     let is_newest = subject.edits.verdict().is_some_and(|(_, edit)| edit.at == step.wrote);
     if matches!(change, EditChange::Verdict { .. }) && !is_newest {
-        return Err("the verdict changed after this edit, so the edit is not undone".into());
+        return Err("the edit cannot be undone, because the verdict was changed after it".into());
     }
     let edit = subject.add_edit(by, reason, change.clone()).map_err(|err| err.to_string())?;
     Ok(Step {

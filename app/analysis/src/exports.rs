@@ -20,7 +20,7 @@ pub enum ExportFailure {
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error(
-        "{} is being recorded, and files of a lake never change; add the session when the run has ended", .0.display()
+        "{} is being recorded, and a lake holds only complete sessions; add the session when the run has ended", .0.display()
     )]
     BeingRecorded(PathBuf),
 }

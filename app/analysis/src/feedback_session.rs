@@ -63,7 +63,7 @@ fn facts(followed: &FeedbackCheck, source: &str) -> Vec<(String, String)> {
         ("speed (mm/s)", settings.speed.0.to_string()),
         ("depth (mm)", settings.depth.0.to_string()),
         ("hold (s)", settings.hold.0.to_string()),
-        ("share of friction made up for", settings.friction_share.to_string()),
+        ("share of friction compensated", settings.friction_share.to_string()),
     ];
     all.map(|(name, value)| (name.to_owned(), value)).into()
 }

@@ -52,9 +52,12 @@ pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
     let options = FitOptions::default();
     let fitted = SourceFit::of(read(source).map_err(|err| err.to_string())?, &options);
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
-    let body = report
-        .kelvin()
-        .ok_or_else(|| format!("the fit of {} is not a modified Kelvin model", source.display()))?;
+    let body = report.kelvin().ok_or_else(|| {
+        format!(
+            "the fit of {} is of another family; haptics need the modified Kelvin model",
+            source.display()
+        )
+    })?;
     let depths = fitted.samples.iter().map(|sample| sample.depth.0);
     let mut notes = fitted.notes;
     notes.extend(report.warnings.iter().cloned());

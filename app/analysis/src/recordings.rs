@@ -28,7 +28,7 @@ pub enum RecordingsError {
     Missing(ReadError),
     #[error("cannot read the folder {} ({reason}); check its permissions", path.display())]
     Folder { path: PathBuf, reason: String },
-    #[error("{} contains neither a session nor a table (.csv or .tsv); name a folder that contains one", .0.display())]
+    #[error("{} contains neither a session nor a table (.csv or .tsv); give a folder that contains one", .0.display())]
     Nothing(PathBuf),
     #[error("{} is a table, not a session", .0.display())]
     Table(PathBuf),
@@ -36,7 +36,7 @@ pub enum RecordingsError {
     Twice(PathBuf),
     #[error("{}: {reason}", path.display())]
     Source { path: PathBuf, reason: Box<SourceError> },
-    #[error("every source is rejected ({0} in total), so no source is left")]
+    #[error("all {0} sources are rejected, so nothing is left to fit")]
     Rejected(usize),
 }
 

@@ -71,7 +71,11 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<BundledFile>, Bund
         to: request.to.display().to_string(),
     };
     bundle.text("versions.txt", "versions and parts of the program", &versions(request))?;
-    bundle.text("findings.txt", "findings of the doctor on the sessions", &request.findings)?;
+    bundle.text(
+        "findings.txt",
+        "results of 'palpate doctor' on the sessions",
+        &request.findings,
+    )?;
     for log in log_files(&log_folder(&request.library)) {
         let name = format!("log/{}", file_name(&log));
         bundle.file(&name, "the program's log", &log)?;

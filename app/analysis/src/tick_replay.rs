@@ -95,7 +95,7 @@ impl ReplayResult {
             lost => format!("the recording lost {lost} ticks"),
         };
         Some(format!(
-            "tick {}: {} is {} and was recorded as {}; {why}",
+            "tick {}: {} is {} now but {} in the recording; {why}",
             first.tick, first.column, first.computed, first.recorded
         ))
     }

@@ -17,10 +17,10 @@ pub struct AnalyseArgs {
     /// Session folders, or delimited tables with columns for time, depth and force
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Depth in mm at which the stiffness is reported; without it 80 % of the first cycle's
+    /// Depth in mm at which the stiffness is reported; without it 80 % of the depth of the first cycle
     #[arg(long, value_name = "MM", value_parser = positive)]
     at: Option<f64>,
-    /// Cycles are steady when peak and shift change by less than so many percent, twice in a row
+    /// Cycles are steady when peak and shift change by less than this percentage, twice in a row
     #[arg(long, value_name = "PERCENT", default_value = "1", value_parser = positive)]
     steady: f64,
     /// Treat a table as one sine of this frequency in Hz; a session has its own
@@ -47,7 +47,7 @@ fn positive(text: &str) -> Result<f64, String> {
 pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     if args.plot.is_some() && args.sources.len() > 1 {
         return Err(Failure::usage(
-            "--plot draws one source; name one source, or leave out --plot",
+            "--plot draws one source; give one source, or leave out --plot",
         ));
     }
     new_file::check("plot", args.plot.as_deref())?;

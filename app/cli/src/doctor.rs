@@ -68,7 +68,7 @@ impl DoctorReport {
         let mut lines: Vec<String> = self.sessions.iter().map(session_text).collect();
         lines.extend(self.leftovers.iter().map(|path| {
             format!(
-                "{} is unfinished, because its program was killed; delete the file, or the next export into this folder deletes it",
+                "{} is unfinished, because the program that wrote it was killed; delete the file, or let the next export into this folder delete it",
                 path.display()
             )
         }));

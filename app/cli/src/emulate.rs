@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// An Arduino Uno's ceramic resonator is rated at 0.5 %: this one is fast by 0.3 %.
 const UNO_CLOCK: f64 = 1.003;
 
-/// Emulate a device on a wire, with the simulated bench behind it
+/// Emulate a device on a serial port or a network, with the simulated rig behind it
 #[derive(Debug, Subcommand)]
 pub enum EmulateCommand {
     /// A Galil DMC controller: axis A the slide with the probe, analog input 1 the load cell
@@ -84,7 +84,7 @@ pub struct GrblArgs {
     /// Load cell on a line of its own
     #[arg(long, default_value = "hx711", value_parser = PossibleValuesParser::new(emulated_cells()))]
     cell: String,
-    /// Link to the pseudo-terminal of the load cell, which it has even with --tcp
+    /// Name of a link to the load cell's pseudo-terminal; the cell has one even with --tcp
     #[arg(long, value_name = "PATH")]
     cell_pty: Option<PathBuf>,
     /// Home switch on the limit pin of the axis, or on the probe pin with limit switches on the limit pin: limit or probe

@@ -16,7 +16,7 @@ use std::num::NonZeroUsize;
 /// Find sessions of the library
 #[derive(Debug, Args)]
 pub struct FindArgs {
-    /// Words, each of which begins some word of the session
+    /// Words to search for; each matches the beginning of a word in the session
     #[arg(value_name = "WORD")]
     words: Vec<String>,
     /// The specimen, exactly

@@ -58,7 +58,7 @@ struct DeviceArgs {
     /// Damping of the device without its motor, in N s/m
     #[arg(long, default_value_t = 0.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "NS_PER_M")]
     damping: f64,
-    /// Coulomb friction of the device in N; without it that of the source's motor
+    /// Coulomb friction of the device in N; without it that of the motor in the source thesis
     #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "N")]
     friction: Option<f64>,
     /// Delay from an encoder count to its force, in ticks

@@ -49,7 +49,7 @@ struct LayoutArgs {
     /// Encoding, such as utf-8, utf-16le or windows-1252
     #[arg(long, value_name = "NAME")]
     encoding: Option<TextEncoding>,
-    /// DecimalSign sign: point or comma
+    /// Decimal sign: point or comma
     #[arg(long, value_name = "SIGN")]
     decimal: Option<DecimalSign>,
     /// Names of all columns in order, where the file has none, as in t_s,depth_mm,force_N

@@ -285,7 +285,7 @@ fn known_fit_failure(err: KnownFitError) -> Failure {
             Failure::usage(format!("{err}; 'palpate fit --json' writes a fit"))
         }
         KnownFitError::Changed(_) => {
-            Failure::failed(format!("{err}; or name another record with --like"))
+            Failure::failed(format!("{err}; or give another record with --like"))
         }
         KnownFitError::Source(err) => source_failure(err),
         KnownFitError::Fit { .. } => Failure::failed(err),

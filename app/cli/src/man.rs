@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Print the manual page, or write one for every command
 #[derive(Debug, Args)]
 pub struct ManArgs {
-    /// Write a page for every command to this folder, and not that of palpate alone to the terminal
+    /// Write a page for every command to this folder, instead of printing the main page
     #[arg(long, value_name = "DIR")]
     to: Option<PathBuf>,
 }

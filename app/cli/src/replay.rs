@@ -58,7 +58,7 @@ pub(super) fn run(
     output.answer("replay", &object, || sessions.iter().map(text).collect::<Vec<_>>().join("\n"));
     if differing > 0 {
         return Err(Failure::failed(format!(
-            "the engine now decides otherwise in {differing} of {} sessions",
+            "the engine now decides differently in {differing} of {} sessions",
             sessions.len()
         )));
     }
@@ -73,7 +73,7 @@ fn show(
 ) -> Result<(), Failure> {
     let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
     let [path] = args.sessions.as_slice() else {
-        return Err(Failure::usage("--window shows one session; name one session"));
+        return Err(Failure::usage("--window shows one session; give one session"));
     };
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
@@ -136,7 +136,7 @@ fn text(replayed: &Replayed) -> String {
         (true, 0) => format!("{} decisions identical", report.decisions),
         (true, blessed) => {
             format!(
-                "{} decisions, {blessed} of them different as blessed.json allows",
+                "{} decisions, {blessed} of them with a difference that blessed.json allows",
                 report.decisions
             )
         }

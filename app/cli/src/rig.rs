@@ -50,7 +50,7 @@ pub struct BenchArgs {
     /// Simulated rig: temperature of its bath, heated from 21 °C, in °C; 0 for none
     #[arg(long, default_value = "0", value_name = "CELSIUS")]
     pub bath: SimBath,
-    /// Simulated rig: when its digital input 1 goes high, in s; 0 for none
+    /// Simulated rig: time at which its digital input 1 goes high, in s; 0 for never
     #[arg(long, default_value = "0", value_name = "SECONDS")]
     pub input: SimInput,
 }
@@ -94,7 +94,7 @@ pub struct RigArgs {
     /// Read forces with this calibration: a name or id of the library, or a file
     #[arg(long, value_name = "NAME|FILE")]
     pub calibration: Option<String>,
-    /// Simulated rig: write what was true, parameters, contact position and the cell's curve, to this new file at the end
+    /// Simulated rig: write the true parameters, contact position and load-cell curve to this new file at the end
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
     /// Session seconds per second, or max

@@ -18,7 +18,7 @@ use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// See and feel a piece of tissue: run a scene, record it, compute a recording again
+/// See and feel a piece of tissue: run a scene, record it, replay a recording
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
     /// Run a scene in real time with a hand on a path, and report the timing of its loop
@@ -42,7 +42,7 @@ pub struct SceneRunArgs {
     /// What the hand does: poke, press, drag or taps
     #[arg(long, default_value = "poke", value_parser = path, value_name = "PATH")]
     path: ScenePath,
-    /// Duration in s, with the path repeated; without it once
+    /// Duration in s, during which the path repeats; without it the path runs once
     #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: Option<f64>,
 }
@@ -67,7 +67,7 @@ pub struct SceneBenchArgs {
     /// A scene file, whose tolerances are planned for; without one those of the built-in scene
     #[arg(value_name = "SCENE.toml")]
     file: Option<PathBuf>,
-    /// Meshes up to 801 nodes a side against 1601, and every family; without it up to 201 against 401
+    /// Compare meshes up to 801 nodes a side with one of 1601, for every family; without it up to 201 with one of 401
     #[arg(long)]
     full: bool,
 }

@@ -24,7 +24,7 @@ pub struct SelectArgs {
     /// percent of what a hand notices (10%jnd)
     #[arg(long, value_name = "ERROR")]
     tolerance: Option<String>,
-    /// What is held out and predicted: auto (each record in turn; of one record its last part),
+    /// What is held out and predicted: auto (each record in turn, or the last part of a single record),
     /// speed, depth, specimen or none
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     hold_out: String,

@@ -45,7 +45,7 @@ pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
     }
     if sessions.is_empty() || (add.is_empty() && remove.is_empty()) {
         return Err(Failure::usage(
-            "name sessions and tags, as in 'palpate tag demo +good -doubtful'",
+            "give sessions and tags, as in 'palpate tag demo +good -doubtful'",
         ));
     }
     let by = author(args.by.as_deref());

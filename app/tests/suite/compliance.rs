@@ -98,7 +98,7 @@ fn what_tells_no_compliance_is_refused() {
     }
     fs::write(at.join("table.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,1,1\n2,2,2\n").unwrap();
     let table = palpate(at, &["fit", "table.csv", "--compliance", "last"]);
-    assert_refused(&table, 2, "which rig");
+    assert_refused(&table, 2, "does not state its rig");
     // A document of another rig, and one that was changed by hand.
     stiff_surface(at);
     let kept = json(&palpate(at, &["compliance", "stiff", "--save", "--json"]));

@@ -97,7 +97,7 @@ fn one_family_in_words_and_an_unknown_one() {
     succeeded(&run);
     let text = stdout(&run);
     assert!(text.contains("9 right, 0 refused"), "{text}");
-    assert!(text.contains("closest") && !text.contains("WRONG "), "{text}");
+    assert!(text.contains("relative to its tolerance") && !text.contains("WRONG "), "{text}");
 
     let run = palpate(at, &["extremes", "--family", "burgers"]);
     assert_refused(&run, 2, "'burgers'");

@@ -183,7 +183,7 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
         (&["ramp-hold", "--set", "hold=5"], "5 has no unit"),
         (&["ramp-hold", "--hold-until", "tau"], "'tau'"),
         (&["load-cell-calibration", "--depth", "5"], "parameter 'depth'"),
-        (&["--hold", "5"], "name a protocol"),
+        (&["--hold", "5"], "give the name of a protocol"),
     ] {
         let refused = palpate(at, &[&["run"], more].concat());
         assert_eq!(refused.status.code(), Some(2));

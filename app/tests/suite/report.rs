@@ -249,9 +249,9 @@ fn figures_are_drawn_and_wrong_use_is_reported() {
     let part = ["report", "press", "--figure", "part.svg", "--from", "70", "--until", "71"];
     succeeded(&palpate(at, &part));
     for (words, printed) in [
-        (&["report"][..], "name a session"),
+        (&["report"][..], "give a session"),
         (&["report", "press", "press"], "one session"),
-        (&["report", "--html", "p.html"], "name the sessions"),
+        (&["report", "--html", "p.html"], "give the sessions"),
         (&["report", "press", "--figure", "a.gif"], "has no known file type"),
         (&["report", "press", "--figure", "a.svg", "--from", "2", "--until", "1"], "not before"),
         (

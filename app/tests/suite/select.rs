@@ -137,7 +137,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let specimen = ["--hold-out", "specimen"];
     let nameless = palpate(at, &[&args[..], &specimen].concat());
     assert_eq!(nameless.status.code(), Some(2));
-    assert!(stdout(&nameless).contains("does not name"));
+    assert!(stdout(&nameless).contains("does not state its specimen"));
     let few = [&args[..], &specimen, &["--specimens", "A,B"]].concat();
     assert_eq!(palpate(at, &few).status.code(), Some(2));
     let named = [&args[..], &specimen, &["--specimens", "A,A,B,B"]].concat();

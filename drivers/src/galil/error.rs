@@ -46,7 +46,7 @@ impl GalilError {
             }
             E::RECORDING => "end the recording with RC 0",
             E::NOT_FOR_STEPPER => {
-                "set the axis up as a stepper: check the motor_type of the rig file and the SM jumper"
+                "this command is for servo axes, and palpate drives stepper axes only; report this error with the log"
             }
             E::NO_ANALOG => {
                 "this controller has no analog inputs; read the cell with another device"

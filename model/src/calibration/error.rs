@@ -63,7 +63,7 @@ pub enum CalibrationError {
     },
     /// Next to no rise between two weights.
     #[error(
-        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or take their steps again"
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or measure both again"
     )]
     TooFlat,
     /// Written by a later version.
@@ -96,7 +96,7 @@ pub enum CalibrationError {
     Tolerance { tolerance_g: f64 },
     /// Straight segments through masses that were not taken.
     #[error(
-        "straight segments through {} do not run from the first to the last weight through measured weights; give masses of the calibration in order", grams(.through_g)
+        "straight segments must begin at the first weight, end at the last and bend only at measured weights, but {} do not; give masses of the calibration in increasing order", grams(.through_g)
     )]
     NoSuchBreak { through_g: Vec<f64> },
     /// A polynomial that turns back or that the points do not determine.

@@ -51,7 +51,7 @@ impl RigDescription {
     fn aliasing(&self, rate: f64) -> String {
         let nyquist = 0.5 * rate;
         let mut sentence = format!(
-            "without a filter all above {nyquist:.0} Hz appears below it, such as the steps of the motor from {:.2} mm/s on",
+            "without a filter, signals above {nyquist:.0} Hz are aliased, such as the steps of the motor from {:.2} mm/s on",
             nyquist * self.mm_per_pulse
         );
         for mains in MAINS_HZ {
@@ -62,7 +62,7 @@ impl RigDescription {
                 .find(|(_, seen)| *seen < SLOW_HZ);
             if let Some((hz, seen)) = worst {
                 sentence += &format!(
-                    "; {hz:.0} Hz, a harmonic of {mains:.0} Hz mains, would be seen at {seen:.1} Hz"
+                    "; {hz:.0} Hz, a harmonic of the {mains:.0} Hz mains, would be aliased to {seen:.1} Hz"
                 );
             }
         }

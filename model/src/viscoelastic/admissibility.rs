@@ -50,12 +50,15 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
     let cases = [
         (
             unstable_bands(body),
-            "the elastic force falls with depth {bands}; this body is unstable there under force control",
+            "the elastic force of the model falls with depth {bands}, so the model is unstable there under force control",
         ),
-        (active_cycles(body), "a small slow cycle around depths {bands} returns energy"),
+        (
+            active_cycles(body),
+            "in a small slow cycle at depths {bands}, the model returns more energy than it receives",
+        ),
         (
             active_pokes(body),
-            "a step from the surface to depths {bands} does not relax, and a slow poke returns energy",
+            "after a step from the surface to depths {bands}, the model does not relax; in a slow press to these depths and back, it returns more energy than it receives",
         ),
     ];
     cases

@@ -27,7 +27,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "brake",
             QuantityKind::Force,
-            "force that remains to the target when the speed falls to a tenth; at a tenth of this force the speed falls to a hundredth",
+            "the speed falls to a tenth when the force is this close to the target, and to a hundredth at a tenth of this distance",
         ),
     ],
     build: Some(|args| {

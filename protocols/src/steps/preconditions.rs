@@ -50,7 +50,7 @@ impl Need {
                 "keeps the force of the probe on the tissue, but the probe does not press yet; put { do = \"load\", to = \"1 N\", ... } before it"
             }
             Self::Specimen => {
-                "would run into the base, because no specimen is mounted; clip a specimen in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
+                "would run into the base, because no specimen is mounted; put { do = \"prompt\", message = \"...\", mount = 1 } before it to have a specimen mounted, or use { do = \"find-base\" } to find the base"
             }
             Self::Outside => {
                 "needs the probe outside the tissue; put { do = \"retract\" } before it"

@@ -185,7 +185,7 @@ fn skipped_rows_are_counted_and_gaps_are_reported() {
         ["2 rows without a value", "line 52"],
         ["2 rows with the time", "line 53"],
         ["1 rows with decreasing time", "line 55"],
-        ["1 gaps: no row follows line 51", "0.600000 s"],
+        ["1 time step(s)", "after line 51, is 0.600000 s"],
     ];
     assert_eq!(part.imported.remarks.len(), expected.len());
     for (remark, facts) in part.imported.remarks.iter().zip(expected) {

@@ -196,7 +196,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     let verdict = DataQuality::Suspect;
     subject.add_edit("Mary", "not that bad", EditChange::Verdict { verdict }).unwrap();
     flow.click("Undo: verdict rejected on 1 session");
-    flow.wait_for_words("the verdict changed after this edit");
+    flow.wait_for_words("the verdict was changed after it");
     assert_eq!(edits(&sessions[20]).verdict().unwrap().0, DataQuality::Suspect);
     flow.wait_for_words("suspect: not that bad");
 }

@@ -120,7 +120,7 @@ fn the_extremes_are_tested_in_the_window() {
     flow.wait("progress", |window| screen_of::<ExtremesScreen>(window).rows().is_none());
     flow.wait("the rows", |window| screen_of::<ExtremesScreen>(window).rows().is_some());
     flow.window.run_steps(3);
-    assert!(flow.says("every case gives the right number or a refusal with its reason"));
+    assert!(flow.says("every case gives a correct result or an error message with the reason"));
     assert!(screen_of::<ExtremesScreen>(&flow.window).rows().unwrap().len() > 100);
     flow.window.check_accessibility();
 }
@@ -165,7 +165,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
         assert!(flow.says(sentence), "{sentence}");
     }
     for words in [
-        "the body's lag",
+        "relaxation of the model",
         "the device has 0.50 N s/m",
         "the model itself returns energy",
         "without guards: limit cycle",

@@ -51,7 +51,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     flow.wait("a force", |window| {
         felt(window).is_some_and(|(depth, force)| depth > 2.0 && force > 0.05)
     });
-    assert!(flow.says("the path leads the hand"));
+    assert!(flow.says("the path moves the hand"));
     assert!(!flow.says(NoForceReason::NoContact.name()));
     flow.window.check_accessibility();
     // Nothing else that keeps time is started beside it.
@@ -162,7 +162,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     flow.click("Replay recording");
     flow.wait("the difference", |window| replayed(window) == Some(Ok(false)));
     flow.window.run_steps(3);
-    assert!(flow.says("and was recorded as"));
+    assert!(flow.says(" in the recording; "));
     let ticks = folder.join("ticks.csv");
     let lines = std::fs::read_to_string(&ticks).unwrap();
     std::fs::write(&ticks, lines.replacen("\n10,", "\n11,", 1)).unwrap();

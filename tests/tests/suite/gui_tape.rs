@@ -122,7 +122,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let elsewhere = elsewhere.map(|line| line.replace(",30.0,", ",-2.0,"));
     write(&folder, &elsewhere.collect::<Vec<_>>());
     flow.click("Replay recording");
-    flow.wait_for_words("was recorded as");
+    flow.wait_for_words(" in the recording; ");
     write(&folder, &whole);
 
     // Another kind is refused and not misread, and goes to its own screen when it is dropped.

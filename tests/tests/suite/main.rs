@@ -39,3 +39,4 @@ mod trade;
 mod unloading;
 mod wait_until;
 mod wired;
+mod wording;

@@ -30,7 +30,8 @@ pub fn budget_lines(parameters: &[FittedParameter]) -> Vec<String> {
     lines.insert(0, "sources of the uncertainty, in shares of the variance".to_owned());
     let remedies = largest.into_iter().filter_map(|source| Some((source, remedy(source)?)));
     lines.extend(
-        remedies.map(|(source, remedy)| format!("- to reduce the part of {source}, {remedy}")),
+        remedies
+            .map(|(source, remedy)| format!("- to reduce the contribution of {source}, {remedy}")),
     );
     lines
 }

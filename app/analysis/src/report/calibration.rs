@@ -228,7 +228,10 @@ fn curves(calibration: &Calibration, details: &CalibrationDetails) -> String {
             format!("{mark}{through}"),
         ]
     });
-    table("curve | left out, rms (N) | worst (N) | ends, rms (N) | residuals, rms (mN) | ", rows)
+    table(
+        "curve | leave-one-out, rms (N) | leave-one-out, worst (N) | end weights left out, rms (N) | residuals, rms (mN) | ",
+        rows,
+    )
 }
 
 fn spread(quality: &CalibrationQuality) -> String {

@@ -64,7 +64,7 @@ pub fn text(rows: &[ExtremesRow]) -> String {
             one.group
         ));
         if let Some(tightest) = one.tightest {
-            lines.push(format!("  closest to its tolerance: {tightest}"));
+            lines.push(format!("  largest error relative to its tolerance: {tightest}"));
         }
     }
     let wrong = rows.iter().filter(|row| row.verdict == ExtremesVerdict::Wrong);
@@ -77,7 +77,7 @@ pub fn text(rows: &[ExtremesRow]) -> String {
 #[must_use]
 pub fn page(rows: &[ExtremesRow]) -> String {
     let mut page = format!("{PAGE_HEAD}{INTRODUCTION}");
-    page += "| group | right | refused | flagged | wrong | closest to its tolerance |\n|---|---|---|---|---|---|\n";
+    page += "| group | right | refused | flagged | wrong | largest error relative to its tolerance |\n|---|---|---|---|---|---|\n";
     for one in summary(rows) {
         let [right, refused, flagged, wrong] = one.counts;
         let (group, tightest) = (one.group, one.tightest.unwrap_or_default());

@@ -154,7 +154,10 @@ impl Traces {
     pub fn limit_above(&self) -> String {
         match (self.limit, limit_in_reach(self)) {
             (Some(limit), None) => {
-                format!(" The interlock limit of {:.1} N is above the figure.", limit.0)
+                format!(
+                    " The interlock limit of {:.1} N lies above the range of the figure.",
+                    limit.0
+                )
             }
             _ => String::new(),
         }
@@ -259,7 +262,7 @@ fn lines(of: &[Vec<[f64; 2]>], ink: Ink, dash: f64) -> impl Iterator<Item = Plot
 }
 
 fn force_plot(x: PlotAxis, series: Vec<PlotSeries>) -> Plot {
-    let remark = series.is_empty().then(|| "no force is known here".to_owned());
+    let remark = series.is_empty().then(|| "no force is known in this part".to_owned());
     Plot { remark, ..Plot::new("", x, PlotAxis::linear("force (N)")).with(series) }
 }
 

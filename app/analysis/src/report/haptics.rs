@@ -42,10 +42,10 @@ pub fn tried_text(tried: &SimulatedTrial) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
     let buzz = match (tried.buzz, tried.buzz_until_s) {
         (Some((frequency, amplitude)), Some(until)) => format!(
-            "the device buzzes in {:.0} % of the hold, until {until:.2} s after the hand arrived, by up to {amplitude:.3} mm at {frequency:.0} Hz",
+            "limit cycle in {:.0} % of the hold, until {until:.2} s after the hand arrived, amplitude up to {amplitude:.3} mm at {frequency:.0} Hz",
             100.0 * tried.buzz_share
         ),
-        _ => "no buzz".to_owned(),
+        _ => "no limit cycle".to_owned(),
     };
     let returned = match tried.energy_min_mj < 0.0 {
         true => format!(
@@ -80,10 +80,12 @@ pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
 pub fn margin_text(margin: &Margin) -> String {
     let depth = margin.depth;
     match margin.ratio() {
-        None => format!("At a depth of {depth:.2} the body brings all the damping it needs."),
+        None => format!(
+            "At a depth of {depth:.2} the model itself dissipates enough energy; the device needs no damping."
+        ),
         Some(ratio) if margin.is_enough() => {
             format!(
-                "At a depth of {depth:.2} the device has {ratio:.1} times the damping that it needs."
+                "At a depth of {depth:.2} the device has {ratio:.1} times the damping it needs."
             )
         }
         Some(ratio) => format!(
@@ -130,7 +132,7 @@ pub fn slave_text(slaved: &SlaveReport) -> String {
     ));
     if let Some(through) = slaved.damping_through_slave {
         lines.push(format!(
-            "damping: at the greatest depth the device has {:.1} N s/m and needs {:.1} N s/m; with the force through the slave it would need {through:.1} N s/m, so the handle renders the force of the model at the master's position",
+            "damping: at the greatest depth the device has {:.1} N s/m and needs {:.1} N s/m; a force computed from the slave's position would need {through:.1} N s/m, so the handle renders the model force at the master's position",
             slaved.damping_has,
             slaved.damping_needed.max(0.0)
         ));
@@ -213,9 +215,9 @@ pub fn follow_text(followed: &FeedbackCheck) -> String {
 /// The cause of the difference between the fits of measured and commanded force.
 fn difference(followed: &FeedbackCheck) -> &'static str {
     if followed.settings.friction_share > 0.0 {
-        "the drive compensates friction only while the rack moves: the measured force steps as the hold begins, and its fit interprets the step as relaxation"
+        "the drive compensates friction only while the rack moves: the measured force steps when the hold begins, and the fit takes this step for relaxation"
     } else {
-        "friction and drag oppose the moving rack with a constant force, and friction remains in the hold: the fit finds this force as f_offset, and the body stays nearly unchanged"
+        "friction and drag add a constant force while the rack moves, and friction remains during the hold: the fit reports this force as f_offset, and the other parameters hardly change"
     }
 }
 
@@ -240,7 +242,7 @@ fn fits_beside_the_body(followed: &FeedbackCheck) -> String {
         row("tau_sig", body.tau_sig, "N·s/mm²"),
         row("f_offset", 0.0, "N"),
     ];
-    table(" | body | fit of the commanded | fit of the measured force | ", rows)
+    table(" | model | fit of the commanded force | fit of the measured force | ", rows)
 }
 
 /// A check of the feedback as a picture: forces over time, and one over the other.
@@ -314,7 +316,7 @@ mod tests {
             friction_needed: Newtons(0.0),
             friction: Newtons(0.0),
         };
-        assert!(margin_text(&margin(-0.1, 0.0)).contains("all the damping"));
+        assert!(margin_text(&margin(-0.1, 0.0)).contains("needs no damping"));
         assert!(margin_text(&margin(0.002, 0.008)).contains("4.0 times"));
         assert!(margin_text(&margin(0.002, 0.001)).contains("0.50 times"));
     }

@@ -60,7 +60,7 @@ fn level(at: f64) -> PlotLevel {
     PlotLevel { name: "limit".to_owned(), at, ink: Ink::Alarm, is_dashed: false }
 }
 
-pub const PLAN_CAPTION: &str = "expected for the pig stomach of the source thesis; the band spans the softest to the stiffest specimen; on a base, the rig compliance is 30 µm/N";
+pub const PLAN_CAPTION: &str = "predicted for the pig stomach of the source thesis; the band spans the softest to the stiffest specimen; pressing on the base assumes a machine compliance of 30 µm/N";
 
 #[must_use]
 pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
@@ -102,7 +102,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     }
     let mut svg = titled(
         name,
-        "expected durations: moves and waits are known, searches and operator actions vary",
+        "predicted durations: moves and waits are exact, searches and operator actions are estimates",
     );
     let (top, look): (f64, AxisColours) = (66.0, look());
     let bottom = top + ROW * phases.len() as f64;

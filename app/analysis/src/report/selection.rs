@@ -112,7 +112,7 @@ pub fn tested(selection: &ModelSelection) -> String {
             });
             let kinds: Vec<String> = kinds.collect();
             format!(
-                "Held out: each of {} records is predicted by the body fitted to other records ({}). The sensor offset is fitted to the predicted record; in 'scaled', a factor on the body is fitted as well.",
+                "Held out: a fit to the other records predicts each of {} records ({}). Only the sensor offset is fitted to the predicted record; for 'scaled', a common factor of the model force is fitted too.",
                 prediction.records.len(),
                 kinds.join(", ")
             )
@@ -122,7 +122,7 @@ pub fn tested(selection: &ModelSelection) -> String {
         .tolerance_n
         .map_or(String::new(), |tolerance| format!(" Tolerance: {} mN.", digits(1e3 * tolerance)));
     format!(
-        "{what}{tolerance} The criteria count {:.0} independent samples among {} samples.",
+        "{what}{tolerance} The criteria use an effective sample size of {:.0} for {} autocorrelated samples.",
         selection.effective_samples, selection.samples
     )
 }

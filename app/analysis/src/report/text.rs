@@ -92,7 +92,7 @@ pub(super) fn equation(report: &FitReport) -> Option<&'static str> {
 
 pub(super) fn limit(report: &FitReport) -> Option<String> {
     let family = find_family(&report.body.family).ok()?;
-    Some(format!("it cannot represent {}", family.cannot_represent()))
+    Some(format!("the model cannot represent {}", family.cannot_represent()))
 }
 
 /// A whole fit, of every family the same: model, equation, parameters, how good it is, every sentence, further intervals.
@@ -295,7 +295,7 @@ mod tests {
             "energy 0.000 N·mm measured, 0.000 fitted; largest residual 0.0 mN",
             "- beware",
             "- found",
-            "- it cannot represent an equilibrium force other than zero; stiffness that grows with depth; unloading that differs from loading",
+            "- the model cannot represent an equilibrium force other than zero; stiffness that grows with depth; unloading that differs from loading",
         ];
         assert_eq!(fit_text(&report, details), lines.join("\n"));
     }

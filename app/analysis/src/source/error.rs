@@ -15,7 +15,7 @@ pub enum SourceError {
     Analysis(#[from] AnalysisError),
     #[error("the session was rejected ({reason}) and is not used")]
     Rejected { reason: String },
-    #[error("a table has no analyses, so it has no analysis '{name}'; name a session")]
+    #[error("a table has no analyses, so it has no analysis '{name}'; give a session")]
     TableAnalysis { name: String },
     #[error(transparent)]
     Table(#[from] TableError),

@@ -158,7 +158,7 @@ pub fn of_session(
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
     if censored > 0 {
         notes.push(format!(
-            "{censored} samples count only by their depth, because the converter was at the end of its range, an interlock had tripped, the probe had left the tissue, or a mask excludes them"
+            "the fit uses the depth but not the force of {censored} samples, because the converter was saturated, an interlock had tripped, the probe had left the tissue, or a mask excludes them"
         ));
     }
     let rig = session.manifest.rig.map(|rig| rig.name);

@@ -108,7 +108,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
 fn families(out: &mut String, curves: &TradeCurves) {
     let _ = writeln!(
         out,
-        "\nfamilies: time of a step at any rate, and largest error in percent of the peak force of the body approximated\n{:34}{:>10}  {:>7} {:>10}",
+        "\nfamilies: time of a step at any rate, and largest error in percent of the peak force of the approximated model\n{:34}{:>10}  {:>7} {:>10}",
         "", "a step", "spread", "error"
     );
     let mut target = "";

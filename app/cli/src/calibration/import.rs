@@ -41,7 +41,7 @@ pub struct CalibrationImportArgs {
     /// When it was taken, such as 2026-03-05T14:15:00Z; now, for a table without it
     #[arg(long, value_name = "TIME")]
     taken_at: Option<String>,
-    /// Tolerance in g of each weight; each mass more than the one before counts as one weight laid on it
+    /// Tolerance in g of each weight; each increase of mass counts as one added weight
     #[arg(long, value_name = "G")]
     tolerance: Option<f64>,
     /// Resolution of the readings in V

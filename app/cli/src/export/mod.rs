@@ -57,8 +57,8 @@ pub struct ExportArgs {
     /// Only every N-th of the selected samples, without averaging; the file name states N
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
     decimate: Option<u64>,
-    /// Write the session as this analysis reads it: with another calibration, or with stretches
-    /// excluded, whose forces are empty
+    /// Apply this analysis of the session: its calibration and its excluded stretches, whose
+    /// forces are left empty
     #[arg(long, value_name = "NAME")]
     analysis: Option<String>,
     /// Add depths corrected for machine compliance to the raw ones: last for the compliance in force
@@ -139,7 +139,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     }
     let [session] = args.sessions.as_slice() else {
         return Err(Failure::usage(
-            "a table holds one session; name one session, or add several sessions to a lake with --lake FOLDER",
+            "a table holds one session; give one session, or add several sessions to a lake with --lake FOLDER",
         ));
     };
     let selection = args.selection()?;

@@ -18,7 +18,7 @@ pub(super) fn run(
     found.note().iter().for_each(|note| output.note(note));
     if shared.is_some() && found.paths.len() < 2 {
         return Err(Failure::usage(
-            "--share needs at least two recordings; name each recording, or their folder",
+            "--share needs at least two recordings; give each recording, or their folder",
         ));
     }
     let reading = RecordingOptions {

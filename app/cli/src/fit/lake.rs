@@ -90,7 +90,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
     ];
     match others.iter().find(|(_, is_given)| *is_given) {
         Some((name, _)) => Err(Failure::usage(format!(
-            "{name} does not apply to a lake; name a single session, or leave out {name}"
+            "{name} does not apply to a lake; give a single session, or leave out {name}"
         ))),
         None => Ok(()),
     }
@@ -100,7 +100,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
 fn hash_file(file: &str) -> Result<String, Failure> {
     sha256_of_file(Path::new(file)).map_err(|err| {
         Failure::usage(format!(
-            "--compliance {file} is not a readable file ({err}); name a file, so that every machine fits the lake with the same compliance"
+            "--compliance {file} is not a readable file ({err}); give a file, so that every machine fits the lake with the same compliance"
         ))
     })
 }

@@ -43,8 +43,8 @@ pub struct FitArgs {
     /// Draw the fit, or the reason of its failure, as a new SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Fit all sources together with these parameters the same in all, as in tau_eps,mu1;
-    /// body stands for the five of the tissue
+    /// Fit all sources together with these parameters in common, as in tau_eps,mu1;
+    /// 'body' stands for the five parameters of the tissue
     #[arg(long, value_name = "NAMES", conflicts_with = "picture")]
     share: Option<String>,
     /// Fit another model family, such as maxwell, prony-2 or unloading-3: one model for all sources unless --share
@@ -54,16 +54,16 @@ pub struct FitArgs {
     /// With --family: fit every source by itself
     #[arg(long, requires = "family", conflicts_with = "share")]
     each: bool,
-    /// With --family: take the recorded unloading of sessions as well
+    /// With --family: fit the recorded unloading of sessions too
     #[arg(long)]
     unload: bool,
     /// Add 95 % intervals from the profile likelihood
     #[arg(long)]
     profile: bool,
-    /// Add 95 % intervals from this many fits to residuals shuffled in blocks
+    /// Add 95 % intervals from a block bootstrap of this many repeats
     #[arg(long, value_name = "N")]
     bootstrap: Option<usize>,
-    /// Seed of the bootstrap, 1 without it
+    /// Seed of the bootstrap; without it 1
     #[arg(long, value_name = "SEED")]
     seed: Option<u64>,
     /// Leave out the systematic component of the calibration from the intervals of a session
@@ -72,7 +72,7 @@ pub struct FitArgs {
     /// Include rejected sessions
     #[arg(long)]
     include_rejected: bool,
-    /// Read a session as this analysis does: with another calibration, or with stretches excluded
+    /// Apply this analysis of the session: its calibration and its excluded stretches
     #[arg(long, value_name = "NAME", conflicts_with = "share")]
     analysis: Option<String>,
     /// Save the fit as an analysis of this name with its session
@@ -87,7 +87,7 @@ pub struct FitArgs {
     /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
     #[arg(long, value_name = "I/N", conflicts_with = "share")]
     shard: Option<Shard>,
-    /// Sources fitted at a time; as many as the computer has processors without it
+    /// Number of sources fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
 }
@@ -132,7 +132,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         return lake::run(lake, args, &recipe, output);
     }
     if args.shard.is_some() {
-        return Err(Failure::usage("--shard needs a lake; name one lake, or leave out --shard"));
+        return Err(Failure::usage("--shard needs a lake; give one lake, or leave out --shard"));
     }
     if let Some(shared) = &args.share {
         return joint::run(args, Some(shared), &recipe, output);
@@ -144,7 +144,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.picture.is_some() || args.save.is_some() || args.analysis.is_some() {
         return Err(Failure::usage(
-            "--picture, --save and --analysis apply to one record; name a single session or table",
+            "--picture, --save and --analysis apply to one record; give a single session or table",
         ));
     }
     if args.family.is_some() && !args.each {
@@ -152,7 +152,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.profile || args.bootstrap.is_some() {
         return Err(Failure::usage(
-            "--profile and --bootstrap work on one fit; name a single session or table, or fit several together with --share",
+            "--profile and --bootstrap work on one fit; give a single session or table, or fit several together with --share",
         ));
     }
     let found = recordings::find(&args.sources).map_err(sources_failure)?;

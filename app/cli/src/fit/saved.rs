@@ -11,7 +11,7 @@ use std::path::Path;
 pub(super) fn check(args: &FitArgs, source: &Path) -> Result<(), Failure> {
     match (&args.save, source.is_dir()) {
         (Some(name), false) => Err(Failure::usage(format!(
-            "analysis '{name}' cannot be saved, because {} is not a session folder; name a session folder",
+            "analysis '{name}' cannot be saved, because {} is not a session folder; give a session folder",
             source.display()
         ))),
         _ => Ok(()),

@@ -21,10 +21,10 @@ pub struct PlanArgs {
     /// Model and noise: a session, a table, or the output of 'palpate fit --json'; without it the last fit
     #[arg(long, value_name = "SESSION|TABLE|FIT.json")]
     like: Option<PathBuf>,
-    /// Noise that is independent from sample to sample, in mN; without it that of the fit
+    /// White noise in mN, independent from sample to sample; without it the white noise of the fit
     #[arg(long, value_name = "MN")]
     noise_mn: Option<f64>,
-    /// Slow noise on top: standard deviation in mN and correlation time in s
+    /// Autocorrelated noise in addition: standard deviation in mN and correlation time in s
     #[arg(long, value_name = "SD_MN,SECONDS")]
     memory: Option<String>,
     /// A parameter that is known and need not be fitted, f0 or f_offset; may be repeated
@@ -36,7 +36,7 @@ pub struct PlanArgs {
     /// Depth from contact in mm
     #[arg(long, value_name = "MM", default_value = "30")]
     depth: f64,
-    /// Highest force in N; without it what leaves a specimen a third stiffer below the interlock
+    /// Highest force in N; without it chosen so that a specimen a third stiffer stays below the interlock limit
     #[arg(long, value_name = "N")]
     force_max: Option<f64>,
     /// Fastest speed in mm/s; without it the rig's
@@ -51,7 +51,7 @@ pub struct PlanArgs {
 }
 
 const GUESS: &str =
-    "the fit determines tau_eps poorly, so the plan is uncertain; name a better record with --like";
+    "the fit determines tau_eps poorly, so the plan is uncertain; give a better record with --like";
 
 pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     let request = PlanRequest {

@@ -45,7 +45,7 @@ pub(super) fn run(
 ) -> Result<(), Failure> {
     if !values.is_empty() {
         return Err(Failure::usage(
-            "a programme takes its values from its file; change the values there",
+            "--set does not apply to a programme; change the values in its file",
         ));
     }
     let text = read(file).map_err(Failure::usage)?;

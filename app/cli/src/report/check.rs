@@ -33,7 +33,7 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
         named.iter().find(|(_, id)| by_session.keys().all(|(known, _)| known != id))
     {
         return Err(Failure::usage(format!(
-            "the page does not describe {} (session {id}); name only sessions that the page describes",
+            "the page does not describe {} (session {id}); give only sessions that the page describes",
             path.display()
         )));
     }
@@ -76,10 +76,10 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
             "the page was changed after it was made; make a new page from the sessions",
         )),
         (_, count) => Err(Failure::failed(format!(
-            "{} not as the page describes; make a new page, or restore the files from a backup",
+            "{} from what the page describes; make a new page, or restore the files from a backup",
             match count {
-                1 => "1 file is".to_owned(),
-                _ => format!("{count} files are"),
+                1 => "1 file differs".to_owned(),
+                _ => format!("{count} files differ"),
             }
         ))),
     }

@@ -35,13 +35,13 @@ pub struct ReportArgs {
     /// With --figure, which one
     #[arg(long, value_parser = choice(&FIGURES), default_value = "force-time", requires = "figure")]
     of: SessionFigure,
-    /// With --figure, draw from here on: s since the first sample
+    /// With --figure, start of the time axis, in s since the first sample
     #[arg(long, value_name = "S", value_parser = parse_number, requires = "figure", allow_negative_numbers = true)]
     from: Option<f64>,
-    /// With --figure, draw to here: s since the first sample
+    /// With --figure, end of the time axis, in s since the first sample
     #[arg(long, value_name = "S", value_parser = parse_number, requires = "figure")]
     until: Option<f64>,
-    /// With --html or --figure, read the sessions as this analysis of theirs does
+    /// With --html or --figure, apply this analysis of the sessions
     #[arg(long, value_name = "NAME", conflicts_with = "check")]
     analysis: Option<String>,
     /// Compare the files that a page describes with those of the sessions named, or of those in its folder
@@ -70,9 +70,9 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
     }
     let [session] = args.sessions.as_slice() else {
         return Err(Failure::usage(match args.sessions.len() {
-            0 => "name a session, or a page with --check",
+            0 => "give a session, or a page with --check",
             _ => {
-                "a report covers one session; name one session, or compare several on a page with --html FILE"
+                "a report covers one session; give one session, or compare several on a page with --html FILE"
             }
         }));
     };
@@ -113,7 +113,7 @@ fn fidelity(session: &Path, output: &Output) -> Result<(), Failure> {
 
 fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
     if args.sessions.is_empty() {
-        return Err(Failure::usage("name the sessions that the page is about"));
+        return Err(Failure::usage("give the sessions that the page is about"));
     }
     new_file::check("page", Some(to))?;
     let wanted: Vec<SessionReading> = args

@@ -127,7 +127,9 @@ pub(super) struct SessionArgs {
 
 pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
-        return Err(Failure::usage("name a protocol; 'palpate protocol list' lists them"));
+        return Err(Failure::usage(
+            "give the name of a protocol; 'palpate protocol list' lists the names",
+        ));
     };
     let (options, values) = (&args.session, args.values()?);
     if programme::is_programme(name) {

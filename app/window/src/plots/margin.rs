@@ -65,9 +65,9 @@ pub fn margin_ui(ui: &mut Ui, picture: &MarginPicture<'_>) {
 /// Names and inks of what asks for damping, each with its edge above the one before.
 type Part = (&'static str, Ink, fn(&MarginPoint) -> f64);
 const PARTS: [Part; 3] = [
-    ("the body's lag", Ink::Session(3), |one| one.lag),
-    ("the tick", Ink::Session(1), |one| one.tick),
-    ("the delay", Ink::Session(0), |one| one.delay),
+    ("relaxation of the model", Ink::Session(3), |one| one.lag),
+    ("period of the loop", Ink::Session(1), |one| one.tick),
+    ("delay of the loop", Ink::Session(0), |one| one.delay),
 ];
 
 /// What is needed between two depths in mm.

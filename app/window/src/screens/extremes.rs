@@ -13,7 +13,7 @@ use palpate_rheology::extremes::{ExtremesExtent, ExtremesRow, ExtremesVerdict};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
-    purpose: "results of every family, integrator and fit at the ends of every range",
+    purpose: "numerical stability of every family, integrator and fit at extreme inputs",
     key: Key::Num8,
     open: |_| Box::new(ExtremesScreen::default()),
 };
@@ -59,7 +59,7 @@ impl Screen for ExtremesScreen {
         section_ui(ui, "Test");
         ui.add(
             Label::new(
-                "Every family, integrator and fit at the ends of every range: each case must give the right number or a refusal that names the reason.",
+                "The test runs every model family, integrator and fit with the smallest and largest values of every input. A case passes if its result is correct, or if an error message states why there is none.",
             )
             .wrap(),
         );
@@ -111,7 +111,7 @@ impl Screen for ExtremesScreen {
         let wrong: usize = found.groups.iter().map(|one| one.counts[3]).sum();
         let (text, ink) = match wrong {
             0 => (
-                "every case gives the right number or a refusal with its reason".to_owned(),
+                "every case gives a correct result or an error message with the reason".to_owned(),
                 tokens.text,
             ),
             1 => ("1 case is wrong".to_owned(), tokens.alarm_text),
@@ -129,7 +129,7 @@ impl Screen for ExtremesScreen {
                 .collect();
             ui.label(counts.join(", "));
             if let Some(tightest) = &facts.tightest {
-                quiet_ui(ui, format!("closest to its tolerance: {tightest}"));
+                quiet_ui(ui, format!("largest error relative to its tolerance: {tightest}"));
             }
         }
     }

@@ -175,8 +175,8 @@ fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
     };
     let why = match phase {
         Phase::Ramp => "a longer part of the ramp is needed",
-        Phase::Hold => "more of the hold is needed",
-        Phase::Creep | Phase::Sine | Phase::Follow => "the live fit follows ramps and holds",
+        Phase::Hold => "a longer part of the hold is needed",
+        Phase::Creep | Phase::Sine | Phase::Follow => "the live fit works in ramps and holds only",
         Phase::Unload
         | Phase::Retract
         | Phase::Stopped

@@ -317,7 +317,7 @@ impl Grbl {
             if self.state != State::Idle {
                 return Err(8);
             }
-            // Only what can be done is decimals_kept, and so it is done.
+            // Only what can be done is kept, and so it is done.
             if !value.is_empty() {
                 self.execute(value)?;
             }

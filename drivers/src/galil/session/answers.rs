@@ -1,4 +1,4 @@
-//! PromptResponder: each belongs to the oldest question without one.
+//! Answers: each belongs to the oldest question without one.
 
 use super::Outgoing;
 use super::{ExpectedReply, GalilSession, PendingStop, RESET};

@@ -202,7 +202,7 @@ impl GrblSession {
                     self.fault(now, "the link is too slow to keep the axis moving, so the axis has stopped; lower the speed or repair the link");
                 } else if steps != motion.to {
                     let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
-                    self.fault(now, format!("the axis stopped at pulse {there} by the board's count instead of pulse {wanted}; home the axis again"));
+                    self.fault(now, format!("the board reports a stop at pulse {there}, but the target is pulse {wanted}; home the axis again"));
                 }
             }
             _ => return,
@@ -230,7 +230,7 @@ impl GrblSession {
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
-            self.fault(now, format!("the axis is at pulse {here:.0} by the board's count instead of pulse {late:.0}, so it is stopped; check the cable and home the axis"));
+            self.fault(now, format!("the board reports pulse {here:.0} where pulse {late:.0} is commanded, so the axis is stopped; check the cable and home the axis"));
             return self.cancel(now);
         }
         let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);

@@ -311,7 +311,7 @@ impl Dialogue for GrblSession {
         {
             let silence = RESET_MAX.0 as f64 * 1e-9;
             return Some(format!(
-                "the board has not answered a reset for {silence} s; the axis comes to rest by itself unless something else moves it; use the emergency stop"
+                "the board has not answered a reset for {silence} s, so the axis may still move; use the emergency stop"
             ));
         }
         let is_unsure = self.locked.is_none() || self.state.is_moving();

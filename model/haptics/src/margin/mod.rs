@@ -210,18 +210,18 @@ impl MarginReport {
             format!("Friction of {friction:.3} suppresses the vibration of single encoder counts.")
         } else {
             format!(
-                "A buzz of an encoder count or two is possible: a friction of {friction_needed:.3} suppresses the buzz at a depth of {depth:.1}, but the device has {friction:.3}. A finer encoder needs less friction."
+                "A limit cycle of one or two encoder counts is possible at a depth of {depth:.1}: suppressing it takes a friction of {friction_needed:.3}, but the device has {friction:.3}. A finer encoder needs less friction."
             )
         });
         if !self.cycles.is_empty() {
             all.push(format!(
-                "The model itself returns energy in small slow cycles at depths {}.",
+                "In small slow cycles at depths {}, the model returns more energy than it receives.",
                 bands::words(&self.cycles, self.deepest)
             ));
         }
         if !self.pokes.is_empty() {
             all.push(format!(
-                "A slow poke to depths {} returns energy.",
+                "In a slow press to depths {} and back, the model returns more energy than it receives.",
                 bands::words(&self.pokes, self.deepest)
             ));
         }
@@ -233,13 +233,18 @@ impl MarginReport {
         // N s/mm as N s/m, which is what catalogues have.
         let (needed_si, has_si) = (needed * 1e3, has * 1e3);
         let Some(ratio) = self.ratio() else {
-            return "The body itself supplies all the damping needed.".into();
+            return "The model itself dissipates enough energy; the device needs no damping."
+                .into();
         };
         let why = match cause {
-            MarginCause::Lag => "the cause is the lag of the body, so a faster loop does not help",
-            MarginCause::Tick => "the causes are the tick and the delay, so a faster loop helps",
+            MarginCause::Lag => {
+                "the relaxation of the model demands this damping, so a faster loop does not help"
+            }
+            MarginCause::Tick => {
+                "the period and the delay of the loop demand this damping, so a faster loop helps"
+            }
             MarginCause::Sudden => {
-                "the cause is sudden moves, so a faster loop or less delay helps"
+                "sudden moves demand this damping, so a faster loop or a shorter delay helps"
             }
         };
         if self.worst.is_enough() {

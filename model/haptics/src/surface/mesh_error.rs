@@ -34,11 +34,13 @@ pub enum MeshError {
         height: f64,
     },
     /// No limit.
-    #[error("a MaxShear of {0} mm is not possible; choose zero, a positive number or infinity")]
+    #[error(
+        "a largest height difference of {0} mm between neighbouring nodes is not possible; choose zero, a positive number or infinity"
+    )]
     Shear(f64),
     /// The surface at rest breaks its own limits.
     #[error(
-        "the rest heights of column {column}, row {row} and its neighbour differ by {rise} mm, more than a MaxShear of {limit} mm allows; make the rest surface smoother or MaxShear larger"
+        "the rest heights of column {column}, row {row} and its neighbour differ by {rise} mm, more than the {limit} mm allowed between neighbouring nodes; make the rest surface smoother or allow a steeper slope"
     )]
     Steep {
         column: usize,

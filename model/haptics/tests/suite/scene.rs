@@ -297,7 +297,7 @@ fn scenes_that_cannot_be_are_refused_in_words() {
     for (settings, word) in [
         (SceneSettings { nodes: 1, ..usual }, "not possible"),
         (SceneSettings { side_mm: f64::NAN, ..usual }, "not possible"),
-        (SceneSettings { max_shear_mm: -1.0, ..usual }, "MaxShear"),
+        (SceneSettings { max_shear_mm: -1.0, ..usual }, "neighbouring nodes"),
         (SceneSettings { recovery_s: -1.0, ..usual }, "recovery"),
         (SceneSettings { friction: 11.0, ..usual }, "friction"),
         (device(|one| one.mass_kg = 0.0), "mass_kg"),

@@ -46,7 +46,7 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
     }
     assert!(scene(|_, _| 0.0).mesh_error_against(1, 101).is_err());
     let steep = scene(|x, _| x).mesh_error_against(51, 101).unwrap_err();
-    assert!(steep.to_string().contains("MaxShear"));
+    assert!(steep.to_string().contains("steeper slope"));
 }
 
 #[test]

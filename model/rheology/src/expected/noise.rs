@@ -47,7 +47,7 @@ impl MeasurementNoise {
     }
 }
 
-/// FreeOffsets of a fit other than the five parameters of the body.
+/// Offsets that a fit leaves free, besides the five parameters of the body.
 ///
 /// Both widen the intervals of the body; a known offset makes the interval of mu1 two to three times
 /// narrower.

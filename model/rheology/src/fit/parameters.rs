@@ -59,7 +59,7 @@ impl System<'_> {
         Err(FitError::Unsupported {
             family: self.source.family.name(),
             reason: format!(
-                "the probe retracts by {:.0} % of its greatest depth while the force is known, but a separation of unloading from loading needs {:.0} %; record the unloading, press deeper, or unload more slowly so that contact lasts",
+                "the probe retracts by {:.0} % of its greatest depth while the force is known, but the unloading parameters need {:.0} %; record the unloading, press deeper, or unload more slowly so that contact lasts",
                 100.0 * share,
                 100.0 * RETURN_MIN
             ),
@@ -104,7 +104,7 @@ impl System<'_> {
         // The search keeps within the bounds, so what the records do not hold ends on one.
         if let Some(parameter) = self.first_zero(points) {
             return Err(refused(format!(
-                "the fit would need a {} of zero or less; these records support fewer terms",
+                "the best fit has a {} of zero or less; use a family with fewer terms",
                 self.known()[parameter].name
             )));
         }

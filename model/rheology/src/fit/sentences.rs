@@ -102,7 +102,7 @@ pub(super) fn findings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
     let mut findings = Vec::new();
     if report.censored > 0 {
         findings.push(format!(
-            "the forces of {} censored samples do not count; their depths do",
+            "{} samples are censored: the fit uses their depths but not their forces",
             report.censored
         ));
     }
@@ -114,12 +114,12 @@ pub(super) fn findings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
     {
         let about = if time > LONGEST_SHARE * length { "at least" } else { "about" };
         findings.push(format!(
-            "autocorrelated residuals: {} % of their variance lasts {about} {}; {} samples carry the \
-             information of {}, and the intervals allow for it",
-            percent_words(noise.slow_share),
-            time_words(time),
+            "autocorrelated residuals: {} samples carry the information of {}, because {} % of the residual \
+             variance has a correlation time of {about} {}; the intervals allow for it",
             report.samples,
-            independent_words(noise.effective_samples)
+            independent_words(noise.effective_samples),
+            percent_words(noise.slow_share),
+            time_words(time)
         ));
     }
     let (_, deepest) = fitted.system.records[record].depths;

@@ -42,7 +42,7 @@ pub enum HoldOutError {
     )]
     AllAlike { what: &'static str, records: usize },
     #[error(
-        "no specimen can be held out, because {record} does not name its specimen; name a specimen for each source, or hold out 'auto'"
+        "no specimen can be held out, because {record} does not state its specimen; give a specimen for each source, or hold out 'auto'"
     )]
     NoSpecimen { record: String },
 }

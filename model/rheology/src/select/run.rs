@@ -47,9 +47,9 @@ pub struct SelectProgress {
 /// Nothing could be compared.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SelectError {
-    #[error("the comparison has no record; name a session or a table")]
+    #[error("the comparison has no record; give a session or a table")]
     NoRecords,
-    #[error("the comparison has no family; name at least one family")]
+    #[error("the comparison has no family; give at least one family")]
     NoFamilies,
     #[error(transparent)]
     HoldOut(#[from] HoldOutError),

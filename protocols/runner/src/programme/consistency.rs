@@ -18,7 +18,7 @@ pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]
         let fitted = before.iter().find(|one| one.name == model.task);
         if let Some(reason) = fitted.and_then(reason_unfitted) {
             find_contradictions.push(format!(
-                "validates = \"{}\" names a task that has no fitted model, because {reason}; name a task with one ramp and hold",
+                "validates = \"{}\" names a task that has no fitted model, because {reason}; give the name of a task with one ramp and hold",
                 model.task
             ));
         }

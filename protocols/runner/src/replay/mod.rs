@@ -123,17 +123,23 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     let folder = if folder.is_file() { folder.parent().unwrap_or(folder) } else { folder };
     let path = folder.join("blessed.json");
     let Some(text) = palpate_sessions::text::read_if_present(&path).map_err(|err| {
-        format!("the blessings cannot be read ({err}); check the file {}", path.display())
+        format!(
+            "the list of allowed differences cannot be read ({err}); check the file {}",
+            path.display()
+        )
     })?
     else {
         return Ok(Vec::new());
     };
     let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {
-        format!("the blessings cannot be understood ({err}); correct the file {}", path.display())
+        format!(
+            "the list of allowed differences cannot be understood ({err}); correct the file {}",
+            path.display()
+        )
     })?;
     match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
         Some(blessing) => Err(format!(
-            "decision {} is blessed without a reason; write the reason into {}",
+            "the difference of decision {} is allowed without a reason; write the reason into {}",
             blessing.decision,
             path.display()
         )),

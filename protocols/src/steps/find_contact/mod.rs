@@ -73,7 +73,7 @@ impl Default for ContactPress {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Find the surface of the tissue and stop there. Depths count from the surface.",
+    about: "Find the surface of the tissue and stop there. Depths are measured from the surface.",
     keys: &[
         Key::optional("speed", QuantityKind::Speed, "speed of the first pass"),
         Key::optional("criterion", QuantityKind::Force, "force that counts as contact in the first pass"),
@@ -135,9 +135,9 @@ fn usual_search() -> String {
         format!("presses to {} and dwells for {}", press.force, press.dwell)
     });
     format!(
-        "Without keys, the first pass goes at {}, detects contact at {}, {press}. The probe then retracts by {} mm. The \
-         second pass goes at {} to {}. The probe rests for {} after each pass. The standard error may be {} mm at \
-         most.\n\n",
+        "Without keys, the first pass approaches at {}, detects contact at {}, {press}. The probe then retracts by {} mm. \
+         The second pass approaches at {} and ends at a force of {}. The probe rests for {} after each pass. The \
+         standard error of the contact point may be at most {} mm.\n\n",
         search.approach_speed,
         search.criterion,
         search.retreat_mm,

@@ -146,7 +146,9 @@ impl Field {
 
     fn origin(self) -> &'static str {
         match self {
-            Self::SessionId => "given at the start; alphabetical order is order of time",
+            Self::SessionId => {
+                "set when the session starts; alphabetical order is the order in time"
+            }
             Self::Specimen => "typed by the operator",
             Self::Sample | Self::EveryNth => "counted",
             Self::Time => "controller ticks times the true length of a tick",

@@ -74,7 +74,7 @@ fn loops(report: &CycleReport) -> String {
 fn steady(report: &CycleReport) -> String {
     let (percent, row) = (report.rule.percent, report.rule.in_a_row);
     let criterion = format!(
-        "peak and shift change by less than {percent} % (of the peak, of the depth), {row} times in a row"
+        "the peak changes by less than {percent} % of the peak and the shift by less than {percent} % of the depth, {row} times in a row"
     );
     match (report.steadiness.steady_from, report.cycles.len()) {
         (Some(cycle), _) => format!("steady from cycle {cycle} on: {criterion}"),

@@ -30,7 +30,7 @@ pub(super) fn comparison(body: &mut HtmlBody, subjects: &[ReportSubject], align:
     let left_out = match without_origin.as_slice() {
         [] => String::new(),
         without_origin => {
-            format!(" Sessions without this start are left out: {}.", without_origin.join(", "))
+            format!(" Sessions without this event are not shown: {}.", without_origin.join(", "))
         }
     };
     body.figure(

@@ -48,7 +48,7 @@ fn own_hash(page: &str) -> String {
 
 /// Files that a page lists, and whether the page itself is unchanged.
 pub fn claims(page: &str) -> Result<(Vec<FileClaim>, bool), String> {
-    let no_page = "the file is not a report page; name a report page";
+    let no_page = "the file is not a report page; give a report page";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
     let stated = seal.strip_suffix(SEAL_END).unwrap_or_default();
     let rows = page.split(ROW).skip(1).map(|row| {

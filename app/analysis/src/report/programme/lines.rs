@@ -58,7 +58,7 @@ impl SessionLoss {
             // A recording that a full disk cut short ended by abort, and has no end either.
             Ok(one) if ending == FINISHED && one.session.end.is_none() => Some((
                 Self::Damaged,
-                "the recording breaks off, but the journal lists it as finished; restore it from a backup".into(),
+                "the recording is incomplete, but the journal lists it as finished; restore it from a backup".into(),
             )),
             Ok(_) => None,
         }

@@ -107,7 +107,10 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &SelectionReport) {
     let ladder = selection::ladder(selection);
     let steps = ladder.get(1..).unwrap_or_default();
     if steps.is_empty() {
-        placeholder_ui(ui, "a gain needs two families of one kind");
+        placeholder_ui(
+            ui,
+            "add a second family of the same kind, such as prony-1 and prony-2, to see the gain of a term",
+        );
     }
     for step in steps {
         let line = |words: RichText| Label::new(words.small()).wrap();

@@ -41,8 +41,8 @@ fn shown_scene<'a>(
             let end = live.now().max(PAST_S);
             let title = match (live.is_running(), live.is_led()) {
                 (false, _) => "stopped; the last picture",
-                (true, true) => "the path leads the hand",
-                (true, false) => "the pointer and the keys lead the hand",
+                (true, true) => "the path moves the hand",
+                (true, false) => "the pointer and the keys move the hand",
             };
             Ok(ShownScene {
                 instant: live.moment(),

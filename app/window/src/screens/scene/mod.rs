@@ -194,7 +194,7 @@ impl Screen for SceneScreen {
         let both = [UiCommand::SceneStart, UiCommand::SceneStop];
         loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
         let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
-            true => "The path leads the hand; at its end the pointer and the keys take over.",
+            true => "The path moves the hand; at its end the pointer and the keys take over.",
             false => {
                 "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
                  button to rotate, turn the wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift \

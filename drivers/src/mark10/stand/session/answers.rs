@@ -1,4 +1,4 @@
-//! PromptResponder: each belongs to the one open question.
+//! Answers: each belongs to the one open question.
 
 use super::{GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandQuestion, StandSession};
 use crate::mark10::stand::protocol::{StandStatus, number};

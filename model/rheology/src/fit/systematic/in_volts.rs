@@ -42,6 +42,10 @@ fn shared_errors<'a>(records: &[TracedRecord<'a>]) -> Vec<SharedError<'a>> {
 /// in ten records by chance if nothing else were known of it, and what is known of it makes that rarer.
 const CONTRADICTION: f64 = 3.0;
 
+/// Nor do errors explain a record whose residuals then still have a long-run variance so many times their own: the model does
+/// not describe it, and would bend the curve instead.
+const MEMORY_MAX: f64 = 2.0;
+
 /// The root of the sum of the squares of parts, one for each error, and the same of those of each term.
 fn sum_of_parts(errors: &[SharedError<'_>], parts: impl Iterator<Item = f64>) -> SystematicError {
     let mut found = SystematicError::default();
@@ -164,7 +168,8 @@ impl<'a> FitSolution<'a> {
         system.ok_or(FitError::Overflow)
     }
 
-    /// The fit with the errors of a system found; `None` where they come out larger than is stated of them.
+    /// The fit with the errors of a system found; `None` where they come out larger than is stated of them, or do not explain the
+    /// record.
     fn with_errors_found(&self, system: &System<'a>) -> Option<Self> {
         let mut system = system.clone();
         let mut points = self.refined.points.clone();
@@ -178,7 +183,14 @@ impl<'a> FitSolution<'a> {
         }
         system = system.with_errors_found(&points)?;
         let is_stated = system.errors.found.iter().all(|error| error.abs() < CONTRADICTION);
-        is_stated.then(|| Self::refined(system, &points).ok()).flatten()
+        let fitted = is_stated.then(|| Self::refined(system, &points).ok()).flatten()?;
+        let uncertainty = fitted.uncertainty();
+        let is_white = |record: usize| {
+            let memory = uncertainty.memory(record);
+            let limit = MEMORY_MAX * uncertainty.variance(record);
+            memory.is_none_or(|memory| memory.long_run() < limit)
+        };
+        (0..points.len()).all(is_white).then_some(fitted)
     }
 
     /// Changes of the unknowns by one standard uncertainty of each error, to first order.

@@ -45,8 +45,8 @@ pub struct SystematicUncertainty {
     pub parameters: Vec<SystematicError>,
     /// Whether forces beyond the heaviest weight were fitted, so that the true error is larger.
     pub is_extrapolated: bool,
-    /// Whether the records contradict what is stated of these errors, which are then propagated and not found with the
-    /// parameters.
+    /// Whether the records depart from model and calibration by more than is stated of these errors, which are then propagated
+    /// and not found with the parameters.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub is_contradicted: bool,
 }

@@ -42,7 +42,9 @@ impl SystematicUncertainty {
                 true => "states nothing about its",
                 false => "state nothing about their",
             };
-            return format!("{names} {states} own errors, so the systematic error is not known");
+            return format!(
+                "{names} {states} own uncertainty, so the systematic uncertainty is not known"
+            );
         };
         let bends = first.compliance.map(|_| "machine compliance".to_owned());
         let is_alike = |pair: &[StatedTerms]| {
@@ -69,12 +71,12 @@ impl SystematicUncertainty {
         };
         let doubt = match self.is_contradicted {
             true => {
-                "; the record contradicts these statements, so either the calibration is wrong or the model does not describe the specimen: check the load cell with known weights, and compare model families"
+                "; the record departs from model and calibration by more than is stated, so these errors are propagated without the help of the record: check the load cell with known weights, and compare model families"
             }
             false => "",
         };
         format!(
-            "{names} {} a systematic error, stated as one standard uncertainty, which repeats do not reduce ({parts}){beyond}{doubt}",
+            "{names} {} a systematic standard uncertainty, which repeats do not reduce ({parts}){beyond}{doubt}",
             if is_one { "adds" } else { "add" },
         )
     }

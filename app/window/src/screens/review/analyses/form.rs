@@ -99,8 +99,8 @@ impl AnalysisForm {
         tick_box(ui, &mut self.with_profile, "profile intervals too");
         if others > 0 {
             let words = match others {
-                1 => "one material for this session and the other one shown".to_owned(),
-                _ => format!("one material for this session and the {others} others shown"),
+                1 => "fit this session and the other one shown as one material".to_owned(),
+                _ => format!("fit this session and the {others} others shown as one material"),
             };
             tick_box(ui, &mut self.is_together, &words);
         }
