@@ -45,6 +45,7 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     assert_eq!(report["tasks"][1]["fits"].as_array().map(Vec::len), Some(1), "{report}");
     let page = fs::read_to_string(at.join("day/summary.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("press/01"), "no page");
+    assert!(page.contains(", total [") && page.contains("uncertainty budget, in shares"), "{page}");
 
     // Rejected, it stays in the count and is fitted no more.
     let verdict = ["verdict", "day/press/01", "rejected", "--reason", "a hair on the probe"];
