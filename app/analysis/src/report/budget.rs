@@ -88,13 +88,14 @@ impl BudgetRow<'_> {
     }
 }
 
-fn rows<'a>(budget: &'a [BudgetEntry]) -> Vec<BudgetRow<'a>> {
+fn rows(budget: &[BudgetEntry]) -> Vec<BudgetRow<'_>> {
     let whole: f64 = budget.iter().map(|one| one.error.powi(2)).sum();
-    let row = |one: &'a BudgetEntry| {
-        let BudgetEntry { source, error } = one;
-        BudgetRow { source, error: *error, percent: 100.0 * error.powi(2) / whole }
-    };
-    let mut rows: Vec<BudgetRow<'_>> = budget.iter().map(row).collect();
+    let rows = budget.iter().map(|BudgetEntry { source, error }| BudgetRow {
+        source,
+        error: *error,
+        percent: 100.0 * error.powi(2) / whole,
+    });
+    let mut rows: Vec<BudgetRow<'_>> = rows.collect();
     rows.sort_by(|one, other| other.percent.total_cmp(&one.percent));
     rows
 }
