@@ -187,7 +187,7 @@ impl WindowFlow {
         words.push(text::quality(report));
         for parameter in &report.parameters {
             let text = ParameterText::of(parameter);
-            words.extend([text.name, text.value, text.unit, text.interval]);
+            words.extend([text.name, text.value, text.unit, text.interval, text.total]);
         }
         for word in words {
             assert!(self.says(&word), "the window does not say '{word}'");

@@ -95,6 +95,28 @@ impl HtmlBody {
         rows: &[Vec<String>],
         attributes: impl Fn(usize) -> String,
     ) {
+        self.whole_table(caption, heads, rows, attributes, |_, _| false);
+    }
+
+    /// The same, some cells bold, by row and by column from 1 on.
+    pub fn table_with_bold(
+        &mut self,
+        caption: &str,
+        heads: &[&str],
+        rows: &[Vec<String>],
+        is_bold: impl Fn(usize, usize) -> bool,
+    ) {
+        self.whole_table(caption, heads, rows, |_| String::new(), is_bold);
+    }
+
+    fn whole_table(
+        &mut self,
+        caption: &str,
+        heads: &[&str],
+        rows: &[Vec<String>],
+        attributes: impl Fn(usize) -> String,
+        is_bold: impl Fn(usize, usize) -> bool,
+    ) {
         let heads: String =
             heads.iter().map(|head| format!("<th scope=\"col\">{}</th>", escape(head))).collect();
         self.0 += &format!(
@@ -105,9 +127,12 @@ impl HtmlBody {
             let cells: String = row
                 .iter()
                 .enumerate()
-                .map(|(column, cell)| match column {
-                    0 => format!("<th scope=\"row\">{}</th>", escape(cell)),
-                    _ => format!("<td>{}</td>", escape(cell)),
+                .map(|(column, cell)| match (column, escape(cell)) {
+                    (0, cell) => format!("<th scope=\"row\">{cell}</th>"),
+                    (_, cell) if is_bold(index, column) => {
+                        format!("<td><strong>{cell}</strong></td>")
+                    }
+                    (_, cell) => format!("<td>{cell}</td>"),
                 })
                 .collect();
             self.0 += &format!("<tr{}>{cells}</tr>\n", attributes(index));
@@ -171,12 +196,13 @@ mod tests {
         body.list([hostile]);
         body.pre(hostile);
         body.facts(hostile, &[(hostile, hostile.to_owned())]);
-        body.table(hostile, &[hostile], &[vec![hostile.to_owned()]]);
+        let rows = [vec![hostile.to_owned(), hostile.to_owned()]];
+        body.table_with_bold(hostile, &[hostile], &rows, |_, column| column == 1);
         body.figure("<svg/>", hostile);
         let page = document(hostile, body);
         assert!(!page.contains("<script") && !page.contains("onload='"), "{page}");
         assert!(!page.contains('\u{202e}'));
-        assert_eq!(page.matches("&lt;script&gt;").count(), 13);
+        assert_eq!(page.matches("&lt;script&gt;").count(), 14);
     }
 
     #[test]

@@ -265,8 +265,9 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     assert!(alone["parameters"][0]["systematic_error"].as_f64() > Some(0.0));
     assert_eq!(own["parameters"], alone["parameters"]);
     let text = report["tasks"][0]["text"].as_str().unwrap();
-    assert!(text.contains(" systematic\n"), "{text}");
-    assert!(page().contains(" systematic\n") && page().contains("systematic standard uncertainty"));
+    for words in [", total [", "uncertainty budget, in shares", "systematic standard uncertainty"] {
+        assert!(text.contains(words) && page().contains(words), "{words}: {text}");
+    }
 
     // Without a session to compare with the page says why it does not.
     for session in ["day/first/01", "day/first/02"] {

@@ -1,7 +1,7 @@
 //! Pages and figures: what they hold, that nothing in them is markup that people wrote, and that hashes tell a change.
 
 use crate::support::{
-    assert_prints, assert_refused, json, palpate, short_run, stderr, stdout, succeeded,
+    answer, assert_prints, assert_refused, json, palpate, short_run, stderr, stdout, succeeded,
 };
 use std::collections::BTreeSet;
 use std::fs;
@@ -155,6 +155,38 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
 }
 
 #[test]
+fn total_intervals_and_budget_of_a_recorded_session_and_of_its_stored_fit_are_on_the_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/ramp-hold-lab/000.mcap");
+    fs::create_dir(at.join("press")).unwrap();
+    fs::copy(log, at.join("press/000.mcap")).unwrap();
+    let kept = ["fit", "press", "--save", "kept", "--reason", "first", "--by", "Ada"];
+    succeeded(&palpate(at, &kept));
+    succeeded(&palpate(at, &["report", "press", "--html", "page.html"]));
+    let page = fs::read_to_string(at.join("page.html")).unwrap();
+    strict(&page);
+    let fit = answer(&palpate(at, &["fit", "press", "--json"]));
+    let tau = &fit["parameters"][0];
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let (low, high) = (number(&tau["total95"][0]), number(&tau["total95"][1]));
+    let entries = tau["budget"].as_array().unwrap().iter();
+    let errors: Vec<f64> = entries.map(|entry| number(&entry["error"])).collect();
+    let largest = errors.iter().copied().fold(0.0, f64::max);
+    let variance: f64 = errors.iter().map(|error| error.powi(2)).sum();
+    let share = 100.0 * largest.powi(2) / variance;
+    for words in [
+        format!("<td>[{low:.4}, {high:.4}]</td>"),
+        format!("<td><strong>{largest:.3} ({share:.0} %)</strong></td>"),
+        "<th scope=\"col\">total 95 % interval</th>".to_owned(),
+        "Uncertainty budget: ".to_owned(),
+        "to reduce the part of".to_owned(),
+    ] {
+        assert!(page.matches(&words).count() >= 2, "{words}");
+    }
+}
+
+#[test]
 fn the_same_sessions_make_the_same_page_but_for_its_date() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -290,6 +322,7 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
     for words in ["imported from", "in its file", "tau_eps", "no decisions"] {
         assert!(texts.contains(words), "no '{words}'");
     }
+    assert!(!texts.contains("total 95 %") && !texts.contains("Uncertainty budget"));
     let refused = palpate(at, &["report", &session, "--figure", "c.svg", "--of", "calibration"]);
     assert_eq!(refused.status.code(), Some(1), "{}", stderr(&refused));
 }

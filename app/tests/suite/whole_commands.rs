@@ -20,7 +20,7 @@ fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
     assert!(live.is_some_and(|live| live.contains("tau_eps")), "{printed}");
     let fit = palpate(at, &["fit", "short"]);
     succeeded(&fit);
-    assert_prints(&fit, " systematic");
+    assert_prints(&fit, ", total [");
 }
 
 #[test]

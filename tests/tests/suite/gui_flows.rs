@@ -4,6 +4,7 @@ use eframe::egui::epaint::Primitive;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use palpate_analysis::report::budget::BUDGET_TITLE;
 use palpate_analysis::report::text;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -119,6 +120,10 @@ fn every_sentence_of_a_report_is_on_the_screen() {
     ] {
         let mut found = window.query_all_by_label_contains(words);
         assert!(found.next().is_some(), "{words}");
+    }
+    // What is not known takes no space.
+    for words in ["total 95 %", BUDGET_TITLE] {
+        assert!(window.query_by_label(words).is_none(), "{words}");
     }
 }
 

@@ -4,6 +4,7 @@
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_analysis::fit::FitRecipe;
+use palpate_analysis::report::budget::UncertaintyBudget;
 use palpate_analysis::report::text;
 use palpate_analysis::source::SourceSelection;
 use palpate_model::calibration::Calibration;
@@ -142,6 +143,14 @@ fn a_fit_is_made_compared_and_taken_back() {
         let cell = text::cell(parameter);
         assert!(panel.says(&cell), "{cell}");
         assert!(panel.says(&format!("session: {cell}")), "{cell}");
+    }
+    // The analysis keeps total intervals and the budget.
+    assert!(panel.says(", total ["));
+    panel.click("Uncertainty budget of 'all of it'");
+    let budget = UncertaintyBudget::of(&report.parameters);
+    assert!(!budget.remedies.is_empty());
+    for words in &budget.remedies {
+        assert!(panel.says(words), "{words}");
     }
     let kept = panel.analyses();
     assert_eq!((kept.all.len(), kept.all[0].by.as_str()), (1, "Ada"));

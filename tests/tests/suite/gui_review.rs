@@ -1,5 +1,8 @@
 //! The review screen, driven by accessible name: sessions closely and beside each other.
 use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
+use palpate_analysis::report::text::ParameterText;
 use palpate_runner::TimeScale;
 use palpate_sessions::Session;
 use palpate_tests::flow::WindowFlow;
@@ -27,7 +30,6 @@ fn show(flow: &mut WindowFlow, name: &str) -> PathBuf {
     let id = Session::open(&path).unwrap().manifest.session_id;
     let words = format!("remove: {id}");
     flow.wait("the session", |window| {
-        use egui_kittest::kittest::Queryable;
         let says = |words: &str| window.query_all_by_label_contains(words).next().is_some();
         says(&words) && !says("still reading") && !says("waiting to be read")
     });
@@ -97,7 +99,6 @@ fn one_session_is_looked_at_closely() {
     // The loop, found beside the window.
     flow.click("Over depth");
     flow.wait("the loop", |window| {
-        use egui_kittest::kittest::Queryable;
         let mut found = window.query_all_by_label_contains("every sample is within half a pixel");
         found.next().is_some()
     });
@@ -121,7 +122,6 @@ fn sessions_are_fitted_compared_and_predicted() {
     let other = show(&mut flow, "hold-until-lab");
     flow.window.key_press(Key::F6);
     flow.wait("the fits", |window| {
-        use egui_kittest::kittest::Queryable;
         let mut found = window.query_all_by_label_contains("from the profile likelihood");
         found.next().is_some()
     });
@@ -134,6 +134,25 @@ fn sessions_are_fitted_compared_and_predicted() {
     for sentence in report.sentences() {
         assert!(flow.says(sentence), "{sentence}");
     }
+    // The budget unfolds without a pointer.
+    assert!(flow.says("total 95 %") && !flow.says("to reduce the part of"));
+    flow.window.get_by_label(BUDGET_TITLE).focus();
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(20);
+    let budget = UncertaintyBudget::of(&report.parameters);
+    assert!(!budget.remedies.is_empty() && budget.parameters.len() > 5);
+    for one in &budget.parameters {
+        let total = ParameterText::of(one.parameter).total;
+        assert!(!total.is_empty() && flow.says(&total), "{total}");
+        for row in one.main_rows() {
+            let words = format!("{}, {}", row.source, row.uncertainty());
+            assert!(flow.says(&words) && flow.says(&row.share()), "{words}");
+        }
+    }
+    for words in &budget.remedies {
+        assert!(flow.says(words), "{words}");
+    }
+    flow.window.check_accessibility();
     flow.click("Over time");
     flow.click("Residuals of the fit");
     flow.click("Parameters");
@@ -143,7 +162,6 @@ fn sessions_are_fitted_compared_and_predicted() {
     flow.click("Prediction");
     flow.click("Predict second session");
     flow.wait("the prediction", |window| {
-        use egui_kittest::kittest::Queryable;
         window.query_all_by_label_contains("with an RMSE of").next().is_some()
     });
     flow.window.run_steps(3);
@@ -159,7 +177,6 @@ fn sessions_are_fitted_compared_and_predicted() {
     flow.type_into("session", "/nowhere/at-all");
     flow.click("Add to view");
     flow.wait("the refusal", |window| {
-        use egui_kittest::kittest::Queryable;
         let mut found = window.query_all_by_label_contains("no session exists at /nowhere/at-all");
         found.next().is_some()
     });

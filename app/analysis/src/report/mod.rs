@@ -1,7 +1,7 @@
 //! Results as people read them: the strings of a fit and of a selection that window, command line and
 //! pictures share, the pictures themselves, and the page of the extremes.
 
-mod budget;
+pub mod budget;
 pub mod calibration;
 pub mod calibration_plot;
 pub mod catalog;

@@ -216,7 +216,8 @@ fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
     for parameter in &report.parameters {
         y += LINE;
         let text = ParameterText::of(parameter);
-        let cells = [text.name, text.value, text.unit, text.interval];
+        let intervals = text.intervals();
+        let cells = [text.name, text.value, text.unit, intervals];
         for (x, cell) in places.into_iter().zip(&cells) {
             svg.text([x, y + 4.0], TextInk::plain(LIGHT.text), cell);
         }

@@ -1,9 +1,8 @@
 //! The content of a stored analysis in words.
 
-use super::text::parameter_lines;
 use crate::analysed_session::ForceChange;
 use palpate_rheology::fit::FittedParameter;
-use palpate_sessions::analyses::{Analyses, Analysis, AnalysisContent};
+use palpate_sessions::analyses::{Analyses, AnalysisContent};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -66,15 +65,6 @@ pub fn describe_analysis(what: &AnalysisContent) -> String {
     }
 }
 
-/// The lines of a kept fit: parameters, then sentences; empty for what is no fit.
-#[must_use]
-pub fn fit_lines(one: &Analysis) -> Vec<String> {
-    let AnalysisContent::Fit { results, .. } = &one.what else { return Vec::new() };
-    let mut lines = parameter_lines(&parameters(results));
-    lines.extend(sentences(results).iter().map(|one| format!("- {one}")));
-    lines
-}
-
 /// Author and reason of a withdrawal; `None` while the analysis counts.
 #[must_use]
 pub fn describe_withdrawal(analyses: &Analyses, name: &str) -> Option<String> {
@@ -96,7 +86,8 @@ mod tests {
     fn fits_of_every_family_are_read_back() {
         let results = json!({
             "parameters": [
-                {"name": "tau", "value": 1.5, "unit": "s", "std_error": 0.1, "ci95": [1.3, 1.7], "is_fixed": false},
+                {"name": "tau", "value": 1.5, "unit": "s", "std_error": 0.1, "ci95": [1.3, 1.7], "is_fixed": false,
+                 "total95": [1.2, 1.9], "budget": [{"source": "noise", "error": 0.1}]},
                 {"name": "k", "value": 2.0, "unit": "N/mm", "std_error": 0.2},
                 {"name": "unreadable"},
             ],
@@ -105,7 +96,9 @@ mod tests {
         let found = parameters(&results);
         assert_eq!(found.len(), 2);
         assert_eq!(found[0].ci95, Some([1.3, 1.7]));
+        assert_eq!((found[0].total95, found[0].budget[0].error), (Some([1.2, 1.9]), 0.1));
         assert_eq!((found[1].ci95, found[1].is_fixed), (None, false));
+        assert!(found[1].total95.is_none() && found[1].budget.is_empty());
         assert_eq!(sentences(&results), ["beware"]);
         assert!(parameters(&Value::Null).is_empty() && sentences(&Value::Null).is_empty());
     }

@@ -4,7 +4,7 @@
 use super::budget::budget_lines;
 use super::fit_json::{FitDetails, FitOverlay};
 use crate::fit::{FitIntervals, JointFit};
-use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_interval};
+use palpate_figures::uncertain::{interval, plain, with_error, with_interval};
 use palpate_rheology::families::find_family;
 use palpate_rheology::fit::{FitReport, FittedParameter, NamedReport};
 
@@ -15,8 +15,10 @@ pub struct ParameterText {
     pub value: String,
     /// Unit of value and interval, typeset.
     pub unit: String,
-    /// 95 % interval and what the calibration adds to it, empty where there is none.
+    /// Statistical 95 % interval, empty where there is none.
     pub interval: String,
+    /// 95 % interval with everything that is known to be uncertain, empty where there is none.
+    pub total: String,
 }
 
 impl ParameterText {
@@ -27,38 +29,50 @@ impl ParameterText {
             None if parameter.is_fixed => format!("{} fixed", plain(parameter.value)),
             None => format!("{} not identified", plain(parameter.value)),
         };
+        let words = |ends: Option<[f64; 2]>| {
+            let known = ends.zip(parameter.std_error);
+            known.map(|(ends, error)| interval(ends, parameter.value, error)).unwrap_or_default()
+        };
         Self {
             name: parameter.name.clone(),
             value,
             unit: typeset(&parameter.unit),
-            interval: match (parameter.ci95, parameter.std_error) {
-                (Some(ends), Some(error)) => {
-                    let ends = interval(ends, parameter.value, error);
-                    format!("{ends}{}", systematic(parameter.systematic_error))
-                }
-                _ => String::new(),
-            },
+            interval: words(parameter.ci95),
+            total: words(parameter.total95),
         }
+    }
+
+    /// Both intervals in one line.
+    #[must_use]
+    pub fn intervals(&self) -> String {
+        with_total(self.interval.clone(), &self.total)
     }
 }
 
-/// The systematic standard uncertainty as it stands after an interval, empty where there is none.
-#[must_use]
-pub fn systematic(error: Option<f64>) -> String {
-    let words = |error: f64| format!(" ± {} systematic", error_alone(error));
-    error.map(words).unwrap_or_default()
+/// An interval, or a value with its interval, and the total interval after it, where there is one.
+fn with_total(words: String, total: &str) -> String {
+    if total.is_empty() { words } else { format!("{words}, total {total}") }
 }
 
-/// A parameter in one cell of a table: `value [low, high]`, or the value and why it has no
-/// interval.
+/// Name and unit of a parameter at the head of a column.
+#[must_use]
+pub fn parameter_head(parameter: &FittedParameter) -> String {
+    match parameter.unit.as_str() {
+        "" => parameter.name.clone(),
+        unit => format!("{} ({})", parameter.name, typeset(unit)),
+    }
+}
+
+/// A parameter in one cell of a table: `value [low, high], total [low, high]`, or the value and why
+/// it has no interval.
 #[must_use]
 pub fn cell(parameter: &FittedParameter) -> String {
+    let text = ParameterText::of(parameter);
     match (parameter.std_error, parameter.ci95) {
         (Some(error), Some(ends)) => {
-            let words = with_interval(parameter.value, error, ends);
-            format!("{words}{}", systematic(parameter.systematic_error))
+            with_total(with_interval(parameter.value, error, ends), &text.total)
         }
-        _ => ParameterText::of(parameter).value,
+        _ => text.value,
     }
 }
 
@@ -170,8 +184,8 @@ pub fn parameter_lines(parameters: &[FittedParameter]) -> Vec<String> {
     let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
     let width = texts.iter().map(|text| text.value.chars().count()).max().unwrap_or(0);
     let line = |text: &ParameterText| {
-        let interval = match text.interval.as_str() {
-            "" => String::new(),
+        let interval = match text.intervals() {
+            ends if ends.is_empty() => ends,
             ends => format!("95 % {ends}"),
         };
         let line =
@@ -250,12 +264,15 @@ mod tests {
     }
 
     #[test]
-    fn what_the_calibration_adds_stands_after_the_interval() {
+    fn the_total_interval_stands_after_the_statistical_one() {
         let mut known = parameter(Some(0.1), false);
-        known.systematic_error = Some(0.0234);
-        let interval = "[1.30, 1.70] ± 0.023 systematic";
-        assert_eq!(ParameterText::of(&known).interval, interval);
-        assert_eq!(cell(&known), format!("1.50 {interval}"));
+        // It need not lie evenly around the value.
+        known.total95 = Some([0.9, 2.5]);
+        let text = ParameterText::of(&known);
+        assert_eq!((text.interval.as_str(), text.total.as_str()), ("[1.30, 1.70]", "[0.90, 2.50]"));
+        let both = "[1.30, 1.70], total [0.90, 2.50]";
+        assert_eq!(cell(&known), format!("1.50 {both}"));
+        assert!(parameter_lines(&[known])[0].ends_with(&format!("95 % {both}")));
     }
 
     #[test]

@@ -159,10 +159,7 @@ fn table(sources: &[PathBuf], rows: &[SourceResult]) -> String {
     };
     let shown: Vec<&FittedParameter> = known.iter().filter(is_shown).collect();
     let mut head = vec!["source".to_owned()];
-    head.extend(shown.iter().map(|one| match one.unit.as_str() {
-        "" => one.name.clone(),
-        unit => format!("{} ({})", one.name, text::typeset(unit)),
-    }));
+    head.extend(shown.iter().map(|one| text::parameter_head(one)));
     head.extend(["R²", "rmse (mN)", "sentences"].map(String::from));
     let mut lines = vec![head];
     for (source, row) in sources.iter().zip(rows) {

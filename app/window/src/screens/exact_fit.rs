@@ -1,12 +1,14 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{cell, tight, value_ui};
-use crate::widgets::{section_ui, sentence_ui, tokens_of};
-use eframe::egui::{Label, RichText, Ui};
-use palpate_analysis::report::text::{ParameterText, quality};
+use super::parameters::{cell, symbol_ui, tight, value_ui};
+use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
+use eframe::egui::{CollapsingHeader, Label, RichText, Ui};
+use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
+use palpate_analysis::report::text::{ParameterText, quality, typeset};
+use palpate_model::estimate::FittedParameter;
 use palpate_rheology::fit::FitReport;
 
-/// Draws the report: parameters with their intervals, quality, every sentence.
+/// Draws the report: parameters with their intervals and their budget, quality, every sentence.
 pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
     section_ui(ui, "Exact fit");
     tight(ui, |ui| {
@@ -14,18 +16,41 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
             row_ui(ui, &ParameterText::of(parameter));
         }
     });
+    budget_ui(ui, BUDGET_TITLE, &report.parameters);
     ui.label(quality(report));
     report.sentences().for_each(|sentence| sentence_ui(ui, sentence));
 }
 
 fn row_ui(ui: &mut Ui, text: &ParameterText) {
     value_ui(ui, &text.name, RichText::new(&text.value), &text.unit);
-    if !text.interval.is_empty() {
+    let intervals = [("95 %", &text.interval), ("total 95 %", &text.total)];
+    for (name, interval) in intervals.into_iter().filter(|(_, interval)| !interval.is_empty()) {
         let quiet = tokens_of(ui).text_quiet;
         ui.horizontal(|ui| {
-            cell(ui, 60.0, |ui| ui.label(RichText::new("95 %").color(quiet).small()));
-            let interval = RichText::new(&text.interval).monospace().small();
+            cell(ui, 60.0, |ui| ui.label(RichText::new(name).color(quiet).small()));
+            let interval = RichText::new(interval).monospace().small();
             ui.add(Label::new(interval.color(quiet)).wrap());
         });
     }
+}
+
+/// Draws the uncertainty budget, folded away; nothing where the sources are not told apart.
+pub fn budget_ui(ui: &mut Ui, title: &str, parameters: &[FittedParameter]) {
+    if parameters.iter().all(|one| one.budget.is_empty()) {
+        return;
+    }
+    CollapsingHeader::new(title).show(ui, |ui| {
+        let budget = UncertaintyBudget::of(parameters);
+        quiet_ui(ui, "share of the variance, source, standard uncertainty");
+        for one in &budget.parameters {
+            ui.horizontal(|ui| {
+                symbol_ui(ui, &one.parameter.name);
+                quiet_ui(ui, typeset(&one.parameter.unit));
+            });
+            for row in one.main_rows() {
+                fact_ui(ui, &row.share(), format!("{}, {}", row.source, row.uncertainty()));
+            }
+        }
+        budget.remedies.iter().for_each(|remedy| quiet_ui(ui, remedy));
+    });
 }

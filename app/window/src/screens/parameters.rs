@@ -108,7 +108,7 @@ pub(super) fn value_ui(ui: &mut Ui, name: &str, value: RichText, unit: &str) -> 
 }
 
 /// Draws a parameter's symbol as in print; its key is the tooltip and what a screen reader says.
-fn symbol_ui(ui: &mut Ui, name: &str) {
+pub(super) fn symbol_ui(ui: &mut Ui, name: &str) {
     let quiet = tokens_of(ui).text_quiet;
     let (letter, index) = symbol(name);
     let mut job = LayoutJob::default();

@@ -3,7 +3,7 @@
 use super::super::figures::{TimeAlignment, Traces, overlays};
 use super::super::session_text;
 use super::ReportSubject;
-use super::html::cells;
+use super::html::{PARAMETER_HEADS, cells};
 use palpate_figures::page::HtmlBody;
 
 /// Table of the sessions, figures over each other, and a table of parameters.
@@ -63,14 +63,8 @@ fn parameters(body: &mut HtmlBody, subjects: &[ReportSubject]) {
         }
     }
     if !rows.is_empty() {
-        let heads = [
-            "parameter",
-            "session",
-            "value ± standard error",
-            "unit",
-            "95 % interval",
-            "systematic",
-        ];
+        let mut heads = PARAMETER_HEADS.to_vec();
+        heads.insert(1, "session");
         body.table("Parameters of every session", &heads, &rows);
     }
     let refused = subjects.iter().filter_map(|one| {

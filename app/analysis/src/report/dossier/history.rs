@@ -4,6 +4,7 @@ use super::super::session::{lateness, target_cells};
 use super::super::text::capital;
 use super::super::{session_text, stored_analysis};
 use super::ReportSubject;
+use super::html::parameters;
 use palpate_figures::page::HtmlBody;
 use palpate_protocols::engine::{Effect, Record};
 use palpate_runner::fidelity::{Fidelity, TargetResult};
@@ -135,10 +136,10 @@ pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses in order of creation", &heads, &rows);
     for one in made {
-        let lines = stored_analysis::fit_lines(one);
-        if !lines.is_empty() {
+        if let AnalysisContent::Fit { results, .. } = &one.what {
             body.paragraph(&format!("Fit '{}' found:", one.name));
-            body.pre(&lines.join("\n"));
+            parameters(body, &stored_analysis::parameters(results));
+            body.list(stored_analysis::sentences(results).iter().map(String::as_str));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The page of a report, part by part.
 
-use super::super::text::{ParameterText, capital, quality, typeset};
+use super::super::budget::{BUDGET_TITLE, UncertaintyBudget};
+use super::super::text::{ParameterText, capital, parameter_head, quality};
 use super::super::{calibration as calibrations, calibration_plot, figures, session_text};
 use super::comparison::comparison;
 use super::files::{MADE, attributes, sealed};
@@ -8,7 +9,7 @@ use super::history::{afterwards, deviations, events, made_with};
 use super::{FitPart, ReportSubject};
 use crate::report::figures::TimeAlignment;
 use palpate_figures::page::{HtmlBody, document};
-use palpate_figures::uncertain::{error_alone, interval};
+use palpate_figures::uncertain::error_alone;
 use palpate_rheology::fit::FittedParameter;
 
 pub(super) fn page(subjects: &[ReportSubject], align: TimeAlignment, made: &str) -> String {
@@ -155,28 +156,76 @@ fn fit(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {
 fn fit_part(body: &mut HtmlBody, part: &FitPart) {
     let report = &part.report;
     body.paragraph(&format!("{}; {}.", capital(&report.model), quality(report)));
-    let heads = ["parameter", "value ± standard error", "unit", "95 % interval", "systematic"];
-    let rows: Vec<Vec<String>> = report.parameters.iter().map(cells).collect();
-    let caption = "Parameters. The interval is statistical; the last column is the standard uncertainty from calibration and compliance, which is the same in every repeat.";
-    body.table(caption, &heads, &rows);
+    parameters(body, &report.parameters);
     body.list(report.sentences().chain(part.remarks.iter().map(String::as_str)));
     let caption = "Measured force, fitted force and the residual. The band around the fitted force is twice the standard uncertainty of the calibration, where the calibration states it. The figure shows the lowest and the highest sample of each pixel column.";
     body.figure(&part.figure.svg(), caption);
 }
 
-/// Name, value, unit, interval and systematic uncertainty of a parameter.
+pub(super) const PARAMETER_HEADS: [&str; 6] = [
+    "parameter",
+    "value ± standard error",
+    "unit",
+    "95 % interval",
+    "systematic",
+    "total 95 % interval",
+];
+
+/// Cells of a parameter below [`PARAMETER_HEADS`].
 pub(super) fn cells(parameter: &FittedParameter) -> Vec<String> {
     let text = ParameterText::of(parameter);
-    let ends = parameter.ci95.zip(parameter.std_error);
-    let ends = ends.map(|(ends, error)| interval(ends, parameter.value, error));
-    let systematic = parameter.systematic_error.map(error_alone);
+    let systematic = parameter.systematic_error.map(|error| format!("± {}", error_alone(error)));
     vec![
         text.name,
         text.value,
-        typeset(&parameter.unit),
-        ends.unwrap_or_default(),
-        systematic.map(|error| format!("± {error}")).unwrap_or_default(),
+        text.unit,
+        text.interval,
+        systematic.unwrap_or_default(),
+        text.total,
     ]
+}
+
+/// The parameters of a fit and their uncertainty budget.
+pub(super) fn parameters(body: &mut HtmlBody, parameters: &[FittedParameter]) {
+    let mut rows: Vec<Vec<String>> = parameters.iter().map(cells).collect();
+    let statistical = "Parameters. The 95 % interval is statistical";
+    if parameters.iter().any(|one| one.total95.is_some()) {
+        let caption = format!(
+            "{statistical}; the systematic column is the standard uncertainty from calibration and compliance, which is the same in every repeat; the total interval holds both."
+        );
+        body.table(&caption, &PARAMETER_HEADS, &rows);
+    } else {
+        let known = PARAMETER_HEADS.len() - 2;
+        rows.iter_mut().for_each(|row| row.truncate(known));
+        body.table(&format!("{statistical}."), &PARAMETER_HEADS[..known], &rows);
+    }
+    budget(body, parameters);
+}
+
+fn budget(body: &mut HtmlBody, parameters: &[FittedParameter]) {
+    let budget = UncertaintyBudget::of(parameters);
+    let Some(columns) = Some(&budget.parameters).filter(|columns| !columns.is_empty()) else {
+        return;
+    };
+    let heads = columns.iter().map(|one| parameter_head(one.parameter));
+    let heads: Vec<String> = std::iter::once("source".to_owned()).chain(heads).collect();
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    let sources = budget.sources();
+    let row = |source: &&str| {
+        let cells = columns.iter().map(|one| {
+            let row = one.rows.iter().find(|row| row.source == *source);
+            row.map_or(String::new(), |row| format!("{} ({})", row.uncertainty(), row.share()))
+        });
+        std::iter::once((*source).to_owned()).chain(cells).collect()
+    };
+    let rows: Vec<Vec<String>> = sources.iter().map(row).collect();
+    let caption = format!(
+        "{BUDGET_TITLE}: standard uncertainty from each source, and its share of the variance; the largest of each parameter is bold."
+    );
+    body.table_with_bold(&caption, &heads, &rows, |row, column| {
+        columns[column - 1].rows.first().is_some_and(|largest| largest.source == sources[row])
+    });
+    body.list(budget.remedies.iter().map(String::as_str));
 }
 
 fn calibration(body: &mut HtmlBody, subject: &ReportSubject, level: u8) {

@@ -4,6 +4,7 @@ mod lines;
 
 pub use lines::{RunLine, SessionLoss, SpecimenPart};
 
+use super::budget::budget_lines;
 use super::calibration::{CalibrationDetails, calibration_page as calibration_text};
 use super::cycles::{CycleReport, CycleSettings, cycles_text, picture as cycles_picture};
 use super::fit_json::FitOverlay;
@@ -293,7 +294,8 @@ impl TaskPart {
     ) {
         let samples = fitted.samples.as_slice();
         self.line(&format!("{name}:"));
-        for line in parameter_lines(&report.parameters) {
+        let budget = budget_lines(&report.parameters);
+        for line in parameter_lines(&report.parameters).into_iter().chain(budget) {
             self.line(&line);
         }
         let systematic = fitted.systematic.iter().map(SystematicUncertainty::sentence);

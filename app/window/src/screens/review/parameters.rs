@@ -5,7 +5,7 @@ use super::middle::head_ui;
 use super::subject::ReviewSubject;
 use crate::widgets::{Column, TableRow, alarm_ui, quiet_ui, table_ui};
 use eframe::egui::Ui;
-use palpate_analysis::report::text::{self, typeset};
+use palpate_analysis::report::text;
 
 /// The sessions, those of one specimen together, in the order in which they stand.
 fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {
@@ -21,7 +21,7 @@ fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {
 
 impl ReviewScreen {
     pub(super) fn parameters_ui(&self, ui: &mut Ui) {
-        let words = "value and 95 % interval of each session's fit; sessions of one specimen stand together";
+        let words = "value, statistical and total 95 % interval of each session's fit; sessions of one specimen stand together";
         head_ui(ui, "Parameters", words);
         let sorted = by_specimen(&self.subjects);
         let first = sorted.iter().find_map(|(subject, _)| subject.fitted());
@@ -35,11 +35,7 @@ impl ReviewScreen {
         };
         let mut columns = vec![Column::words("specimen", 90.0), Column::words("session", 190.0)];
         for parameter in &first.report.parameters {
-            let head = match parameter.unit.as_str() {
-                "" => parameter.name.clone(),
-                unit => format!("{} ({})", parameter.name, typeset(unit)),
-            };
-            columns.push(Column::numbers(&head, 230.0));
+            columns.push(Column::numbers(&text::parameter_head(parameter), 310.0));
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
         let rows: Vec<TableRow> = sorted

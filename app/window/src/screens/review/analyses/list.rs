@@ -2,10 +2,12 @@
 
 use super::super::ReviewSource;
 use super::OwnFit;
+use crate::screens::exact_fit::budget_ui;
 use crate::widgets::{
     NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
+use palpate_analysis::report::budget::BUDGET_TITLE;
 use palpate_analysis::report::session_text;
 use palpate_analysis::report::{stored_analysis, text};
 use palpate_analysis::session_actions::{SessionAction, SessionActionContext};
@@ -55,14 +57,16 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
     quiet_ui(ui, stored_analysis::describe_analysis(&one.what));
     let AnalysisContent::Fit { results, .. } = &one.what else { return false };
-    for parameter in stored_analysis::parameters(results) {
+    let parameters = stored_analysis::parameters(results);
+    for parameter in &parameters {
         let unit = text::typeset(&parameter.unit);
-        fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(&parameter)));
+        fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(parameter)));
         let mut own = own.iter().flat_map(|own| &own.parameters);
         if let Some(same) = own.find(|own| own.name == parameter.name) {
             fact_ui(ui, "", format!("session: {}", text::cell(same)));
         }
     }
+    budget_ui(ui, &format!("{BUDGET_TITLE} of '{}'", one.name), &parameters);
     if let Some(profile) = results["profile"].as_array() {
         quiet_ui(ui, "95 % from the profile likelihood");
         let number = |value: &serde_json::Value| match value.as_f64() {
