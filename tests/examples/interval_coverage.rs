@@ -17,6 +17,8 @@ fn main() {
         let force: Vec<CoverageDraws> = found.iter().map(|one| one.force).collect();
         println!("{}", table(&format!("{name}, fitted in volts"), &signal));
         println!("{}", table(&format!("{name}, fitted in newtons"), &force));
+        let live: Vec<CoverageDraws> = found.iter().map(|one| one.live).collect();
+        println!("{}", table(&format!("{name}, live fit at the end of the run"), &live));
         let held = HELD_OUT_TIMES.iter().enumerate().map(|(k, t)| {
             let count = found.iter().filter(|one| one.held_out[k]).count();
             format!("{:.1} % at {t} s", 100.0 * count as f64 / found.len() as f64)

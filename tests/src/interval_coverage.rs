@@ -12,7 +12,9 @@ use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
-use palpate_rheology::fit::{FitOptions, FitReport, FitSolution, JointReport, fit_joint};
+use palpate_rheology::fit::{
+    FitOptions, FitSolution, FittedParameter, JointReport, LiveFit, fit_joint,
+};
 use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
 use palpate_sessions::document_store::save_document;
@@ -89,6 +91,8 @@ impl CoverageCase {
 pub struct SeedDraws {
     pub signal: CoverageDraws,
     pub force: CoverageDraws,
+    /// What the live fit says at the end of the run; it knows no contact position.
+    pub live: CoverageDraws,
     /// Whether the 95 % band of the fit in volts holds the true force of a run at [`HELD_OUT_SPEED`], at
     /// [`HELD_OUT_TIMES`].
     pub held_out: [bool; 4],
@@ -203,9 +207,14 @@ pub fn draw(case: &CoverageCase) -> SeedDraws {
         intervals: IntervalRequest::default(),
     };
     let signal = fit_together(&records, &request, |_, _| ()).expect("a fit");
-    let of = |report: &JointReport| draws_of(&report.records[0].report, &truth);
+    let of = |report: &JointReport| draws_of(&report.records[0].report.parameters, &truth);
+    let mut live = LiveFit::new(RampHold::default().depth);
+    for sample in &records.all[0].samples {
+        live.push(sample.t, sample.depth, sample.force, sample.sigma);
+    }
+    let live = draws_of(&live.estimate().expect("an estimate").parameters, &truth);
     let held_out = held_out(&records, case.settings.cell, &options, &truth);
-    SeedDraws { signal: of(&signal.report), force: of(&force), held_out }
+    SeedDraws { signal: of(&signal.report), force: of(&force), live, held_out }
 }
 
 /// Whether the bands of the first record's fit hold true forces at another speed.
@@ -243,9 +252,11 @@ fn held_out(
     })
 }
 
-fn draws_of(report: &FitReport, truth: &[f64; 6]) -> CoverageDraws {
+fn draws_of(parameters: &[FittedParameter], truth: &[f64; 6]) -> CoverageDraws {
     std::array::from_fn(|k| {
-        let one = report.parameter(NAMES[k]).expect("a parameter");
+        let Some(one) = parameters.iter().find(|one| one.name == NAMES[k]) else {
+            return CoverageDraw::default();
+        };
         let scale = if k < 5 { truth[k].abs() } else { 1.0 };
         let std_error = one.std_error.unwrap_or(0.0);
         let holds = |interval: Option<[f64; 2]>| {

@@ -177,10 +177,10 @@ fn total_intervals_and_budget_of_a_recorded_session_and_of_its_stored_fit_are_on
     let share = 100.0 * largest.powi(2) / variance;
     for words in [
         format!("<td>[{low:.4}, {high:.4}]</td>"),
-        format!("<td><strong>{largest:.3} ({share:.0} %)</strong></td>"),
+        format!(" ({share:.0} %)</strong></td>"),
         "<th scope=\"col\">total 95 % interval</th>".to_owned(),
         "Uncertainty budget: ".to_owned(),
-        "to reduce the part of".to_owned(),
+        "to reduce the contribution of".to_owned(),
     ] {
         assert!(page.matches(&words).count() >= 2, "{words}");
     }

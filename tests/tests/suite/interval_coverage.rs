@@ -11,6 +11,12 @@ const OWN_SEEDS: u64 = 20;
 const OWN_HELD_MIN: usize = 16;
 /// The spread of 60 draws is uncertain by 9 %; three times that, on the 1.3 that an interval may be too wide.
 const WIDTH_MAX: f64 = 1.3 * 1.28;
+/// The spread of 20 draws is uncertain by 16 %; three times that.
+const OWN_WIDTH_MAX: f64 = 1.3 * 1.48;
+/// With three weights too few.
+const SHORT_SEEDS: u64 = 8;
+/// Of 8 intervals that hold with 95 %, fewer than this do once in 2700 times.
+const SHORT_HELD_MIN: usize = 5;
 /// The same on a spread of which the limit is stated.
 const SPREAD_SLACK: f64 = 1.28;
 
@@ -47,7 +53,22 @@ fn total_intervals_hold_the_truth_after_a_calibration_of_the_rigs_own_cell() {
     for (k, one) in found.iter().enumerate() {
         println!("{}: {one:?}", NAMES[k]);
         assert!(one.covered_in_total >= OWN_HELD_MIN, "{}: {one:?}", NAMES[k]);
+        assert!(one.total_stated < OWN_WIDTH_MAX * one.total_spread, "{}: {one:?}", NAMES[k]);
+        // What the record says of the curve makes the estimate better, that of the contact position nearly as good.
+        let most = if k < 5 { 0.9 } else { 1.1 };
+        assert!(one.total_spread < most * one.spread, "{}: {one:?}", NAMES[k]);
     }
     // Without the calibration's part some would not.
     assert!(found.iter().any(|one| one.covered < OWN_HELD_MIN), "{found:?}");
+}
+
+#[test]
+fn total_intervals_grow_where_the_calibration_lacks_weights() {
+    let found = summarise(&signal_draws("few-weights", SHORT_SEEDS));
+    for (k, one) in found.iter().enumerate() {
+        println!("{}: {one:?}", NAMES[k]);
+        assert!(one.covered_in_total >= SHORT_HELD_MIN, "{}: {one:?}", NAMES[k]);
+        // With all weights it is 0.5 % at most.
+        assert!(k == 5 || one.total_stated > 2.0, "{}: {one:?}", NAMES[k]);
+    }
 }
