@@ -5,8 +5,8 @@ use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::calibration::ForceUncertainty;
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{FitOptions, FitSolution, SignalRecord, TracedRecord};
+use palpate_runner::Stopwatch;
 use palpate_tests::recorded_runs::record_ramp_hold;
-use std::time::Instant;
 
 fn main() {
     let repeats = std::env::args().nth(1).map_or(21, |text| text.parse().expect("a number"));
@@ -21,16 +21,16 @@ fn main() {
     let traced = TracedRecord { name: "lab", samples, calibration, compliance: None };
     let mut times = [const { Vec::new() }; 3];
     for _ in 0..repeats {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         FitSolution::of(samples, &options).expect("a fit").report();
-        times[0].push(start.elapsed().as_secs_f64());
-        let start = Instant::now();
+        times[0].push(start.seconds());
+        let start = Stopwatch::start();
         let fitted = FitSolution::fit_signals(&[record], &options, &[]).expect("a fit");
         fitted.report();
-        times[1].push(start.elapsed().as_secs_f64());
-        let start = Instant::now();
+        times[1].push(start.seconds());
+        let start = Stopwatch::start();
         fitted.systematic(&[traced]).expect("its uncertainty");
-        times[2].push(start.elapsed().as_secs_f64());
+        times[2].push(start.seconds());
     }
     let [forces, volts, errors] = times.map(|mut times: Vec<f64>| {
         times.sort_by(f64::total_cmp);

@@ -52,7 +52,7 @@ impl FitSolution<'_> {
         }
         let uncertainty = self.uncertainty();
         let sources: Vec<ResidualSource> = (0..self.system.records.len())
-            .map(|record| self.residual_source(&uncertainty, record))
+            .map(|record| self.residual_source(uncertainty, record))
             .collect();
         if let Some(short) = sources.iter().find(|source| source.blocks() < BLOCKS_MIN) {
             return Err(FitError::TooFewBlocks { blocks: short.blocks(), needed: BLOCKS_MIN });

@@ -15,6 +15,9 @@ const STEP_ZERO: f64 = 1e-13;
 const STEP_SHARE: f64 = 0.1;
 /// The same with a free contact: the sum bends more sharply over it than over a relaxation time.
 const STEP_SHARE_CONTACT: f64 = 0.001;
+/// The same where errors of the calibration are found too: they are taken as straight around what was found before, which
+/// leaves steps of a few thousandths.
+const STEP_SHARE_ERRORS: f64 = 0.01;
 /// But only where it is short enough for its square to be small.
 const STEP_LONG: f64 = 1e-2;
 /// Steps at most, those that were refused included.
@@ -281,7 +284,11 @@ impl Iterate {
         let scatter = (joint.residual_sum(all) / spare as f64).sqrt();
         let contact = system.layout().contact();
         let has_contact = system.unknowns.iter().any(|one| one.parameter == contact);
-        let share = if has_contact { STEP_SHARE_CONTACT } else { STEP_SHARE };
+        let share = match has_contact {
+            _ if system.errors.count > 0 => STEP_SHARE_ERRORS,
+            true => STEP_SHARE_CONTACT,
+            false => STEP_SHARE,
+        };
         step.iter().enumerate().all(|(k, step)| {
             let mut outer = vec![0.0; all];
             outer[system.linear + k] = 1.0;

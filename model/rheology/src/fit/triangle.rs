@@ -61,6 +61,19 @@ impl Triangle {
         reduce(&mut self.r, self.width, columns);
     }
 
+    /// Takes out the row of the first unknown. The second becomes the first, and the second is a new one of which nothing is
+    /// known; rows stay an upper triangle.
+    pub fn pass_first(&mut self) -> Vec<f64> {
+        self.flush();
+        let (first, rest) = self.r.split_at_mut(self.width);
+        let passed = first.to_vec();
+        let second = &mut rest[..self.width];
+        first.copy_from_slice(second);
+        (first[0], first[1]) = (second[1], 0.0);
+        second.fill(0.0);
+        passed
+    }
+
     /// The finished triangle, `width` by `width`, row by row.
     pub fn finish(mut self) -> Factor {
         self.flush();

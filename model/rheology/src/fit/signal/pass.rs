@@ -2,13 +2,15 @@
 
 use super::super::block_sums::NoiseBlock;
 use super::super::columns::{ParameterPoint, Slope};
-use super::super::design::LANES;
-use super::super::passes::{RecordFactor, UnknownPlace};
-use super::super::system::{Rows, System};
+use super::super::design::{LANES, Lane};
+use super::super::passes::{Pass, RecordFactor, UnknownPlace, product};
+use super::super::sample::FitSample;
+use super::super::system::System;
 use super::super::triangle::Triangle;
 use super::lag::LaggingCell;
 use super::zero::{ZeroFilter, ZeroSolution};
 use super::{Drift, ErrorColumns, ErrorPlace, SignalTerm};
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::units::Newtons;
 use std::ops::Range;
 use std::sync::Arc;
@@ -34,6 +36,80 @@ struct SignalMeans {
     means: Vec<SampleMean>,
     /// Squares of the noise about its means, in V^2.
     within: f64,
+}
+
+/// Means of neighbouring samples.
+struct ClosedMean {
+    t: f64,
+    volts: f64,
+    count: usize,
+    columns: Vec<f64>,
+}
+
+/// Sums of the samples so far of a mean.
+#[derive(Default)]
+struct OpenMean {
+    /// Of the columns of the force.
+    sums: Vec<f64>,
+    taken: usize,
+    count: usize,
+    /// Time, signal, modelled force and slope of the curve at the first sample, from which the others count: their squares stay
+    /// small.
+    first: [f64; 4],
+    time: f64,
+    volts: f64,
+    /// The signal with what the modelled force makes of it subtracted.
+    noise: f64,
+    square: f64,
+}
+
+impl OpenMean {
+    fn add(&mut self, t: f64, volts: f64, force: f64, curve: &CalibrationCurve) {
+        if self.count == 0 {
+            self.first = [t, volts, force, curve.sensitivity_at(Newtons(force))];
+        }
+        let [first_t, first_volts, first_force, slope] = self.first;
+        self.count += 1;
+        self.time += t - first_t;
+        self.volts += volts - first_volts;
+        let noise = volts - first_volts - slope * (force - first_force);
+        self.noise += noise;
+        self.square += noise * noise;
+    }
+
+    /// Adds the columns of these samples, the first of which is in this lane.
+    fn add_columns(&mut self, lanes: &[Lane], samples: &[FitSample], from: usize) {
+        let is_whole = samples.iter().all(FitSample::is_measured);
+        for (sum, lane) in self.sums.iter_mut().zip(lanes) {
+            let values = &lane[from..from + samples.len()];
+            *sum += match is_whole {
+                true => values.iter().sum::<f64>(),
+                false => {
+                    let pairs = values.iter().zip(samples);
+                    pairs.filter(|(_, one)| one.is_measured()).map(|(value, _)| value).sum()
+                }
+            };
+        }
+    }
+
+    /// Squares of the noise about its mean.
+    fn noise_square(&self) -> f64 {
+        (self.square - self.noise * self.noise / self.count.max(1) as f64).max(0.0)
+    }
+
+    /// The means, of which the next begin; `None` where no force was known.
+    fn take_mean(&mut self) -> Option<ClosedMean> {
+        let count = self.count;
+        let over = 1.0 / count as f64;
+        let next = Self { sums: vec![0.0; self.sums.len()], ..Self::default() };
+        let Self { sums, first, time, volts, .. } = std::mem::replace(self, next);
+        (count > 0).then(|| ClosedMean {
+            t: first[0] + over * time,
+            volts: first[1] + over * volts,
+            count,
+            columns: sums.into_iter().map(|sum| over * sum).collect(),
+        })
+    }
 }
 
 impl System<'_> {
@@ -110,12 +186,11 @@ impl System<'_> {
         Some(Self { errors, ..self.clone() })
     }
 
-    /// The same around the errors that are found at these points.
-    pub(in super::super) fn with_errors_found(mut self, points: &[ParameterPoint]) -> Option<Self> {
-        let count = self.errors.count;
-        let pass = self.pass(points, Rows::All)?;
-        let change = pass.with_errors?.solve(count + self.unknowns.len());
-        let pairs = self.errors.found.iter_mut().zip(&change[..count]);
+    /// The same around the errors that a pass finds.
+    pub(in super::super) fn with_errors_found(mut self, pass: &Pass) -> Option<Self> {
+        let whole = pass.with_errors.as_ref()?;
+        let change = whole.solve(self.errors.count + self.unknowns.len());
+        let pairs = self.errors.found.iter_mut().zip(&change);
         pairs.for_each(|(found, change)| *found += change);
         Some(self)
     }
@@ -174,10 +249,9 @@ impl System<'_> {
                 row[width - 1] = term.contact_mm - point.outer.contact * self.depth_mm;
                 triangle.push(&row, term.drift.noise / error);
             }
-            for k in own.len()..width - 1 {
+            for (k, found) in (own.len()..width - 1).zip(&self.errors.found) {
                 let mut row = vec![0.0; width];
-                row[k] = 1.0;
-                row[width - 1] = -self.errors.found[k - own.len()];
+                (row[k], row[width - 1]) = (1.0, -found);
                 triangle.push(&row, term.drift.noise);
             }
             let factor = triangle.finish();
@@ -203,90 +277,68 @@ impl System<'_> {
         let samples = self.records[record].samples;
         let columns = self.layout().linear_count() + slopes.len();
         let length = samples.len().div_ceil(MEANS).max(1);
-        let mut found = SignalMeans { means: Vec::with_capacity(MEANS + 1), within: 0.0 };
-        let mut lanes = vec![[0.0; LANES]; columns + 1];
-        let mut sums = vec![0.0; columns];
-        let (mut taken, mut count) = (0usize, 0usize);
-        // Times and volts from the first sample of a mean: their squares stay small.
-        let (mut origin, mut time, mut volts) = ((0.0, 0.0), 0.0, 0.0);
-        // The same with what the modelled force makes of the signal subtracted: noise.
-        let (mut first, mut noise, mut square) = ((0.0, 0.0), 0.0, 0.0);
-        let mut place = 0;
         let (shallowest, deepest) = self.records[record].depths;
         let (reach, mut depth) = ((deepest - shallowest) / DEPTHS, shallowest);
+        let mut found = SignalMeans { means: Vec::with_capacity(MEANS + 1), within: 0.0 };
+        let mut lanes = vec![[0.0; LANES]; columns + 1];
+        let mut open = OpenMean { sums: vec![0.0; columns], ..OpenMean::default() };
+        let mut close = self.mean_maker(record, term, point);
+        let curve = &term.signal.curve;
+        let mut place = 0;
+        self.source.walk(samples, self.scale(&point.outer), point, slopes, |block, filled| {
+            filled.write(&mut lanes, point, slopes);
+            let mut forces = [0.0; LANES];
+            for (lane, share) in lanes.iter().zip(&point.at) {
+                forces.iter_mut().zip(lane).for_each(|(force, value)| *force += share * value);
+            }
+            let mut from = 0;
+            for (i, sample) in block.iter().enumerate() {
+                open.taken += 1;
+                if sample.is_measured() {
+                    open.add(sample.t.0, term.signal.volts[place + i], forces[i], curve);
+                }
+                let is_full = open.taken == length
+                    || place + i + 1 == samples.len()
+                    || (sample.depth.0 - depth).abs() >= reach;
+                if is_full || i + 1 == block.len() {
+                    open.add_columns(&lanes, &block[from..=i], from);
+                    from = i + 1;
+                }
+                if is_full {
+                    depth = sample.depth.0;
+                    found.within += open.noise_square();
+                    let samples = place + i + 1 - open.taken..place + i + 1;
+                    found.means.extend(open.take_mean().map(|mean| close(mean, samples)));
+                }
+            }
+            place += block.len();
+        })?;
+        (!found.means.is_empty()).then_some(found)
+    }
+
+    /// Makes rows of the means of a record, in the order of time.
+    fn mean_maker<'b>(
+        &'b self,
+        record: usize,
+        term: &'b SignalTerm<'_>,
+        point: &'b ParameterPoint,
+    ) -> impl FnMut(ClosedMean, Range<usize>) -> SampleMean + 'b {
         let curve = &term.signal.curve;
         let mut cell = LaggingCell::new(term.signal.hysteresis.as_ref());
         let mut errors = self.errors.columns.get(record).map(|all| all.iter());
-        let mut close =
-            |sums: &mut [f64], samples: Range<usize>, count: usize, t: f64, volts: f64| {
-                let over = 1.0 / count as f64;
-                sums.iter_mut().for_each(|sum| *sum *= over);
-                let shares = sums.iter().zip(&point.at);
-                let force = shares.map(|(column, share)| column * share).sum::<f64>();
-                let lag = cell.lag(force);
-                let changes = errors.as_mut().and_then(Iterator::next);
-                let moved = changes.map_or(0.0, |changes| {
-                    changes.iter().zip(&self.errors.found).map(|(one, found)| one * found).sum()
-                });
-                let felt = Newtons(force - cell.half() * lag + moved);
-                let slope = curve.sensitivity_at(felt);
-                let mut columns: Vec<f64> = sums.iter().map(|column| slope * column).collect();
-                if let Some(changes) = changes {
-                    columns.extend(changes.iter().map(|change| slope * change));
-                }
-                columns.push(volts - curve.volts_from_newtons(felt).0);
-                let place = ErrorPlace { record, samples, force, lag };
-                found.means.push(SampleMean { t, count, place, columns });
-                sums.fill(0.0);
-            };
-        let mut within = 0.0;
-        self.source.walk(samples, self.scale(&point.outer), point, slopes, |block, filled| {
-            filled.write(&mut lanes, point, slopes);
-            for (i, sample) in block.iter().enumerate() {
-                if sample.is_measured() {
-                    let signal = term.signal.volts[place];
-                    let shares = lanes.iter().zip(&point.at);
-                    let force = shares.map(|(lane, share)| lane[i] * share).sum::<f64>();
-                    if count == 0 {
-                        origin = (sample.t.0, signal);
-                        first = (force, curve.sensitivity_at(Newtons(force)));
-                    }
-                    count += 1;
-                    time += sample.t.0 - origin.0;
-                    volts += signal - origin.1;
-                    let left = signal - origin.1 - first.1 * (force - first.0);
-                    noise += left;
-                    square += left * left;
-                    for (sum, lane) in sums.iter_mut().zip(&lanes) {
-                        *sum += lane[i];
-                    }
-                }
-                place += 1;
-                taken += 1;
-                let is_far = (sample.depth.0 - depth).abs() >= reach;
-                if taken == length || place == samples.len() || is_far {
-                    depth = sample.depth.0;
-                    if count == 0 {
-                        taken = 0;
-                        continue;
-                    }
-                    let over = 1.0 / count as f64;
-                    let samples = place - taken..place;
-                    close(
-                        &mut sums,
-                        samples,
-                        count,
-                        origin.0 + over * time,
-                        origin.1 + over * volts,
-                    );
-                    within += (square - over * noise * noise).max(0.0);
-                    (taken, count, time, volts) = (0, 0, 0.0, 0.0);
-                    (noise, square) = (0.0, 0.0);
-                }
-            }
-        })?;
-        found.within = within;
-        (!found.means.is_empty()).then_some(found)
+        move |mean, samples| {
+            let force = product(&point.at, &mean.columns);
+            let lag = cell.lag(force);
+            let changes = errors.as_mut().and_then(Iterator::next);
+            let moved = changes.map_or(0.0, |changes| product(changes, &self.errors.found));
+            let felt = Newtons(force - cell.half() * lag + moved);
+            let slope = curve.sensitivity_at(felt);
+            let all = mean.columns.iter().chain(changes.into_iter().flatten());
+            let mut columns: Vec<f64> = all.map(|column| slope * column).collect();
+            columns.push(mean.volts - curve.volts_from_newtons(felt).0);
+            let place = ErrorPlace { record, samples, force, lag };
+            SampleMean { t: mean.t, count: mean.count, place, columns }
+        }
     }
 
     /// The rows that say where the contact positions were before the records were looked at, for small changes of

@@ -79,15 +79,7 @@ impl ZeroFilter {
     }
 
     fn pass_node(&mut self) {
-        let width = self.row.len();
-        let factor = std::mem::replace(&mut self.triangle, Triangle::new(width)).finish();
-        for i in 1..width {
-            let row = factor.row(i);
-            self.row.copy_from_slice(row);
-            (self.row[0], self.row[1]) = (row[1], 0.0);
-            self.triangle.push(&self.row, 1.0);
-        }
-        self.passed.push(factor.row(0).to_vec());
+        self.passed.push(self.triangle.pass_first());
         self.present += 1;
         self.push_step();
     }

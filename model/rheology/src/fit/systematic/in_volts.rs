@@ -38,6 +38,9 @@ fn shared_errors<'a>(records: &[TracedRecord<'a>]) -> Vec<SharedError<'a>> {
     terms.chain(compliances.into_iter().map(SharedError::Compliance)).collect()
 }
 
+/// Times that errors and drift are found in turn: after two, no value of the simulated cells moves by a tenth of its
+/// uncertainty.
+const ERROR_PASSES: usize = 2;
 /// Errors that come out larger than so many standard uncertainties contradict their statement: of forty, one does so once
 /// in ten records by chance if nothing else were known of it, and what is known of it makes that rarer.
 const CONTRADICTION: f64 = 3.0;
@@ -142,28 +145,31 @@ impl<'a> FitSolution<'a> {
                 None => Vec::new(),
             });
         }
-        let change = |place: &ErrorPlace, error: &SharedError<'_>| {
-            let record = &records[place.record];
-            match *error {
-                SharedError::Calibration { of, .. } if record.calibration != Some(of) => 0.0,
-                SharedError::Calibration { of, index, term } => {
-                    let signal = self.system.signals[place.record].as_ref();
-                    let own = signal.and_then(|term| term.signal.hysteresis.as_ref());
-                    match own.filter(|_| term == UncertaintyTerm::Hysteresis) {
-                        Some(own) => -place.lag * own.std_error.0.hypot(LOOP_SHARE * own.half.0),
-                        None => of.1.shift(index, Newtons(place.force)).0,
-                    }
+        let is_of = |record: &TracedRecord<'_>, error: &SharedError<'_>| match *error {
+            SharedError::Calibration { of, .. } => record.calibration == Some(of),
+            SharedError::Compliance(of) => record.compliance == Some(of),
+        };
+        // Documents are compared once: they are long.
+        let own = records.iter().map(|record| errors.iter().map(|error| is_of(record, error)));
+        let own: Vec<Vec<bool>> = own.map(Iterator::collect).collect();
+        let change = |place: &ErrorPlace, error: &SharedError<'_>| match *error {
+            SharedError::Calibration { of, index, term } => {
+                let signal = self.system.signals[place.record].as_ref();
+                let own = signal.and_then(|term| term.signal.hysteresis.as_ref());
+                match own.filter(|_| term == UncertaintyTerm::Hysteresis) {
+                    Some(own) => -place.lag * own.std_error.0.hypot(LOOP_SHARE * own.half.0),
+                    None => of.1.shift(index, Newtons(place.force)).0,
                 }
-                SharedError::Compliance(of) if record.compliance != Some(of) => 0.0,
-                SharedError::Compliance(_) => {
-                    let bent = &bends[place.record][place.samples.clone()];
-                    bent.iter().sum::<f64>() / bent.len() as f64
-                }
+            }
+            SharedError::Compliance(_) => {
+                let bent = &bends[place.record][place.samples.clone()];
+                bent.iter().sum::<f64>() / bent.len() as f64
             }
         };
         let points = &self.refined.points;
         let system = self.system.with_errors(points, errors.len(), |place| {
-            errors.iter().map(|error| change(place, error)).collect()
+            let pairs = errors.iter().zip(&own[place.record]);
+            pairs.map(|(error, is_own)| if *is_own { change(place, error) } else { 0.0 }).collect()
         });
         system.ok_or(FitError::Overflow)
     }
@@ -173,15 +179,14 @@ impl<'a> FitSolution<'a> {
     fn with_errors_found(&self, system: &System<'a>) -> Option<Self> {
         let mut system = system.clone();
         let mut points = self.refined.points.clone();
-        // The second time around the errors found.
-        for _ in 0..2 {
-            system = system.with_errors_found(&points)?;
-            // What a wrong curve leaves is no drift.
-            system = system.with_drift_of_records(&points);
+        let mut pass = system.pass(&points, Rows::All)?;
+        // Each time around the errors found before; what a wrong curve leaves is no drift.
+        for _ in 0..ERROR_PASSES {
+            system = system.with_errors_found(&pass)?.with_drift_of_records(&points);
             let fitted = Self::refined(system, &points).ok()?;
-            (system, points) = (fitted.system, fitted.refined.points);
+            (system, points, pass) = (fitted.system, fitted.refined.points, fitted.refined.pass);
         }
-        system = system.with_errors_found(&points)?;
+        system = system.with_errors_found(&pass)?;
         let is_stated = system.errors.found.iter().all(|error| error.abs() < CONTRADICTION);
         let fitted = is_stated.then(|| Self::refined(system, &points).ok()).flatten()?;
         let uncertainty = fitted.uncertainty();
