@@ -270,7 +270,7 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
     let at = folder.path();
     let check = ["daily-check", "--time-scale", "max"];
     for (more, words) in
-        [(&[][..], "operator"), (&["--operator", "Ada", "--mass", "500"], "0.505 N")]
+        [(&[][..], "operator"), (&["--operator", "Ada", "--mass", "500"], "0.508 N")]
     {
         let refused = palpate(at, &[&check[..], more].concat());
         assert_eq!(refused.status.code(), Some(2), "{more:?}");

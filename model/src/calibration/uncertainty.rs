@@ -315,7 +315,8 @@ impl<'a> ComponentBuilder<'a> {
         other.newtons_from_volts(above_zero + other.volts_from_newtons(zero)).0
     }
 
-    /// Between weights, an arch of the size of the neighbours' errors when left out, and one that changes its sign halfway. A curve that meets its
+    /// Between weights, an arch of the size of the neighbours' errors when left out, and two that change their sign once and
+    /// twice, orthogonal to it: Gegenbauer polynomials (Abramowitz & Stegun, section 22.2). A curve that meets its
     /// points is held to the interval whose ends it knows; one that misses them may be off at each point.
     fn interpolation(&self) -> Option<Vec<Component>> {
         let left_out = left_out_volts(&self.calibration.curve, &self.points);
@@ -330,7 +331,7 @@ impl<'a> ComponentBuilder<'a> {
         };
         let sensitivity = |force: f64| self.curve.sensitivity_at(Newtons(force));
         if self.calibration.curve.meets_all(&self.points) {
-            let arch = |(i, is_skew): (usize, bool)| {
+            let arch = |(i, order): (usize, usize)| {
                 let near = left_out[i..=i + 1].iter().flatten().copied();
                 let sigma = GAP_SHARE * rms(near).unwrap_or(0.0);
                 let (from, to) = (newtons(i), newtons(i + 1));
@@ -339,13 +340,13 @@ impl<'a> ComponentBuilder<'a> {
                     if !(0.0..=1.0).contains(&s) {
                         return 0.0;
                     }
-                    let skew = if is_skew { 1.0 - 2.0 * s } else { 1.0 };
-                    let error = 4.0 * s * (1.0 - s) * skew * sigma / sensitivity(force);
+                    let shape = [1.0, 1.0 - 2.0 * s, 1.0 - 5.0 * s * (1.0 - s)][order];
+                    let error = 4.0 * s * (1.0 - s) * shape * sigma / sensitivity(force);
                     let limit = (force - from).min(to - force);
                     error.clamp(-limit, limit)
                 })
             };
-            let arches = (0..last).flat_map(|i| [(i, false), (i, true)]);
+            let arches = (0..last).flat_map(|i| (0..3).map(move |order| (i, order)));
             return Some(arches.map(arch).collect());
         }
         let sigma = rms(left_out.iter().flatten().copied()).unwrap_or(0.0);
