@@ -105,7 +105,6 @@ impl FitReport {
         let known = self.parameters.iter_mut();
         for parameter in known.filter(|one| one.std_error.is_some()) {
             let own = systematic.parameters.iter().find(|one| one.name == parameter.name);
-            parameter.systematic_error = own.map(|own| own.error);
             let (Some(own), Some([low, high]), Some(std_error)) =
                 (own, parameter.ci95, parameter.std_error)
             else {
@@ -116,10 +115,18 @@ impl FitReport {
                 statistical: std_error,
                 half: 0.5 * (high - low),
             });
-            let widening = joint.statistical / std_error;
-            if !parameter.budget.is_empty() {
-                parameter.budget.iter_mut().for_each(|one| one.error *= widening);
-                parameter.budget.extend(own.budget());
+            // What an exact calibration would take away: its errors, and the noise that finding them lets in.
+            let all = joint.statistical.hypot(own.error);
+            let added = (all.powi(2) - std_error.powi(2)).max(0.0).sqrt();
+            // An exact one may even state more, where a wrong curve passes for drift.
+            let left = if added > 0.0 { 1.0 } else { all / std_error };
+            parameter.systematic_error = Some(added);
+            if !parameter.budget.is_empty() && own.error > 0.0 {
+                parameter.budget.iter_mut().for_each(|one| one.error *= left);
+                let share = added / own.error;
+                let entries = own.budget().into_iter();
+                let entries = entries.map(|one| BudgetEntry { error: share * one.error, ..one });
+                parameter.budget.extend(entries.filter(|one| one.error > 0.0));
             }
             // Two standard normal errors add in quadrature, and so do the halves of their intervals.
             let half = joint.half.hypot(NORMAL975 * own.error);

@@ -137,9 +137,10 @@ fn records_of_one_calibration_move_together_and_of_two_apart() {
     let alone = estimate_systematic(traced(&one, "a", &uncertainty), &options).unwrap();
     let (same, apart) = (joint(["a", "a"]), joint(["a", "b"]));
     for (k, own) in alone.parameters.iter().enumerate().take(5) {
-        // Twice the same record with the same error: the same as once.
+        // Twice the same record with the same error: the same as once. Fits end within 1e-9 of a parameter, and an error is
+        // a thousandth of it or less.
         let ratio = same[0].parameters[k].error / own.error;
-        assert!((ratio - 1.0).abs() < 1e-6, "{}: {ratio}", own.name);
+        assert!((ratio - 1.0).abs() < 1e-5, "{}: {ratio}", own.name);
         // Each moves half of the body, and both are independent: 1 / sqrt(2). Differences of a fit that bends
         // are a few percent off.
         let ratio = apart[1].parameters[k].error / own.error;
