@@ -3,11 +3,9 @@
 use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::FitSolution;
+use super::uncertainty::DIFFERENCE;
 use crate::families::Model;
 use palpate_model::units::{Depth, Newtons, Seconds};
-
-/// Share of a parameter over which forces are differenced: the root of rounding.
-const DIFFERENCE: f64 = 1e-6;
 
 /// A force that a fit predicts.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -16,7 +16,7 @@ const CONTACT_EDGE: f64 = 1e-6;
 const ROUNDING: f64 = 1e-24;
 
 /// Share of a parameter over which what is derived from it is differenced.
-const DIFFERENCE: f64 = 1e-6;
+pub(super) const DIFFERENCE: f64 = 1e-6;
 
 /// Scatter and autocorrelation of the residuals of all records.
 #[derive(Clone, Debug)]

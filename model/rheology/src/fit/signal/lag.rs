@@ -2,7 +2,9 @@
 
 use palpate_model::calibration::HysteresisLoop;
 
-/// Change of the force over which a load cell goes from one side of its loop to the other, as a share of its range.
+/// Change of the force over which a load cell goes from one side of its loop to the other, as a share of its range. Assumed:
+/// weight steps are far larger than it, so no calibration tells it, and the simulated cell has the same. The uncertainty
+/// of the loop's width allows for another.
 const TURN_SHARE: f64 = 0.02;
 
 /// The side that a load cell is on while its force changes.

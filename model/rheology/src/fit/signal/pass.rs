@@ -19,6 +19,8 @@ use std::sync::Arc;
 /// columns are as good as straight, so that it holds all that they know.
 const MEANS: usize = 1024;
 const DEPTHS: f64 = 512.0;
+/// But over no fewer than a mean's samples divided by this: measured depths that tremble would else make a mean of every sample.
+const MEAN_PARTS: usize = 16;
 /// Blocks in which autocorrelation is estimated, as of records without a signal.
 const NOISE_BLOCKS: usize = 400;
 
@@ -297,9 +299,9 @@ impl System<'_> {
                 if sample.is_measured() {
                     open.add(sample.t.0, term.signal.volts[place + i], forces[i], curve);
                 }
-                let is_full = open.taken == length
-                    || place + i + 1 == samples.len()
-                    || (sample.depth.0 - depth).abs() >= reach;
+                let is_far =
+                    open.taken * MEAN_PARTS >= length && (sample.depth.0 - depth).abs() >= reach;
+                let is_full = open.taken == length || place + i + 1 == samples.len() || is_far;
                 if is_full || i + 1 == block.len() {
                     open.add_columns(&lanes, &block[from..=i], from);
                     from = i + 1;

@@ -16,8 +16,8 @@ use crate::distinct;
 use palpate_model::calibration::{ForceUncertainty, UncertaintyTerm};
 use palpate_model::units::Newtons;
 
-/// Standard uncertainty of the width of a loop, relative to that of the calibration: a smaller change of the force may
-/// make a loop narrower by any share up to this much times the root of twelve, which is all.
+/// Standard uncertainty of the width of a loop, relative to its width in the calibration: over a part of the range a loop
+/// is narrower, by nobody knows how much. That of a rectangular distribution from nothing to the whole: 1 / sqrt(12).
 const LOOP_SHARE: f64 = 0.29;
 
 /// One independent error that records share.
@@ -38,8 +38,7 @@ fn shared_errors<'a>(records: &[TracedRecord<'a>]) -> Vec<SharedError<'a>> {
     terms.chain(compliances.into_iter().map(SharedError::Compliance)).collect()
 }
 
-/// Times that errors and drift are found in turn: after two, no value of the simulated cells moves by a tenth of its
-/// uncertainty.
+/// Times that errors and drift are found in turn: each starts from the other of the time before.
 const ERROR_PASSES: usize = 2;
 /// Errors that come out larger than so many standard uncertainties contradict their statement: of forty, one does so once
 /// in ten records by chance if nothing else were known of it, and what is known of it makes that rarer.
