@@ -8,6 +8,7 @@ use super::super::signal::ErrorPlace;
 use super::super::solve::FitSolution;
 use super::super::system::{Rows, System};
 use super::super::uncertainty::UncertaintyEstimate;
+use super::sentence::total_half;
 use super::{
     JointChange, SystematicError, SystematicUncertainty, TermError, TracedRecord, add_compliance,
     estimate_systematic_jointly,
@@ -47,6 +48,11 @@ const CONTRADICTION: f64 = 3.0;
 /// Nor do errors explain a record whose residuals then still have a long-run variance so many times their own: the model does
 /// not describe it, and would bend the curve instead.
 const MEMORY_MAX: f64 = 2.0;
+
+/// The standard uncertainty that is left of one without an independent part of it.
+fn difference(all: f64, part: f64) -> f64 {
+    (all.powi(2) - part.powi(2)).max(0.0).sqrt()
+}
 
 /// The root of the sum of the squares of parts, one for each error, and the same of those of each term.
 fn sum_of_parts(errors: &[SharedError<'_>], parts: impl Iterator<Item = f64>) -> SystematicError {
@@ -107,11 +113,12 @@ impl<'a> FitSolution<'a> {
         let of_record = |record: usize| {
             let changes = &changes[record * names.len()..];
             let found = whole.combinations(record).into_iter().zip(whole.estimates(record));
-            let each = names.iter().zip(found).zip(changes);
-            let parameters = each.map(|((name, (combination, estimate)), change)| {
-                let known = combination.zip(estimate);
-                let error = known.map(|(combination, estimate)| {
-                    whole.systematic_error(&errors, &combination, estimate, *change)
+            let each = names.iter().zip(found.zip(self.estimates(record))).zip(changes);
+            let parameters = each.map(|((name, ((combination, estimate), exact)), change)| {
+                let known = combination.zip(estimate.zip(exact));
+                let error = known.map(|(combination, (estimate, exact))| {
+                    let exact = exact.std_error;
+                    whole.systematic_error(&errors, &combination, exact, estimate, *change)
                 });
                 SystematicError { name: name.clone(), ..error.unwrap_or_default() }
             });
@@ -210,11 +217,13 @@ impl<'a> FitSolution<'a> {
         Ok((0..errors).map(change).collect())
     }
 
-    /// What the errors contribute to the uncertainty of a combination of unknowns, which they moved by `change`.
+    /// What the errors contribute to the uncertainty of a combination of unknowns, which they moved by `change` and whose
+    /// standard uncertainty with an exact calibration is `exact`.
     fn systematic_error(
         &self,
         errors: &[SharedError<'_>],
         combination: &[f64],
+        exact: f64,
         estimate: UncertaintyEstimate,
         change: f64,
     ) -> SystematicError {
@@ -228,9 +237,19 @@ impl<'a> FitSolution<'a> {
         let unit = self.system.sigma_scale.powi(2);
         let parts = influence.iter().map(|influence| unit * influence.abs());
         let mut found = sum_of_parts(errors, parts);
-        let statistical = (estimate.std_error.powi(2) - found.error.powi(2)).max(0.0).sqrt();
-        let half = student_t975(estimate.freedom) * statistical;
-        found.joint = Some(JointChange { change, statistical, half });
+        let all = estimate.std_error;
+        let left = student_t975(estimate.freedom) * difference(all, found.error);
+        let half = total_half(left, found.error);
+        // What an exact calibration would take away is its errors and the noise that finding them lets in.
+        let added = difference(all, exact);
+        if found.error > 0.0 {
+            let scale = added / found.error;
+            found.terms.iter_mut().for_each(|one| one.error *= scale);
+            found.compliance = found.compliance.map(|error| scale * error);
+            found.error = added;
+        }
+        // A fit that takes a wrong curve for exact may state more, for it takes the error for drift.
+        found.joint = Some(JointChange { change, statistical: exact.min(all), half });
         found
     }
 

@@ -91,9 +91,9 @@ pub struct SystematicError {
 pub struct JointChange {
     /// How far its value moves, in its unit.
     pub change: f64,
-    /// The statistical standard uncertainty that it then has.
+    /// The standard uncertainty that it would have if these errors were known.
     pub statistical: f64,
-    /// Half of its statistical 95 % interval.
+    /// Half of its total 95 % interval.
     #[serde(skip)]
     pub half: f64,
 }

@@ -7,6 +7,11 @@ use palpate_model::calibration::UncertaintyTerm;
 /// Half of the 95 % interval of a standard normal error.
 const NORMAL975: f64 = 1.959_963_985;
 
+/// Half of a total 95 % interval: two standard normal errors add in quadrature, and so do the halves of their intervals.
+pub(super) fn total_half(statistical: f64, error: f64) -> f64 {
+    statistical.hypot(NORMAL975 * error)
+}
+
 impl StatedTerms {
     /// Its own part of a sentence.
     fn words(&self) -> String {
@@ -110,28 +115,19 @@ impl FitReport {
             else {
                 continue;
             };
-            let joint = own.joint.unwrap_or(JointChange {
+            let joint = own.joint.unwrap_or_else(|| JointChange {
                 change: 0.0,
                 statistical: std_error,
-                half: 0.5 * (high - low),
+                half: total_half(0.5 * (high - low), own.error),
             });
-            // What an exact calibration would take away: its errors, and the noise that finding them lets in.
-            let all = joint.statistical.hypot(own.error);
-            let added = (all.powi(2) - std_error.powi(2)).max(0.0).sqrt();
-            // An exact one may even state more, where a wrong curve passes for drift.
-            let left = if added > 0.0 { 1.0 } else { all / std_error };
-            parameter.systematic_error = Some(added);
-            if !parameter.budget.is_empty() && own.error > 0.0 {
-                parameter.budget.iter_mut().for_each(|one| one.error *= left);
-                let share = added / own.error;
-                let entries = own.budget().into_iter();
-                let entries = entries.map(|one| BudgetEntry { error: share * one.error, ..one });
-                parameter.budget.extend(entries.filter(|one| one.error > 0.0));
+            parameter.systematic_error = Some(own.error);
+            if !parameter.budget.is_empty() {
+                let scale = joint.statistical / std_error;
+                parameter.budget.iter_mut().for_each(|one| one.error *= scale);
+                parameter.budget.extend(own.budget());
             }
-            // Two standard normal errors add in quadrature, and so do the halves of their intervals.
-            let half = joint.half.hypot(NORMAL975 * own.error);
             let middle = parameter.value + joint.change;
-            parameter.total95 = Some([middle - half, middle + half]);
+            parameter.total95 = Some([middle - joint.half, middle + joint.half]);
         }
     }
 }
