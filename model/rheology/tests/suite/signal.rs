@@ -1,5 +1,5 @@
 //! Fits of what the load cell reported: a zero that wanders is measured, and what the caller fixed stays fixed.
-use palpate_model::calibration::{Calibration, ForceUncertainty, WeightStep};
+use palpate_model::calibration::{Calibration, ForceUncertainty, HysteresisLoop, WeightStep};
 use palpate_model::units::{Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::fit::{
@@ -103,6 +103,33 @@ fn fixed_contact_position_stays_and_fixed_offset_fits_forces() {
     offset.fix("f_offset", 0.003).unwrap();
     let of_forces = fit(&samples, &offset).unwrap();
     assert_eq!(fitted(&samples, &signal, &offset), of_forces);
+}
+
+#[test]
+fn loop_of_a_load_cell_is_taken_out_of_its_signal() {
+    let known = HysteresisLoop { half: Newtons(0.01), std_error: Newtons(0.0), range: (0.0, 10.0) };
+    let (mut without, mut with) = (0.0, 0.0);
+    for seed in 0..4 {
+        let (samples, mut signal) = record(seed);
+        // The force that a straight cell of 0.15 V/N feels, without noise and drift; it rises, then relaxes.
+        let body = respond(&THESIS, &ramp_hold(0.75, 20.0, 0.01));
+        let (mut before, mut side) = (0.0, 0.0f64);
+        for (volts, one) in signal.volts.iter_mut().zip(&body) {
+            let force = one.force.0;
+            side = (side + (force - before) / 0.1).clamp(-1.0, 1.0);
+            before = force;
+            let share = 4.0 * (force / 10.0) * (1.0 - force / 10.0);
+            *volts -= 0.15 * 0.01 * share * side;
+        }
+        let error = |signal: &Signal| {
+            let report = fitted(&samples, signal, &FitOptions::default());
+            report.value("tau_eps").unwrap() / THESIS.tau_eps - 1.0
+        };
+        without += error(&signal).powi(2);
+        signal.hysteresis = Some(known);
+        with += error(&signal).powi(2);
+    }
+    assert!(with < 0.1 * without, "{with} {without}");
 }
 
 /// Readings of a straight cell, written down with this digit in V, each wrong by up to a half of it.
