@@ -171,7 +171,7 @@ impl PlainNumbers {
             let (first_at, first_ticks, first) = all[0];
             if number.decimals != first.decimals {
                 return Err(unfit(format!(
-                    "its numbers first had {} and now have {} digits after the point; print all numbers with the same number of digits",
+                    "the number of digits after the point has changed from {} to {}; print all numbers with the same number of digits",
                     first.decimals, number.decimals
                 )));
             }
@@ -194,7 +194,7 @@ impl PlainNumbers {
             return if received.is_empty() {
                 console.no_answer("check the port, the cable and that the board sends numbers without being asked")
             } else {
-                unfit("it sends less than one number a second; make it send numbers more often")
+                unfit("it sends less than one number per second; make it send numbers more often")
             };
         };
         let other = DeviceKind::recognise_lines(&split_lines(&received));
@@ -207,7 +207,7 @@ impl PlainNumbers {
             Some(_) => "a time, a comma and a number",
         };
         unfit(format!(
-            "it sends {quote:?} where the rig file expects {wanted}; correct cell.time_column in the rig file, or correct the output of the board"
+            "it sends {quote:?}, but the rig file expects {wanted}; correct cell.time_column in the rig file, or correct the output of the board"
         ))
     }
 }
@@ -236,7 +236,7 @@ impl CellDevice for PlainNumbers {
         };
         let description = CellDescription {
             identity: format!(
-                "plain numbers in {}, {} digits behind the point, up to {}, {}",
+                "plain numbers in {}, {} digits after the point, up to {}, {}",
                 self.unit_name,
                 like.decimals,
                 self.full_scale,
@@ -309,7 +309,7 @@ impl CellProtocol for PlainNumberReader {
         let is_beyond = number.digits.saturating_abs() >= self.counts_max;
         reports.set_beyond_range(
             is_beyond,
-            "its number is at or beyond the end of its range; take the load off, or correct cell.full_scale in the rig file",
+            "its reading is at or beyond full scale; take the load off, or correct cell.full_scale in the rig file",
         );
         let counts = if self.cell.is_reversed { -number.digits } else { number.digits };
         reports.push_counts(now, device_time, counts, self.per_count);

@@ -22,7 +22,7 @@ impl fmt::Display for GrantedPriority {
             Self::RealTime(priority) => write!(f, "real time, priority {priority}"),
             Self::Ordinary(reason) => write!(
                 f,
-                "ordinary, because the system does not grant real-time priority ({reason}); give your account 'rtprio' in /etc/security/limits.conf"
+                "ordinary, because the system does not grant real-time priority ({reason}); set an 'rtprio' limit for your account in /etc/security/limits.conf"
             ),
         }
     }

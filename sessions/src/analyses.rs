@@ -167,7 +167,7 @@ impl Analyses {
             name: name.to_owned(),
             known: match self.withdrawal(name) {
                 Some(by) => format!(" any more, because {} withdrew it: {}", by.by, by.reason),
-                None if self.all.is_empty() => " or any other".to_owned(),
+                None if self.all.is_empty() => ", nor any other".to_owned(),
                 None => String::new(),
             },
         })

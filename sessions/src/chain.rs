@@ -35,9 +35,9 @@ pub enum ChainError {
         /// Which line, from 1.
         line: usize,
     },
-    #[error("{} is incomplete: {}; restore the file from a backup or, to use the recording without this file, move it, {} and the library's catalog elsewhere", path.display(), missing(*found, *written), ChainHead::file_of(path).display())]
+    #[error("{} is incomplete: {}; restore the file from a backup, or move it, {} and the library's catalog elsewhere to use the recording without the file", path.display(), missing(*found, *written), ChainHead::file_of(path).display())]
     Shortened { path: PathBuf, found: u64, written: u64 },
-    #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere, although missing last lines are then not detected", path.display())]
+    #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere, but palpate then cannot detect that lines at the end of the record beside it are missing", path.display())]
     BadHead { path: PathBuf, reason: String },
     #[error("line {line} of {} is {what} of an unknown kind ({detail}); update palpate", path.display())]
     Unknown {
@@ -55,9 +55,9 @@ pub enum ChainError {
 fn missing(found: u64, written: u64) -> String {
     match written.checked_sub(found) {
         None | Some(0) => "its lines differ from the lines that were written".to_owned(),
-        Some(1) => format!("its last line is missing ({found} of {written} are present)"),
+        Some(1) => format!("its last line is missing ({found} of {written} lines are present)"),
         Some(count) => {
-            format!("its last {count} lines are missing ({found} of {written} are present)")
+            format!("its last {count} lines are missing ({found} of {written} lines are present)")
         }
     }
 }

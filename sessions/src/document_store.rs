@@ -140,7 +140,7 @@ impl<D: Document> DocumentStore<D> {
                 name: name.to_owned(),
                 folder: D::FOLDER,
                 known: match self.documents.len() {
-                    0 => " or any other".to_owned(),
+                    0 => ", nor any other".to_owned(),
                     count => format!(" among its {count}"),
                 },
             }),

@@ -25,7 +25,7 @@ pub enum FolderError {
     #[error(transparent)]
     Lock(#[from] LockError),
     #[error(
-        "the disk of {} has {} free, but a session of {} needs twice its size; free some space or choose another disk",
+        "the disk that holds {} has {} of free space, but the session may need {}, and twice that must be free; free some space or choose another disk",
         path.display(), megabytes(*free_bytes), megabytes(*needed_bytes)
     )]
     NoSpace { path: PathBuf, free_bytes: u64, needed_bytes: u64 },

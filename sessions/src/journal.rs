@@ -20,7 +20,7 @@ pub enum JournalError {
     #[error("the journal {} cannot be {what} ({source}); check its permissions and the disk", path.display())]
     Io { what: &'static str, path: PathBuf, source: io::Error },
     #[error(
-        "line {line} of the journal {} is damaged ({reason}); restore the journal from a backup, or begin in a new folder",
+        "line {line} of the journal {} is damaged ({reason}); restore the journal from a backup, or start the programme in a new folder",
         path.display()
     )]
     Line {
@@ -30,7 +30,7 @@ pub enum JournalError {
         path: PathBuf,
     },
     #[error(
-        "the journal {} is incomplete: it has {found} entries, but {written} were written; restore it from a backup or, to continue after its last entry, move {} elsewhere",
+        "the journal {} is incomplete: it has {found} entries, but {written} were written; restore it from a backup, or move {} elsewhere to continue after the last entry that is present",
         path.display(), ChainHead::file_of(path).display()
     )]
     Shortened { found: u64, written: u64, path: PathBuf },

@@ -118,7 +118,7 @@ impl<const W: usize, const R: usize> TickRecorder<W, R> {
         let file = folder.join(TICKS_FILE);
         let failed = |err: io::Error| {
             format!(
-                "cannot record in {} ({err}); give a new folder that may be written",
+                "cannot record in {} ({err}); give a new folder in a writable place",
                 folder.display()
             )
         };

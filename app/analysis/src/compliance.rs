@@ -27,15 +27,15 @@ pub enum ComplianceMeasurementError {
     #[error(transparent)]
     Source(#[from] SourceError),
     #[error(
-        "an imported session has no rig and no calibration, so no machine compliance can be computed from it; run stiff-surface and give its session"
+        "an imported session has no rig and no calibration, so no machine compliance can be computed from it; run the protocol 'stiff-surface' and give its session"
     )]
     Imported,
     #[error(
-        "the session has no contact with a stiff surface and may have pressed tissue; run stiff-surface and give its session"
+        "in this session the probe found no stiff surface and may have pressed tissue; run the protocol 'stiff-surface' and give its session"
     )]
     NoSurface,
     #[error(
-        "the session touched a stiff surface but has no press with a known force; run stiff-surface to its end"
+        "in this session the probe touched a stiff surface but never pressed it with a known force; run the protocol 'stiff-surface' to its end"
     )]
     NoPress,
     #[error(transparent)]
@@ -106,7 +106,7 @@ pub enum ComplianceCorrectionError {
     #[error(transparent)]
     Library(#[from] LibraryError),
     #[error(
-        "the library has no compliance of rig {rig}; run stiff-surface on that rig and store the compliance of its session"
+        "the library has no compliance of rig {rig}; run the protocol 'stiff-surface' on that rig and store the compliance of its session"
     )]
     NoneInForce { rig: String },
     #[error(

@@ -139,7 +139,7 @@ fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String)
     let is_passed = newtons.abs() <= limit;
     let side = if is_passed { "within" } else { "beyond" };
     let sentence = format!(
-        "the empty load cell reads {volts:.4}, which is {newtons:+.3} N and {side} the limit of {limit:.3} N"
+        "the empty load cell reads {volts:.4} ({newtons:+.3} N), which is {side} the limit of {limit:.3} N"
     );
     let advice = "remove what touches the probe; if nothing does, calibrate the load cell again";
     Ok(advised(is_passed, sentence, advice))
@@ -182,7 +182,8 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
         _ => None,
     });
     let missed = missed.ok_or("the check did not reach the home switch twice; repeat the check")?;
-    let sentence = format!("two homings differ by {missed} pulses; the limit is {HOME_PULSES}");
+    let sentence =
+        format!("two homings differ by {missed} pulses; the limit is {HOME_PULSES} pulses");
     let advice = "check the home switch, its cable and whether the slider moves freely";
     Ok(advised(missed.abs() <= HOME_PULSES, sentence, advice))
 }

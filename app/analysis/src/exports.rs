@@ -194,7 +194,8 @@ pub fn export_all(
     for (done, session) in sessions.iter().enumerate() {
         let name = name(session);
         if progress.report(done, of, &name).is_break() {
-            remarks.push(format!("cancelled: {} were not begun", sessions.len() - done));
+            remarks
+                .push(format!("cancelled: {} sessions were not exported", sessions.len() - done));
             break;
         }
         let notes = match to {

@@ -42,7 +42,7 @@ pub fn store_feedback_check(
 
 fn provenance(followed: &FeedbackCheck, source: &str) -> String {
     format!(
-        "simulated, without tissue: 'palpate haptics follow' pushed the rack of a simulated master that rendered the body of {source}; the measured force includes friction of {:.3} N and drag of {:.3} N",
+        "simulated, without tissue: 'palpate haptics follow' pushed the rack of a simulated master that rendered the model of {source}; the measured force includes friction of {:.3} N and drag of {:.3} N",
         followed.friction_n, followed.drag_n
     )
 }

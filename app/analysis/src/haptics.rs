@@ -54,7 +54,7 @@ pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
     let report = fitted.result.map_err(|err| format!("{} has no fit: {err}", source.display()))?;
     let body = report.kelvin().ok_or_else(|| {
         format!(
-            "the fit of {} is of another family; haptics need the modified Kelvin model",
+            "the fit of {} uses another model family; haptics needs the modified Kelvin model",
             source.display()
         )
     })?;

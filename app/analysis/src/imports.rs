@@ -159,7 +159,7 @@ pub fn text(file: &ImportedFile) -> String {
         lines.extend(import_lines(&part.imported, &rows));
         lines.push(match &part.session {
             Some(session) => format!("  session       {}", session.display()),
-            None => "  session       none made: a dry run".into(),
+            None => "  session       none (dry run)".into(),
         });
     }
     let left_out = file.left_out.iter();

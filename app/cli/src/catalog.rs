@@ -48,7 +48,10 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
     let object = serde_json::json!({ "file": file, "unreadable": unreadable, "seconds": seconds });
     note_all(&changes.remarks, output);
     output.answer("catalog rebuild", &merged(object, &changes), || {
-        let head = format!("{} sessions read in {seconds:.2} s; catalog {file}", changes.sessions);
+        let head = format!(
+            "{} sessions read in {seconds:.2} s; catalog written to {file}",
+            changes.sessions
+        );
         let bad = unreadable.iter().map(|one| format!("{}: {}", one.folder, one.reason));
         [head].into_iter().chain(bad).collect::<Vec<_>>().join("\n")
     });

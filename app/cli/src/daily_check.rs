@@ -69,7 +69,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed(
-            "the thread that runs protocols ended without a run; start the check again",
+            "the thread that runs protocols ended before the check began; start the check again",
         ));
     };
     let ended = view.outcome.as_ref();

@@ -272,7 +272,7 @@ fn sources_failure(err: RecordingsError) -> Failure {
             Failure::usage(format!("{err}; add --include-rejected to include them"))
         }
         RecordingsError::Table(_) => {
-            Failure::usage(format!("{err}; 'palpate import' makes a session of a table"))
+            Failure::usage(format!("{err}; 'palpate import' makes a session from a table"))
         }
         err => Failure::usage(err),
     }
@@ -285,7 +285,7 @@ fn known_fit_failure(err: KnownFitError) -> Failure {
             Failure::usage(format!("{err}; 'palpate fit --json' writes a fit"))
         }
         KnownFitError::Changed(_) => {
-            Failure::failed(format!("{err}; or give another record with --like"))
+            Failure::failed(format!("{err}, or give another record with --like"))
         }
         KnownFitError::Source(err) => source_failure(err),
         KnownFitError::Fit { .. } => Failure::failed(err),
@@ -297,12 +297,12 @@ fn source_failure(err: SourceError) -> Failure {
     let with = |way_out: &str| Failure::Usage(format!("{err}; {way_out}"));
     match err {
         SourceError::Rejected { .. } => with(
-            "use the session with --include-rejected of fit or select, or change the verdict with 'palpate verdict'",
+            "add --include-rejected to 'palpate fit' or 'palpate select', or change the verdict with 'palpate verdict'",
         ),
-        SourceError::Imported { .. } => with("'palpate info' shows its content"),
+        SourceError::Imported { .. } => with("'palpate info' shows the content of the session"),
         // The error of tables has no variant for it.
         SourceError::Table(_) if err.to_string().contains("no header") => {
-            with("--columns names them")
+            with("--columns names the columns")
         }
         SourceError::NoCycles => {
             Failure::Failed(format!("{err}; 'palpate report' shows what happened in the session"))

@@ -27,7 +27,7 @@ pub(super) fn run(args: &ManArgs, output: &Output) -> Result<(), Failure> {
     };
     let failed = |err: io::Error| {
         Failure::failed(format!(
-            "the manual pages cannot be written to {} ({err}); choose an existing folder that may be written",
+            "the manual pages cannot be written to {} ({err}); choose an existing folder that you may write to",
             folder.display()
         ))
     };

@@ -38,7 +38,7 @@ impl FromStr for Span {
             Some((Some(from), Some(to))) if from.is_finite() && to.is_finite() && from <= to => {
                 Ok(Self([from, to]))
             }
-            _ => Err("write two times in s, the earlier first, as in 12.5..14".to_owned()),
+            _ => Err("give two times in s, the earlier first, as in 12.5..14".to_owned()),
         }
     }
 }

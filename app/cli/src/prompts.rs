@@ -80,13 +80,13 @@ impl OperatorPrompts {
             let instruction = if self.is_closed {
                 "no answer is possible: standard input is closed"
             } else {
-                "press Enter when it is done, or type no"
+                "press Enter when done, or type no"
             };
             let left = prompt.time_left.0.round();
             output.note(&format!("{} ({instruction}; {left} s left)", prompt.message));
             return;
         }
-        let hint = "press Enter when it is done, or type no; Ctrl-C stops the run";
+        let hint = "press Enter when done, or type no; Ctrl-C stops the run";
         let choice = match parse_answer(typed, hint, output) {
             Some(true) => Operator::Confirm,
             Some(false) => Operator::Decline,

@@ -144,7 +144,10 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     if let Some(to) = &args.truth {
         new_file::check("truth of the rig", Some(to))?;
         let file = std::fs::File::create_new(to).map_err(|err| {
-            Failure::failed(format!("cannot create {} ({err}); check the folder", to.display()))
+            Failure::failed(format!(
+                "cannot create {} ({err}); choose a folder that you may write to",
+                to.display()
+            ))
         })?;
         rig = Box::new(write_at_end(SimRig::named(&args.rig, settings), file));
     }
@@ -169,7 +172,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
 /// Opens the rig that a file describes.
 fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     if args.truth.is_some() {
-        return Err(Failure::usage("--truth is for simulated rigs; leave it out"));
+        return Err(Failure::usage("--truth applies only to simulated rigs; leave out --truth"));
     }
     if args.time_scale != TimeScale::Factor(1.0) {
         return Err(Failure::usage(

@@ -140,7 +140,7 @@ fn identify_device(at: &str, baud: u32) -> Result<DetectedDevice, String> {
 
 fn port_lines(ports: &[Port]) -> String {
     if ports.is_empty() {
-        return "no serial port found; plug in the device, or give --at HOST:PORT for one on a network"
+        return "no serial port found; plug in the device, or give --at HOST:PORT for a device on a network"
             .into();
     }
     let lines = ports.iter().map(|port| {
@@ -198,7 +198,7 @@ fn check(args: &RigCheckArgs, output: &Output) -> Result<(), Failure> {
                 about.mm_per_pulse, about.travel, about.speed_max, about.acceleration.0
             ),
             format!(
-                "samples    at most {:.2} ms apart, position within {:.2} ms of the command",
+                "samples    at most {:.2} ms apart; the position is at most {:.2} ms behind or ahead of the command",
                 about.tick().0 * about.ticks_per_sample * 1e3,
                 about.pulse_lag.0 * 1e3
             ),

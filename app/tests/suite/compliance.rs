@@ -90,7 +90,10 @@ fn what_tells_no_compliance_is_refused() {
         (&["compliance", "demo"][..], "stiff surface"),
         (&["compliance", "demo", "--seating", "-1"], "above 0 N"),
         (&["fit", "demo", "--compliance", "never"], "no compliance \"never\""),
-        (&["export", "demo", "--format", "csv", "--compliance", "last"], "run stiff-surface"),
+        (
+            &["export", "demo", "--format", "csv", "--compliance", "last"],
+            "run the protocol 'stiff-surface'",
+        ),
     ] {
         let refused = palpate(at, args);
         assert_eq!(refused.status.code(), Some(2), "{args:?}");

@@ -73,7 +73,7 @@ fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
         notes.read_line(&mut note).unwrap();
         note
     };
-    assert_eq!(order("load 840\n"), "note: 840 g are on the load cell\n");
+    assert_eq!(order("load 840\n"), "note: a mass of 840 g is on the load cell\n");
     assert!(order("load much\n").contains("mass in g"));
     // A sample later the cell feels it.
     let is_felt = || {

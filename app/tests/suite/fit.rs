@@ -184,7 +184,7 @@ fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
     let fitted = objects.iter().filter(|object| object["r2"].is_f64()).count();
     let not_begun = |object: &&Value| {
         let error = object["error"].as_str();
-        error.is_some_and(|error| error.starts_with("the fit was not begun"))
+        error.is_some_and(|error| error.starts_with("the fit was not started"))
     };
     let left = objects.iter().filter(not_begun).count();
     assert!(fitted >= 1 && left >= 1, "{fitted} {left}");

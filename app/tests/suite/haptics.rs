@@ -197,7 +197,7 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
     assert!(fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.8), "{fitted}");
     // The preview moves nothing and names the bounds.
     let preview = typed(at.path(), "haptics slave thesis --depth 6 --preview");
-    assert_prints(&preview, "no deeper than 6");
+    assert_prints(&preview, "down to a depth of 6");
     for bad in [
         ["--depth", "0"],
         ["--depth", "500"],

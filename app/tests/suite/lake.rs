@@ -161,7 +161,7 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     assert!(contents(&at.join("killed")) == expected, "the kill shows");
 
     let other = palpate(at, &["fit", "killed", "--fixed", "f_offset=0"]);
-    assert_refused(&other, 1, "with other content");
+    assert_refused(&other, 1, "with different content");
     for (args, says) in [
         (["fit", "lake", "--shard", "4/3"], "i/n"),
         (["fit", "runs", "--shard", "1/3"], "not a lake"),

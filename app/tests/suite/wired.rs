@@ -63,7 +63,7 @@ fn what_is_not_as_the_file_says_is_reported() {
 }
 
 /// Messages where a busy computer has ended a run, or the retract after it.
-const LATE: [&str; 4] = ["sample age", "stood still", "samples arrived", "controller answers"];
+const LATE: [&str; 4] = ["sample age", "was suspended", "samples arrived", "controller answers"];
 
 fn is_late(message: &str) -> bool {
     LATE.iter().any(|words| message.contains(words))

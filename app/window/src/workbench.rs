@@ -171,7 +171,8 @@ impl Workbench {
             (Intent::Closing, _) => Err("the window is closing".into()),
             (Intent::Starting, _) => Err("starting".into()),
             (Intent::None, Some(run)) if run.holding.is_some() => {
-                Err("the stopped run waits: retract or close it first".into())
+                Err("the stopped run is still open; retract the probe or close the session first"
+                    .into())
             }
             (Intent::None, Some(_)) => Err("a run is in progress".into()),
             (Intent::None, None) => Ok(()),
@@ -190,8 +191,8 @@ impl Workbench {
     pub fn loop_verdict(&self, screen: &str) -> Result<(), String> {
         let mut others = self.occupation.running.iter();
         match (self.is_busy(), others.find(|(running, _)| *running != screen)) {
-            (true, _) => Err("a run is in progress and would be disturbed".into()),
-            (false, Some((_, words))) => Err(format!("{words} and would be disturbed")),
+            (true, _) => Err("a run is in progress, and this would disturb its timing".into()),
+            (false, Some((_, words))) => Err(format!("{words}, and this would disturb its timing")),
             (false, None) => Ok(()),
         }
     }
@@ -300,7 +301,7 @@ impl Workbench {
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => {
                     self.refusal = Some(
-                        "the thread that runs protocols ended; close palpate and check the rig"
+                        "the thread that runs protocols ended unexpectedly; close palpate and check the rig"
                             .into(),
                     );
                     self.start = Start::None;

@@ -34,13 +34,12 @@ impl EmulatorOrder {
                 let mass_g: f64 = rest.parse().unwrap_or(f64::NAN);
                 // A tonne is beyond every load cell.
                 if !(0.0..=1e6).contains(&mass_g) {
-                    return Err(wrong("load and a mass in g, which is 0 for a free load cell"));
+                    return Err(wrong("load and a mass in g, 0 for an empty load cell"));
                 }
                 Ok(Self::Hand(HandAction::LoadCell { mass_g }))
             }
             "mount" => {
-                let specimen =
-                    rest.parse().map_err(|_| wrong("mount and the number of a specimen"))?;
+                let specimen = rest.parse().map_err(|_| wrong("mount and a specimen number"))?;
                 Ok(Self::Hand(HandAction::Mount { specimen }))
             }
             "unmount" if rest.is_empty() => Ok(Self::Hand(HandAction::Unmount)),
@@ -55,7 +54,7 @@ impl EmulatorOrder {
         match self {
             Self::Fault(_) => None,
             Self::Hand(HandAction::LoadCell { mass_g }) => {
-                Some(format!("{mass_g} g are on the load cell"))
+                Some(format!("a mass of {mass_g} g is on the load cell"))
             }
             Self::Hand(HandAction::Mount { specimen }) => {
                 Some(format!("specimen {specimen} is mounted"))

@@ -151,9 +151,7 @@ pub fn set_up(
         if settings.sampling == Sampling::Record {
             return Err(no_recording("the link is too slow"));
         }
-        return Ok(polled(
-            ", because recorded samples would be too old when they arrive over this link",
-        ));
+        return Ok(polled(", because the link is too slow for recorded samples"));
     };
     match start_recording(console, settings, n, tick) {
         Ok(plan) => Ok(SamplingSetup {
@@ -263,5 +261,5 @@ fn anchor(
             return Ok(RecordingPlan { interval, ring, base: least, first: newest + 1, tick });
         }
     }
-    Err(no_recording("its clock and its recording do not agree"))
+    Err(no_recording("its clock does not agree with the times of its samples"))
 }

@@ -78,13 +78,14 @@ pub fn connect(
     } else {
         settings.travel.0 + 2.0 * super::order::LIMIT_MARGIN_MM
     };
-    let watch = if has_watchdog { "with" } else { "without" };
+    let with = if has_watchdog { "with" } else { "without" };
     // Rounded up: it is a bound.
     let most = (worst_case_mm * 10.0).ceil() / 10.0;
-    let safety = format!("{watch} a watchdog: at most {most:.1} mm after the link is lost");
+    let safety =
+        format!("{with} watchdog: the axis stops within {most:.1} mm after the link is lost");
     let ms = |span: Nanos| span.0 as f64 * 1e-6;
     let link = format!(
-        "an answer takes {:.1} to {:.1} ms; {how}",
+        "the controller answers in {:.1} to {:.1} ms; {how}",
         ms(stats.round_trip_min),
         ms(stats.round_trip_max)
     );

@@ -28,7 +28,7 @@ impl GalilError {
                 "a setting in the rig file is beyond the range of this controller; lower the setting"
             }
             E::RUNNING | E::NOT_RUNNING | E::BEGIN_RUNNING | ErrorCode(29) => {
-                "wait until the axis rests"
+                "wait until the axis is at rest"
             }
             ErrorCode(14 | 15) => {
                 "the controller's memory has failed; have the controller serviced"
@@ -49,7 +49,7 @@ impl GalilError {
                 "this command is for servo axes, and palpate drives stepper axes only; report this error with the log"
             }
             E::NO_ANALOG => {
-                "this controller has no analog inputs; read the cell with another device"
+                "this controller has no analog inputs; read the load cell with another device"
             }
             ErrorCode(134 | 135) => "switch the motor off first (MO)",
             ErrorCode(136..=138) => "the controller is locked; enter its password",

@@ -34,7 +34,7 @@ impl GalilBoard {
             [3, 0, 0, 1, 0] => 1,
             [1, 8, ..] | [1, 7, ..] => {
                 return Err(unsupported(
-                    "it is a card on a computer's bus, and palpate drives no cards",
+                    "it is a plug-in card, and palpate drives no plug-in cards",
                 ));
             }
             _ => {
@@ -66,7 +66,7 @@ pub enum GalilOpenError {
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
     Lost { detail: String },
     #[error(
-        "no Galil controller answers; check its power, the cable and the baud rate that its jumpers set"
+        "no Galil controller answers; check its power, the cable and the baud rate set by its jumpers"
     )]
     Silent,
     #[error(
@@ -83,7 +83,9 @@ pub enum GalilOpenError {
         /// The rig file's.
         expected: u64,
     },
-    #[error("{revision} has {axes} axes and no axis {axis}; correct the axis in the rig file")]
+    #[error(
+        "{revision} has {axes} axes, so axis {axis} does not exist; correct the axis in the rig file"
+    )]
     NoAxis {
         revision: String,
         axes: usize,

@@ -101,7 +101,7 @@ impl GalilOrder {
                 vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
             }
             RigCommand::Stop | RigCommand::Halt => {
-                return OrderStep::Refused("a stop does not wait in a queue".into());
+                return OrderStep::Refused("a stop cannot be queued behind other commands".into());
             }
         };
         self.open = commands.len();

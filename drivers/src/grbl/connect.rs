@@ -81,7 +81,7 @@ pub fn connect(
     Ok(ConnectedGrbl {
         // Rounded up: it is a bound.
         identity: format!(
-            "Grbl {version}, axis {}; at most {:.1} mm after the link is lost at full speed",
+            "Grbl {version}, axis {}; the axis stops within {:.1} mm after the link is lost",
             settings.axis,
             (worst_case_mm * 10.0).ceil() / 10.0
         ),

@@ -38,12 +38,12 @@ pub enum GrblOpenError {
     )]
     OnALimit { axis: char },
     #[error(
-        "the board has ${number}={found} ({meaning}) where the rig file needs {wanted}; correct the rig file, or send ${number}={wanted} from a terminal"
+        "the board has ${number}={found} ({meaning}), but the rig file needs {wanted}; correct the rig file, or send ${number}={wanted} from a terminal"
     )]
     SetOtherwise { number: u16, meaning: &'static str, found: f64, wanted: String },
     /// Its steps are shorter than the resolution of its reports.
     #[error(
-        "the board has ${number}={found} (steps per mm), but reports positions in thousandths of a mm only, so more than 1000 steps per mm cannot be checked; set the drive to coarser microsteps"
+        "the board has ${number}={found} (steps per mm), but reports positions only in thousandths of a mm, so more than 1000 steps per mm cannot be checked; set the drive to coarser microsteps"
     )]
     TooFine { number: u16, found: f64 },
     /// It is not known at which end the axis stands.
@@ -86,7 +86,7 @@ impl GrblCode {
                 "a limit switch has closed, so the axis was stopped at once; move the axis off the switch by hand, then open the rig again and home the axis"
             }
             (true, Some(2)) => {
-                "the target was outside the travel that is set in the board; open the rig again"
+                "the target was outside the axis travel set in the board; open the rig again"
             }
             (true, Some(3)) => {
                 "the board was reset in motion, so the position is lost; open the rig again and home the axis"
@@ -96,23 +96,21 @@ impl GrblCode {
                 "the board's own homing has failed; check the limit switch and its cable"
             }
             (true, _) | (false, Some(9)) => {
-                "the board is locked; look at the axis, then open the rig again"
+                "the board is locked; check the axis, then open the rig again"
             }
             (false, Some(1 | 2 | 11 | 16 | 22..=29)) => {
-                "a line was garbled on its way; check the cable"
+                "a line was garbled in transmission; check the cable"
             }
             (false, Some(3 | 20)) => "this firmware does not know the command; use Grbl 1.1",
             (false, Some(4)) => "a number must not be negative",
-            (false, Some(5)) => {
-                "the board's homing is off; set $22=1 or let palpate search for home"
-            }
+            (false, Some(5)) => "the board's homing is off; set $22=1 or let palpate home the axis",
             (false, Some(7)) => {
                 "the board could not read its memory and now has the factory settings; enter your settings and open the rig again"
             }
             (false, Some(8)) => "the board is not at rest; wait until the axis is at rest",
             (false, Some(10)) => "soft limits need homing ($22=1)",
             (false, Some(12)) => {
-                "the speed needs more steps a second than the board makes; lower the speed"
+                "the speed needs more steps per second than the board can output; lower the speed"
             }
             (false, Some(13)) => "the safety door is open; close it",
             (false, Some(15)) => {

@@ -40,7 +40,7 @@ impl CellDevice for Hx711Settings {
         let volts_per_count = self.volts_per_count(header.gain);
         let description = CellDescription {
             identity: format!(
-                "HX711 board {}, {rate:.1} values a second, gain {}, {} of full scale",
+                "HX711 board {}, {rate:.1} values per second, gain {}, full scale {}",
                 header.board, header.gain, self.full_scale
             ),
             adc: AdcDescription { counts_min: COUNT_MIN, counts_max: COUNT_MAX, volts_per_count },

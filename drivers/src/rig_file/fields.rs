@@ -200,7 +200,7 @@ impl Fields {
             self.mistakes.push(Mistake {
                 line: field.line,
                 message: format!(
-                    "'{}' means nothing here; remove it or correct its spelling",
+                    "'{}' is not a key of this file; remove it or correct its spelling",
                     field.key
                 ),
             });

@@ -13,8 +13,10 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     let (axis, cell) = (read(name, fields), super::read_cell(fields));
     let (axis, cell) = (axis?, cell?);
     if axis.0 == cell.0 {
-        fields
-            .mistake("cell.port", "the board uses this port; give another port for the load cell");
+        fields.mistake(
+            "cell.port",
+            "the Grbl board uses this port; give another port for the load cell",
+        );
         return None;
     }
     let places = vec![axis.0.clone(), cell.0.clone()];
@@ -44,7 +46,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(DeviceAddress, 
     if is_closed_home.is_some() && home == Some(HomeSwitch::Probe) {
         fields.mistake(
             "closed_is_home",
-            "a home switch on the probe pin does not use this key; remove the key",
+            "this key has no effect with a home switch on the probe pin; remove the key",
         );
     }
     let build_info = fields.text("build_info");

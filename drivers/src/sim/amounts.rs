@@ -57,7 +57,7 @@ macro_rules! amount {
 amount!(
     /// White noise of the ideal load cell, rms, in whole mN. Without any, every sample would be the same, and the
     /// engine takes such a cell for a dead one.
-    SimNoise, "noise", 20, (1..=1000), "1 to 1000 (whole millinewtons; a signal without noise is taken for a dead cell)"
+    SimNoise, "noise", 20, (1..=1000), "1 to 1000 (whole millinewtons; a signal without noise would look like a failed load cell)"
 );
 amount!(
     /// Stiffness of the tissue in whole percent of what it usually is: `mu` and `tau_sig` alike, so that

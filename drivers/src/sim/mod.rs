@@ -175,7 +175,9 @@ impl SimRig {
         let (tick, at) = self.clock.advance();
         self.slider.begin_tick(tick);
         if std::mem::take(&mut self.is_overrun) {
-            let detail = format!("input buffer full, keep below {COMMANDS_MAX} commands at once");
+            let detail = format!(
+                "the input buffer is full; send fewer than {COMMANDS_MAX} commands at once"
+            );
             self.report(at, RigEventBody::refusal(detail));
         }
         while let Some(&(arrival, command)) = self.commands.front() {

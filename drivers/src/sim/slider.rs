@@ -141,12 +141,12 @@ impl Slider {
     /// Whether a motion may begin, or why it may not.
     fn check_begin(&self) -> Result<(), Fault> {
         if !self.is_motor_on {
-            return Err(refusal("begin not valid with the motor off, enable it first"));
+            return Err(refusal(
+                "the axis cannot start while the motor is off; enable the motor first",
+            ));
         }
         if self.motion.is_some() || self.is_just_ended {
-            return Err(refusal(
-                "begin not valid while the axis moves, wait until it reports rest",
-            ));
+            return Err(refusal("the axis cannot start while it moves; wait until it is at rest"));
         }
         Ok(())
     }
@@ -160,7 +160,7 @@ impl Slider {
     fn check_direction(&self, way: f64) -> Result<(), Fault> {
         if self.is_blocked(way) {
             return Err(refusal(
-                "begin not possible towards a closed limit switch, move the other way",
+                "the axis cannot move towards a closed limit switch; move it the other way",
             ));
         }
         Ok(())
@@ -170,14 +170,14 @@ impl Slider {
         self.check_begin()?;
         if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
             return Err(refusal(format!(
-                "target {} pulses is out of range, stay within {PULSES_MAX}",
+                "the target of {} pulses is out of range; stay within {PULSES_MAX}",
                 wanted.target_pulses
             )));
         }
         let speed = round_down(wanted.speed.0, self.speed_quantum);
         if !(speed > 0.0 && speed <= self.speed_max * (1.0 + 1e-12)) {
             return Err(refusal(format!(
-                "speed {} is out of range, choose from {} to {} mm/s",
+                "the speed of {} is out of range; choose from {} to {} mm/s",
                 wanted.speed, self.speed_quantum, self.speed_max
             )));
         }
@@ -199,7 +199,7 @@ impl Slider {
         let far = made.amplitude_pulses.saturating_mul(2);
         if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
             return Err(refusal(format!(
-                "an amplitude of {} pulses from {start} is out of range, stay within {PULSES_MAX}",
+                "an amplitude of {} pulses from {start} is out of range; stay within {PULSES_MAX}",
                 made.amplitude_pulses
             )));
         }
@@ -246,11 +246,13 @@ impl Slider {
 
     fn define(&mut self, pulses: i64) -> Result<(), Fault> {
         if self.motion.is_some() {
-            return Err(refusal("position cannot be defined while the axis moves, stop it first"));
+            return Err(refusal(
+                "the position cannot be defined while the axis moves; stop the axis first",
+            ));
         }
         if pulses.unsigned_abs() > PULSES_MAX {
             return Err(refusal(format!(
-                "position {pulses} pulses is out of range, stay within {PULSES_MAX}"
+                "the position of {pulses} pulses is out of range; stay within {PULSES_MAX}"
             )));
         }
         let here = self.true_position();
@@ -306,7 +308,7 @@ fn achievable_acceleration(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
         Ok(MmPerS2(made))
     } else {
         Err(refusal(format!(
-            "acceleration {wanted} is out of range, choose at least {ACCELERATION_QUANTUM}"
+            "the acceleration of {wanted} is out of range; choose at least {ACCELERATION_QUANTUM}"
         )))
     }
 }

@@ -9,8 +9,9 @@ use std::collections::VecDeque;
 pub(crate) const ORDERS_MAX: usize = 64;
 /// Without samples being taken for so long, palpate hangs and the axis is stopped.
 pub(crate) const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-pub(crate) const OVERTAKEN: &str = "a stop came first, so the command was not begun";
-pub(crate) const TOO_MANY_COMMANDS: &str = "too many commands are waiting";
+pub(crate) const OVERTAKEN: &str =
+    "a stop came before the command, so the command was not executed";
+pub(crate) const TOO_MANY_COMMANDS: &str = "too many commands are waiting in the queue";
 
 /// Statistics of a link, for the operator and the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

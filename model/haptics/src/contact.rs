@@ -18,7 +18,7 @@ pub struct ContactSettings {
 /// No hysteresis.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
-    "contact begins at {on} and ends below {off}, which leaves no hysteresis; choose a smaller force for the end than for the beginning"
+    "contact begins at {on} and ends below {off}, so there is no hysteresis; choose a smaller force for the end of contact than for its beginning"
 )]
 pub struct ContactThresholdError {
     pub on: Newtons,

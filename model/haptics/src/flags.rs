@@ -26,7 +26,7 @@ facts! {
     FORCE_MAX 5 "the force is held at its limit";
     SLEW 6 "the force changes at its largest allowed rate";
     SOFT_START 7 "the force rises slowly after the start";
-    STALL 8 "the control loop had stopped; the force rises slowly from the value that the device held";
+    STALL 8 "the control loop has resumed after a gap; the force rises slowly from the value that the device held";
     CONTACT_RAMP 9 "the force rises slowly after contact";
     NO_CONTACT 10 "the load cell detects no contact; the force is zero";
     ABOVE_SURFACE 11 "the probe is above the surface; the force is zero";

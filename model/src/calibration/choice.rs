@@ -165,7 +165,7 @@ fn left_out(recipe: &Recipe, points: &[CalibrationPoint]) -> Result<Vec<(usize, 
             None if is_end => continue,
             None => {
                 return Err(format!(
-                    "the curve falls or is flat in places without the weight of {} g",
+                    "the curve without the weight of {} g does not rise everywhere",
                     out.mass_g
                 ));
             }

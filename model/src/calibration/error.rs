@@ -63,7 +63,7 @@ pub enum CalibrationError {
     },
     /// Next to no rise between two weights.
     #[error(
-        "between two weights the signal rises by less than a millionth of its own uncertainty, so the force there is not determined; leave out one of the two weights or measure both again"
+        "between two of the weights the signal hardly rises (by less than a millionth of the uncertainty of this rise), so forces between them cannot be determined; leave out one of the two weights or measure both again"
     )]
     TooFlat,
     /// Written by a later version.
@@ -96,7 +96,7 @@ pub enum CalibrationError {
     Tolerance { tolerance_g: f64 },
     /// Straight segments through masses that were not taken.
     #[error(
-        "straight segments must begin at the first weight, end at the last and bend only at measured weights, but {} do not; give masses of the calibration in increasing order", grams(.through_g)
+        "straight segments through {} are not possible; begin at the first weight, end at the last, and use only masses of the calibration, in increasing order", grams(.through_g)
     )]
     NoSuchBreak { through_g: Vec<f64> },
     /// A polynomial that turns back or that the points do not determine.

@@ -105,7 +105,7 @@ impl fmt::Display for SettleProgress {
         match self.last {
             None => write!(
                 f,
-                "the signal has no complete window without gaps within {waited:.0} s; check the load cell and its wiring"
+                "no gap-free window of the signal has arrived within {waited:.0} s; check the load cell and its wiring"
             ),
             Some(last) if last.noise.0 > self.noise_max.0 => write!(
                 f,
@@ -115,7 +115,7 @@ impl fmt::Display for SettleProgress {
             ),
             Some(last) => write!(
                 f,
-                "after {waited:.0} s the signal still moves by {:.3} mV/s, more than the {:.3} mV/s that noise explains; warm the cell up, or check that the weight rests freely",
+                "after {waited:.0} s the signal still moves by {:.3} mV/s, more than the {:.3} mV/s that noise explains; let the load cell warm up, or check that the weight hangs or stands freely",
                 last.slope_v_per_s * 1e3,
                 self.slope_max_v_per_s * 1e3
             ),

@@ -90,7 +90,7 @@ impl KnownWeight {
                 self.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
                 "give 0 g or more",
             ),
-            ("tare", self.tare.0, self.tare.is_finite(), "read the empty cell again"),
+            ("tare", self.tare.0, self.tare.is_finite(), "read the empty load cell again"),
         ] {
             if !is_right {
                 return Err(WeightCheckError::Number { what, value, advice });
@@ -227,7 +227,7 @@ impl Calibration {
         }
         if let Some(sigma) = sigma.filter(|sigma| 2.0 * sigma > limit) {
             doubts.push(format!(
-                "the standard uncertainty of this force is {sigma:.3} N, so a limit of {limit:.3} N proves little here; use a weight at which the load cell is more sensitive"
+                "the standard uncertainty of this force is {sigma:.3} N, too large for a check against a limit of {limit:.3} N; use a weight at which the load cell is more sensitive"
             ));
         }
         let is_passed = error.abs() <= limit;

@@ -51,7 +51,7 @@ pub enum ComplianceError {
     NotRising,
     /// Not a straight line.
     #[error(
-        "force over position is not a straight line: it deviates by {bend:.1} %, and at most {limit:.0} % are allowed; clean and seat the surface, or raise the seating force"
+        "force over position is not a straight line: it deviates by {bend:.1} %, and at most {limit:.0} % are allowed; clean the stiff surface and fix it firmly, or raise the seating force"
     )]
     Curved {
         /// Greatest deviation of a parabola from the line as a share of the force range, in percent.

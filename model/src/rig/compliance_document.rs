@@ -116,7 +116,7 @@ impl RigCompliance {
     pub fn check(&self) -> Result<(), String> {
         if self.format > COMPLIANCE_FORMAT {
             return Err(format!(
-                "a machine compliance of format {} is newer than this palpate, which reads up to {COMPLIANCE_FORMAT}; update palpate",
+                "the machine compliance has format {}, but this version of palpate reads up to format {COMPLIANCE_FORMAT}; update palpate",
                 self.format
             ));
         }

@@ -141,7 +141,7 @@ impl RigDescription {
                 format!("the nearest are {below:.4} and {above:.4} mm/s")
             };
             return Err(format!(
-                "rig {} cannot make {speed}: its speeds are multiples of {}; {nearest}",
+                "rig {} cannot move at {speed}: its speeds are multiples of {}; {nearest}",
                 self.name, self.speed_quantum
             ));
         }

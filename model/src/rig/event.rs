@@ -31,9 +31,11 @@ pub enum Fault {
     #[error("the session log cannot be written ({detail})")]
     LogFailed { detail: String },
     /// The session log is whole so far, but the disk will not take it for much longer.
-    #[error("the run ends before the disk is full ({detail})")]
+    #[error("the run ends, because the session log may soon fail ({detail})")]
     LogAtRisk { detail: String },
     /// As when the computer is suspended: interlocks were not checked meanwhile.
-    #[error("the computer stood still for {missed:.1}, and the rig was not supervised meanwhile")]
+    #[error(
+        "the computer was suspended for {missed:.1}, and the rig was not supervised in that time"
+    )]
     HostPaused { missed: Seconds },
 }

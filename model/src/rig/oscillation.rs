@@ -63,12 +63,12 @@ impl SinePath {
         // 1e-9 forgives the rounding of limits that are meant to be met exactly.
         if speed.0 > speed_max.0 * (1.0 + 1e-9) {
             return Err(format!(
-                "{what} reaches {speed:.2}, but the axis allows {speed_max:.2}; {advice}"
+                "{what} needs a speed of {speed:.2}, but the axis allows {speed_max:.2}; {advice}"
             ));
         }
         if accel.0 > acceleration.0 * (1.0 + 1e-9) {
             return Err(format!(
-                "{what} accelerates by {accel:.2}, but the axis allows {acceleration:.2}; {advice}"
+                "{what} needs an acceleration of {accel:.2}, but the axis allows {acceleration:.2}; {advice}"
             ));
         }
         Ok(())

@@ -16,7 +16,7 @@ use thiserror::Error;
 /// The path and the pulses do not agree.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error(
-    "commanded path at {expected_pulses:.2} pulses but the controller reports {reported_pulses}; steps were lost or the axis was moved by hand, home it again"
+    "the controller reports {reported_pulses} pulses instead of the commanded {expected_pulses:.2}: steps were lost or the axis was moved by hand; home it again"
 )]
 pub struct PathError {
     pub expected_pulses: f64,

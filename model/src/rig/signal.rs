@@ -32,9 +32,9 @@ impl RigDescription {
     pub fn signal(&self) -> SignalFacts {
         let rate = 1.0 / self.tick().0;
         let filter = if self.settings.is_empty() {
-            "not known: the rig does not say whether there is one before the converter"
+            "not known: the rig does not state whether a filter is ahead of the converter"
         } else {
-            "none: the simulated cell is sampled as it is"
+            "none: the simulated signal has no filter"
         };
         SignalFacts {
             sample_rate_hz: rate,
@@ -51,7 +51,7 @@ impl RigDescription {
     fn aliasing(&self, rate: f64) -> String {
         let nyquist = 0.5 * rate;
         let mut sentence = format!(
-            "without a filter, signals above {nyquist:.0} Hz are aliased, such as the steps of the motor from {:.2} mm/s on",
+            "without a filter, signals above {nyquist:.0} Hz are aliased, such as motor steps at speeds above {:.2} mm/s",
             nyquist * self.mm_per_pulse
         );
         for mains in MAINS_HZ {

@@ -26,7 +26,7 @@ pub struct Thickness {
 /// Two positions that are no thickness.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error(
-    "the base at {base:.3} is not behind the tissue at {tissue:.3}; touch both again without homing in between"
+    "the base at {base:.3} is not clearly beyond the tissue at {tissue:.3}; touch both again without homing in between"
 )]
 pub struct ThicknessError {
     pub base: Position,

@@ -42,10 +42,12 @@ pub enum ContactFitError {
     )]
     TooShort { points: usize },
     /// Not a pass forward at one speed.
-    #[error("the slow pass did not move forward at one speed, so contact cannot be located in it")]
+    #[error(
+        "the contact point cannot be determined, because the slow pass did not move at constant speed"
+    )]
     NotOneSpeed,
     /// The force shows no onset inside the pass.
-    #[error("the force shows no clear onset in the slow pass; press further or quieten the signal")]
+    #[error("the force of the slow pass shows no clear onset; press further or reduce the noise")]
     NoOnset,
 }
 

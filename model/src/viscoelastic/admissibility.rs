@@ -50,7 +50,7 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
     let cases = [
         (
             unstable_bands(body),
-            "the elastic force of the model falls with depth {bands}, so the model is unstable there under force control",
+            "at depths {bands} the elastic force of the model falls with depth, so the model is unstable there under force control",
         ),
         (
             active_cycles(body),
@@ -58,7 +58,7 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
         ),
         (
             active_pokes(body),
-            "after a step from the surface to depths {bands}, the model does not relax; in a slow press to these depths and back, it returns more energy than it receives",
+            "the model is not physical at depths {bands}: its force does not relax after a step from the surface, and it returns more energy than it receives in a slow press and retraction",
         ),
     ];
     cases

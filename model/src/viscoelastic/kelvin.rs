@@ -24,7 +24,7 @@ pub struct ModifiedKelvin {
 /// Numbers that do not describe a body.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error(
-    "the tissue body has {name} = {value}; the relaxation time must be positive and every coefficient finite"
+    "the tissue model has {name} = {value}; the relaxation time must be positive and every coefficient finite"
 )]
 pub struct BodyError {
     pub name: &'static str,

@@ -123,7 +123,7 @@ impl ActiveRun {
         if given_up.0 > 0.0 && given_up.0 >= 2.0 * self.reported_given_up.0 {
             self.reported_given_up = given_up;
             self.report_trouble(&format!(
-                "the computer does not keep up: the run is {:.1} s behind the clock and does not make up this time; close other programs",
+                "the computer is too slow: the run is {:.1} s behind the clock and does not catch up; close other programs",
                 given_up.0
             ));
         }

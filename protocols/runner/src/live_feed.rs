@@ -90,7 +90,7 @@ impl LiveFeed {
             // Its state may be inconsistent: it is not used again.
             self.fit = None;
             self.failure = Some(format!(
-                "the live fit failed ({}) and is off for the rest of the run; the recording goes on",
+                "the live fit failed ({}) and is off for the rest of the run; the recording continues",
                 words(panic.as_ref())
             ));
             None

@@ -92,9 +92,10 @@ impl Runner {
 
     /// Asks for something. Fails only when the runner has ended or is swamped.
     pub fn request(&self, request: RunnerRequest) -> Result<(), String> {
-        self.requests
-            .try_send(request)
-            .map_err(|_| "the runner does not answer; close palpate and check the rig".to_string())
+        self.requests.try_send(request).map_err(|_| {
+            "the thread that controls the rig does not answer; close palpate and check the rig"
+                .to_string()
+        })
     }
 
     /// Passes on the operator's choice.

@@ -97,7 +97,7 @@ impl RunLog {
             Record::InterlockTripped { interlock, .. } => {
                 warn!(parent: &self.step, "interlock tripped: {interlock}");
             }
-            Record::LeadLost { .. } => warn!(parent: &self.step, "lead lost"),
+            Record::LeadLost { .. } => warn!(parent: &self.step, "no position from the master"),
             Record::MonitorTripped { index, .. } => {
                 warn!(parent: &self.step, "monitor {} tripped", index + 1);
             }
@@ -106,7 +106,7 @@ impl RunLog {
                 warn!(parent: &self.step, "step failed, trying again ({count})");
             }
             Record::StepFailed { then: FailureResponse::Skip, .. } => {
-                warn!(parent: &self.step, "step failed, left out");
+                warn!(parent: &self.step, "step failed, skipped");
             }
             _ => {}
         }

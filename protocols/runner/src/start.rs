@@ -89,7 +89,7 @@ pub(super) fn start(
     let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);
     preview.check_start(request.is_acknowledged).map_err(refused)?;
     if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
-        return Err(refused(format!("{first}; acknowledge this to go on")));
+        return Err(refused(format!("{first}; acknowledge this to continue")));
     }
     request.labels.check().map_err(|err| refused(err.to_string()))?;
 

@@ -161,7 +161,7 @@ fn a_computer_that_was_suspended_ends_the_run() {
     let session = Session::open(&out).unwrap();
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "abort");
-    assert!(end.reason.contains("stood still for 20.0 s"), "{}", end.reason);
+    assert!(end.reason.contains("was suspended for 20.0 s"), "{}", end.reason);
     assert_eq!(session.auxiliary.health.clock_jumps, 1);
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }

@@ -24,7 +24,7 @@ pub(crate) struct Context<'a> {
     pub(super) effects: &'a mut Vec<Effect>,
 }
 
-pub(crate) const NOT_TARED: &str = "tare the load cell before searching with it";
+pub(crate) const NOT_TARED: &str = "the load cell is not tared; tare it first";
 
 /// Time a move may overrun its profile before the axis counts as stuck.
 const MOVE_GRACE: Seconds = Seconds(1.0);
@@ -113,7 +113,7 @@ impl Context<'_> {
     }
 
     pub fn contact(&self) -> Result<ContactPosition, String> {
-        let unknown = "contact is not known; find it first";
+        let unknown = "the contact point is not known; run find-contact first";
         self.state.contact.ok_or_else(|| unknown.to_owned())
     }
 
@@ -128,7 +128,7 @@ impl Context<'_> {
         let travel = self.limits().travel_max;
         if target > travel {
             return Err(format!(
-                "a depth of {depth} from contact at {:.3} mm ends at {:.3} mm, beyond the travel of {:.1} mm",
+                "a depth of {depth} from the contact point at {:.3} mm ends at a position of {:.3} mm, beyond the travel of {:.1} mm",
                 contact.position.0, target.0, travel.0
             ));
         }

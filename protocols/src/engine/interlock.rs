@@ -184,7 +184,10 @@ pub(super) fn judge(
         .or_else(|| {
             (reading.volts > volts_max).then(|| Trip {
                 interlock: Interlock::Volts,
-                reason: format!("the raw signal is {:.3}, above {volts_max:.2}", reading.volts),
+                reason: format!(
+                    "the raw signal is {:.3}, above the limit of {volts_max:.2}",
+                    reading.volts
+                ),
             })
         })
         .or_else(|| rate_trip(rate, limits.force_rate_max, state.current_step()))
@@ -213,7 +216,7 @@ fn travel_trip(state: &EngineState, reading: &Reading, limits: &Limits) -> Optio
     {
         let is_leaving = state.in_flight.is_some_and(|flight| flight.is_forward != is_forward);
         if reading.status.has(bit) && !is_leaving && !is_parked {
-            return trip(Interlock::Travel, format!("the {which} limit switch closed"));
+            return trip(Interlock::Travel, format!("the {which} limit switch is closed"));
         }
     }
     let is_returning = state.in_flight.is_some_and(|flight| !flight.is_forward);
@@ -221,7 +224,7 @@ fn travel_trip(state: &EngineState, reading: &Reading, limits: &Limits) -> Optio
         let Position(end) = limits.travel_max;
         return trip(
             Interlock::Travel,
-            format!("the probe is at {:.3} mm, past its travel of {end:.1} mm", position.0),
+            format!("the probe is at {:.3} mm, beyond the travel of {end:.1} mm", position.0),
         );
     }
     None
@@ -233,12 +236,15 @@ fn motor_trip(state: &mut EngineState, reading: &Reading) -> Option<Trip> {
         return None;
     }
     state.is_homed = false;
-    trip(Interlock::Motor, "the motor lost its current; check its supply, then home")
+    trip(Interlock::Motor, "the motor has lost its current; check its supply, then home the axis")
 }
 
 fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
     if force > force_max {
-        return trip(Interlock::Force, format!("the force is {force:.2}, above {force_max:.2}"));
+        return trip(
+            Interlock::Force,
+            format!("the force is {force:.2}, above the limit of {force_max:.2}"),
+        );
     }
     if force < force_min {
         let reason = format!("the load cell reads {force:.2} in tension; check its wiring");
@@ -252,7 +258,9 @@ fn rate_trip(rate: Option<f64>, rate_max: f64, step: Option<&Step>) -> Option<Tr
     let advice = step.map_or("", |step| step.kind().rate_advice());
     trip(
         Interlock::ForceRate,
-        format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s{advice}"),
+        format!(
+            "the force changes by {rate:.0} N/s, faster than the limit of {rate_max:.0} N/s{advice}"
+        ),
     )
 }
 
@@ -271,7 +279,7 @@ pub(super) fn age_trip(state: &EngineState, now: Nanos) -> Option<Trip> {
     trip(
         Interlock::SampleAge,
         format!(
-            "no sample for {:.0} ms; at most {:.0} ms are allowed at this speed",
+            "no sample has arrived for {:.0} ms, but at most {:.0} ms are allowed at this speed",
             age.0 * 1e3,
             age_max.0 * 1e3
         ),

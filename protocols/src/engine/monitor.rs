@@ -63,7 +63,9 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     match action {
         MonitorAction::Note => {}
         MonitorAction::Pause if is_endless => {
-            let reason = format!("{message}; this has paused the step {PAUSES_MAX} times already");
+            let reason = format!(
+                "{message}; the run ends, because this condition has already paused the step {PAUSES_MAX} times"
+            );
             stop::begin(cx, EndingKind::Stop, reason);
         }
         MonitorAction::Pause => pause::now(cx, PauseRequester::Monitor, message),

@@ -27,7 +27,7 @@ pub(super) fn now(cx: &mut Context<'_>, by: PauseRequester, reason: String) {
             let next = Ok(*index);
             return halt_motion(cx, next, reason);
         }
-        _ => return cx.refuse("nothing runs that could pause"),
+        _ => return cx.refuse("no step is in progress that can be paused"),
     };
     match pausing {
         Some(PauseBehaviour::Wait | PauseBehaviour::Control) => {
@@ -54,7 +54,8 @@ pub(super) fn after(cx: &mut Context<'_>, step_index: usize) {
         Activity::Starting | Activity::Step(_) | Activity::Between { .. }
     );
     if !is_ahead || !is_running || cx.state.pause == Some(Pause::Extended) {
-        return cx.refuse("that place of the plan is not ahead, or the run is paused");
+        return cx
+            .refuse("the chosen checkpoint is already past, or the run is paused or has ended");
     }
     cx.state.is_paused_by_operator = true;
     await_end_of(cx, step_index);
@@ -76,7 +77,7 @@ fn halt_motion(cx: &mut Context<'_>, next: Result<usize, &'static str>, reason: 
 pub(super) fn at_checkpoint(cx: &mut Context<'_>, done_index: usize) {
     let planned = cx.state.config.plan.steps.get(done_index);
     let name = planned.and_then(|planned| planned.checkpoint.clone());
-    let reason = name.unwrap_or_else(|| format!("behind step {}", done_index + 1));
+    let reason = name.unwrap_or_else(|| format!("after step {}", done_index + 1));
     cx.state.pause = None;
     cx.record(Record::Paused { reason, no_resume: None });
     cx.enter_phase(Phase::Paused);
@@ -95,7 +96,7 @@ pub(super) fn resume(cx: &mut Context<'_>) {
             }
         }
         (Activity::Paused { next: Err(cause), .. }, _) => {
-            let reason = format!("{cause}; finish early or stop");
+            let reason = format!("{cause}; finish the run early or stop it");
             cx.refuse(reason);
         }
         (_, Some(_)) => {
@@ -126,7 +127,9 @@ pub(super) fn finish(cx: &mut Context<'_>) {
         _ => false,
     };
     if !is_at_rest {
-        return cx.refuse("pause first, then finish early");
+        return cx.refuse(
+            "the run can finish early only while it is paused and at rest; pause it first",
+        );
     }
     cx.state.pause = None;
     cx.state.is_finished_early = true;

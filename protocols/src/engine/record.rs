@@ -221,7 +221,10 @@ impl fmt::Display for Record {
                 })
             }
             Self::ContactTriggered { pass, position, force, .. } => {
-                write!(f, "pass {pass} triggered at {position:.3} with a force of {force:.3}")
+                write!(
+                    f,
+                    "pass {pass}: contact detected at {position:.3} with a force of {force:.3}"
+                )
             }
             Self::ContactFound { position, std_error_mm } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
@@ -243,22 +246,25 @@ impl fmt::Display for Record {
             }
             Self::HoldEndedEarly { parameter, relative, wanted, held } => write!(
                 f,
-                "hold ended after {held:.1}: {} is known to within {} %; the target was {} %",
+                "the hold ended after {held:.1}, because {} is known to within {} %; the target was {} %",
                 parameter.name(),
                 percent(*relative),
                 percent(*wanted)
             ),
             Self::LeadLost { silent } => write!(
                 f,
-                "the slave has had no lead for {silent:.1}; the axis stops, and the step ends unless a lead arrives"
+                "the master has sent no position for {silent:.1}; the axis stops, and the step ends unless a position arrives"
             ),
             Self::HoldSteady { slope_n_per_s, held } => write!(
                 f,
-                "hold ended after {held:.1}: the force changes by {:.4} N/min",
+                "the hold ended after {held:.1}, because the force changes by only {:.4} N/min",
                 60.0 * slope_n_per_s
             ),
             Self::ForceReached { target, force, depth } => {
-                write!(f, "{force:.3} reached at {depth:.3}; the target was {target:.3}")
+                write!(
+                    f,
+                    "a force of {force:.3} was reached at a depth of {depth:.3}; the target was {target:.3}"
+                )
             }
             Self::Prompted { message, timeout } => {
                 write!(f, "{message} (waits at most {:.0})", *timeout)
@@ -272,7 +278,9 @@ impl fmt::Display for Record {
                 write!(f, "the run will pause after step {}", step_index + 1)
             }
             Self::Paused { reason, no_resume } => match no_resume {
-                Some(cause) => write!(f, "paused: {reason}; the run cannot go on: {cause}"),
+                Some(cause) => {
+                    write!(f, "paused: {reason}; the run cannot be resumed, because {cause}")
+                }
                 None => write!(f, "paused: {reason}"),
             },
             Self::Resumed => f.write_str("resumed"),
@@ -284,7 +292,7 @@ impl fmt::Display for Record {
             },
             Self::MonitorTripped { message, value, .. } => write!(f, "{message} ({value:.4})"),
             Self::MonitorPast { index, value } => {
-                write!(f, "monitor {} is back in range ({value:.4})", index + 1)
+                write!(f, "the value of monitor {} is back in range ({value:.4})", index + 1)
             }
             Self::Weighed { mass_g, is_loading, repeat, volts, .. } => {
                 let way = if *is_loading { "loading" } else { "unloading" };

@@ -323,10 +323,10 @@ impl EngineState {
     pub fn can_retract(&self) -> Result<(), &'static str> {
         match &self.activity {
             Activity::Holding { ending } if ending.ending == EndingKind::Halt || !self.is_homed => {
-                Err("the position is no longer known; move the probe by hand, then home")
+                Err("the position is no longer known; move the probe by hand, then home the axis")
             }
             Activity::Holding { .. } => Ok(()),
-            _ => Err("retract follows a stop"),
+            _ => Err("a retract is possible only after a stop"),
         }
     }
 

@@ -184,8 +184,11 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
     let expected = cx.state.unacknowledged.pop_front().map(|(_, command)| command);
     if !expected.is_some_and(|sent| sent.is_answered_by(&ack.command)) {
         let reason = match expected {
-            Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
-            None => format!("the rig acknowledged {:?}, which was not asked", ack.command),
+            Some(command) => format!(
+                "the rig acknowledged {:?} instead of the commanded {command:?}",
+                ack.command
+            ),
+            None => format!("the rig acknowledged {:?}, which was not commanded", ack.command),
         };
         return stop::begin(cx, EndingKind::Abort, reason);
     }
@@ -240,8 +243,8 @@ fn leave(cx: &mut Context<'_>) {
     let PauseView::Paused { no_resume } = cx.state.pause() else {
         return;
     };
-    let reason = no_resume.unwrap_or("what paused the run does not pass");
-    let reason = format!("paused, and nobody is there to decide: {reason}");
+    let reason = no_resume.unwrap_or("the condition that paused the run persists");
+    let reason = format!("the run is paused and no operator can decide how it continues: {reason}");
     stop::begin(cx, EndingKind::Stop, reason);
 }
 
@@ -280,7 +283,7 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
         Operator::Pause => {
-            pause::now(cx, pause::PauseRequester::Operator, "the operator asked for it".into())
+            pause::now(cx, pause::PauseRequester::Operator, "requested by the operator".into())
         }
         Operator::Leave => leave(cx),
         Operator::PauseAfter { step_index } => pause::after(cx, step_index),
@@ -294,7 +297,7 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
 
 fn answer(cx: &mut Context<'_>, answer: PromptAnswer) {
     if !pass_event(cx, &StepEvent::Answer(answer)) {
-        cx.refuse("there is no question to answer");
+        cx.refuse("no prompt waits for an answer");
     }
 }
 

@@ -113,7 +113,7 @@ fn check_name(root: &DocumentTable, name: &str, problems: &mut Problems) {
         problems.error(
             line,
             format!(
-                "the name '{name}' has characters that are not allowed; use small letters, digits and '-'"
+                "the name '{name}' has characters that are not allowed; use lower-case letters, digits and '-'"
             ),
         );
     }
@@ -150,7 +150,7 @@ fn read_ask(root: &DocumentTable, problems: &mut Problems) -> Vec<String> {
             DocumentValue::Text(key) if known.contains(&key.as_str()) => ask.push(key.clone()),
             DocumentValue::Text(key) => {
                 let hint = suggestion(key, &known);
-                problems.error(item.line, format!("'ask' knows no key '{key}'; {hint}"));
+                problems.error(item.line, format!("'ask' has no key '{key}'; {hint}"));
             }
             _ => {
                 let kind = item.kind();

@@ -72,13 +72,13 @@ pub(super) const MONITOR_KEYS: [Key; 4] = [
         "settle",
         QuantityKind::Time,
         "1 s",
-        "time that the value must stay in range before a paused run goes on",
+        "time that the value must stay in range before a paused run continues",
     )
     .zero_allowed(),
     Key::needed(
         "action",
         QuantityKind::Text,
-        "what follows: `note`, `pause`, `stop`, `retract` or `halt`",
+        "what follows when the monitor trips: `note`, `pause`, `stop`, `retract` or `halt`",
     )
     .one_of(&["note", "pause", "stop", "retract", "halt"]),
     Key::needed("message", QuantityKind::Text, "text that the operator reads"),

@@ -30,7 +30,7 @@ pub(super) fn check(steps: &[PlacedStep], problems: &mut Problems) {
         {
             problems.push(ProtocolProblem::warning(
                 placed.line,
-                format!("the probe is in the tissue at checkpoint '{checkpoint}', and the tissue goes on relaxing during a pause; put the checkpoint after a retract or unload if this matters"),
+                format!("the probe is in the tissue at checkpoint '{checkpoint}', and the tissue continues to relax during a pause; put the checkpoint after a retract or unload if this matters"),
             ));
         }
     }

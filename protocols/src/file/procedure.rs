@@ -19,7 +19,7 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
         QuantityKind::Text,
-        "name of the pass number, which counts from 1: `$name` in values, `{name}` in texts",
+        "name for the number of the pass, from 1; write `$name` in values and `{name}` in texts",
     ),
     Key::optional("reverse", QuantityKind::Flag, "`true` takes the values in reverse order"),
     Key::optional(
@@ -135,7 +135,7 @@ impl Writer<'_> {
         let mistake = |message: &str| Err((table.line, message.to_owned()));
         if depth == LOOPS_MAX {
             return mistake(&format!(
-                "loops are nested more than {LOOPS_MAX} deep; write some steps out"
+                "loops are nested more than {LOOPS_MAX} levels deep; write out the passes of one loop"
             ));
         }
         let Some(steps) = table.get("steps") else {

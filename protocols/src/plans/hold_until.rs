@@ -39,7 +39,7 @@ impl HoldUntil {
     pub fn check(&self) -> Result<(), String> {
         if !(self.relative > 0.0 && self.relative < 1.0) {
             return Err(format!(
-                "a hold cannot end at an interval of {} % of the value; give a share above 0 and below 100 %",
+                "a share of {} % of the value is not possible; give a share above 0 and below 100 %",
                 self.relative * 100.0
             ));
         }
@@ -54,7 +54,7 @@ impl HoldUntil {
 
     /// Reads `tau=1%` or `mu1=0.02`; `tau` is short for `tau_eps`.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let form = "write the rule like tau=1% or tau_eps=0.01";
+        let form = "write the rule in the form tau=1% or tau_eps=0.01";
         let Some((name, share)) = text.split_once('=') else {
             return Err(format!("'{text}' has no '='; {form}"));
         };

@@ -22,7 +22,7 @@ impl Walk<'_> {
     pub fn check_sizes(&mut self, sizes: &[f64]) {
         if let Some(size) = sizes.iter().find(|size| size.is_nan() || size.abs() > 1000.0) {
             self.refusals.push(format!(
-                "a distance or force of {size} is not possible; give at most 1000 mm or N"
+                "a distance or force of {size} is not possible; give at most 1000 mm or 1000 N"
             ));
         }
     }

@@ -133,7 +133,7 @@ fn walk(
     notes.extend(unused_limits);
     if force_band[1] > limits.force_max {
         notes.push(format!(
-            "a stiff specimen may reach {:.1}; the interlock stops the run at {:.1}",
+            "the force on a stiff specimen may reach {:.1}, but the interlock stops the run at {:.1}",
             force_band[1], limits.force_max
         ));
     }

@@ -24,7 +24,7 @@ pub struct FindBase {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Find the base without a specimen on it. A contact point found before gives the thickness of the specimen.",
+    about: "Find the base without a specimen on it. The distance from a contact point found before is the thickness of the specimen.",
     keys: &[
         Key::usual("speed", QuantityKind::Speed, "0.6 mm/s", "speed of the first touch"),
         Key::usual("criterion", QuantityKind::Force, "0.05 N", "force that ends the first touch"),
@@ -63,7 +63,10 @@ impl FindBase {
 
     fn check_speeds(&self) -> Result<(), String> {
         if self.approach_speed.0.max(self.pass_speed.0) > Self::SPEED_MAX.0 {
-            return Err(format!("a base is stiff; touch it at {} at most", Self::SPEED_MAX));
+            return Err(format!(
+                "a speed is too high for a stiff base; give at most {}",
+                Self::SPEED_MAX
+            ));
         }
         Ok(())
     }
@@ -85,7 +88,7 @@ impl Default for FindBase {
 
 impl StepKind for FindBase {
     fn rate_advice(&self) -> &'static str {
-        "; what the search for the base met hardly gives way: give find-base a lower speed, or let a simulated rig give way (compliance 30)"
+        "; the base is too stiff for this speed: give find-base a lower speed, or a simulated rig a machine compliance of 30 um/N"
     }
 
     fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
@@ -148,7 +151,7 @@ impl Executable for FindBase {
         self.check_speeds()?;
         if criterion >= self.pass_force {
             return Err(format!(
-                "noise of {noise:.3} would need a criterion of {criterion:.3}, no less than the {:.3} of the second touch; quieten the signal",
+                "a noise of {noise:.3} needs a criterion of {criterion:.3}, but it must be below the {:.3} that end the second touch; reduce the noise",
                 self.pass_force
             ));
         }
@@ -184,7 +187,10 @@ impl RunningStep for BaseSearch {
                 self.stage = Stage::Braking;
             }
             Stage::Approach if at_rest => {
-                return Err(format!("nothing stiff before {:.1} mm; check the base", position.0));
+                return Err(format!(
+                    "no stiff surface was found up to {:.1} mm; check the base",
+                    position.0
+                ));
             }
             Stage::Braking if at_rest => {
                 let back = self.first.moved_by(-self.plan.retreat_mm);

@@ -19,7 +19,7 @@ pub struct Follow {
 
 /// No protocol asks for it: what leads is a program.
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Follow a lead from outside.",
+    about: "Follow the positions that a master sends.",
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
@@ -40,7 +40,7 @@ impl StepKind for Follow {
         walk.expected.stay(walk.phase, (duration - there).max(0.0));
         walk.reach = Reach { low: -walk.limits.travel_max.0, high: way };
         walk.note(format!(
-            "the slave follows its lead no faster than {} and no deeper than {}",
+            "the slave follows the master at up to {} and down to a depth of {}",
             self.speed, self.depth_max
         ));
         // The move under way is braked first.
@@ -146,7 +146,7 @@ impl RunningStep for FollowRun {
             None if self.is_refusal_reported => {}
             None => {
                 self.is_refusal_reported = true;
-                cx.refuse("what leads the slave gave no number; check what leads it");
+                cx.refuse("the master sent no valid position; check the master");
             }
         }
         Some(Progress::Continue)

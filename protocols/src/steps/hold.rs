@@ -19,7 +19,7 @@ pub struct Hold {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Stay at depth while the force relaxes.",
+    about: "Keep the probe at its depth while the force relaxes.",
     keys: &[
         Key::needed("for", QuantityKind::Time, "longest duration").zero_allowed(),
         Key::optional(
@@ -50,7 +50,7 @@ fn read(args: &Args) -> Result<Step, String> {
         (None, None) => None,
         _ => {
             let message =
-                "'slope' and 'over' need each other; give both the slope and the time, or neither";
+                "'slope' and 'over' belong together; give both the slope and the time, or neither";
             return Err(message.into());
         }
     };

@@ -126,7 +126,7 @@ impl RunningStep for ForceHoldRun {
         let mean = Newtons(self.filter.push(force.0));
         if depth > self.plan.depth_max {
             return Err(format!(
-                "the probe reached {depth:.2}, deeper than {:.2}; check the specimen or allow a greater depth",
+                "the probe reached a depth of {depth:.2}, beyond the limit of {:.2}; check the specimen or allow a greater depth",
                 self.plan.depth_max
             ));
         }

@@ -152,7 +152,7 @@ impl RunningStep for HomingRun {
             }
             Stage::BackingOff if at_rest => {
                 if is_at_switch {
-                    return Err("the home switch stays closed; check it".into());
+                    return Err("the home switch stays closed; check the switch".into());
                 }
                 let target = reading.pulses - cx.pulses_of(self.back_off_mm + TOUCH_REACH_MM);
                 cx.move_to_pulses(target, self.plan.touch_speed)?;
@@ -163,7 +163,7 @@ impl RunningStep for HomingRun {
                 self.stage = Stage::TouchBraking { edge_pulses: reading.pulses };
             }
             Stage::Searching | Stage::Touching if at_rest => {
-                return Err("the home switch was not found; check it and its cable".into());
+                return Err("the home switch was not found; check the switch and its cable".into());
             }
             Stage::TouchBraking { edge_pulses }
                 if at_rest && self.purpose == HomingPurpose::Check =>

@@ -27,7 +27,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "brake",
             QuantityKind::Force,
-            "the speed falls to a tenth when the force is this close to the target, and to a hundredth at a tenth of this distance",
+            "difference to the target force at which the probe slows to 10 % of its speed; within 10 % of this difference it slows to 1 %",
         ),
     ],
     build: Some(|args| {
@@ -54,7 +54,7 @@ impl LoadTo {
             return Ok(());
         }
         Err(format!(
-            "the load may go to a depth of {:.2} and the probe is at {depth:.2} already; allow a greater depth, or unload before it",
+            "the depth limit of the load is {:.2}, but the probe is already at {depth:.2}; allow a greater depth, or unload first",
             self.depth_max
         ))
     }
@@ -229,9 +229,9 @@ impl RunningStep for LoadRun {
             self.is_stopping = true;
         } else if at_rest {
             return Err(format!(
-                "{:.3} was not reached before {depth:.2}; the force there is {:.3}; check the specimen or allow a greater depth",
-                self.plan.force,
-                Newtons(mean)
+                "the force is only {:.3} at a depth of {depth:.2}, below the target of {:.3}; check the specimen or allow a greater depth",
+                Newtons(mean),
+                self.plan.force
             ));
         }
         Ok(Progress::Continue)

@@ -57,12 +57,8 @@ pub(super) const FACTS: StepFacts = StepFacts {
             "manual work: total mass to put on the load cell, `\"0 g\"` for none",
         )
         .zero_allowed(),
-        Key::optional(
-            "mount",
-            QuantityKind::Count,
-            "manual work: number of the specimen to clip in",
-        )
-        .zero_allowed(),
+        Key::optional("mount", QuantityKind::Count, "manual work: number of the specimen to mount")
+            .zero_allowed(),
         Key::optional(
             "unmount",
             QuantityKind::Flag,
@@ -150,7 +146,9 @@ impl RunningStep for PromptRun {
         cx.record(Record::Answered { answer: PromptAnswer::TimedOut });
         Ok(match self.plan.on_timeout {
             OnTimeout::Continue => Progress::Done,
-            OnTimeout::Stop => Progress::Stop(format!("nobody answered within {timeout:.0}")),
+            OnTimeout::Stop => {
+                Progress::Stop(format!("the prompt was not answered within {timeout:.0}"))
+            }
         })
     }
 
@@ -160,7 +158,7 @@ impl RunningStep for PromptRun {
         };
         cx.record(Record::Answered { answer });
         if answer != PromptAnswer::Confirmed {
-            return Some(Progress::Stop("the operator declined what the plan asked for".into()));
+            return Some(Progress::Stop("the operator declined the prompt".into()));
         }
         if matches!(self.plan.hand, Some(HandAction::Mount { .. })) {
             // The contact position was that of another specimen.

@@ -25,7 +25,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
 };
 
 /// Why an indentation does not go on after a pause.
-pub(super) const INTERRUPTED: &str = "an interrupted indentation is another experiment";
+pub(super) const INTERRUPTED: &str = "the tissue relaxes while an indentation is interrupted";
 
 impl StepKind for Ramp {
     fn deepest(&self) -> Option<Depth> {

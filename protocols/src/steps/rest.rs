@@ -10,7 +10,7 @@ pub struct Rest {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Stay where the probe is and let the tissue recover.",
+    about: "Keep the probe where it is while the tissue recovers.",
     keys: &[Key::needed("for", QuantityKind::Time, "duration").zero_allowed()],
     build: Some(|args| Ok(Rest { duration: args.seconds("for")? }.into())),
     may_touch: false,

@@ -91,7 +91,7 @@ impl SelfTestRun {
         let noise_max = NOISE_FACTOR_MAX * rig.noise_expected.0.max(cx.volts_per_count());
         if noise > noise_max {
             return Err(format!(
-                "the signal's noise is {:.2} mV rms, above {:.2} mV; check wiring and range",
+                "the signal's noise is {:.2} mV rms, above the limit of {:.2} mV; check the wiring and the measuring range",
                 noise * 1e3,
                 noise_max * 1e3
             ));
@@ -108,7 +108,7 @@ pub(super) fn check_unloaded(cx: &Context<'_>, volts: Volts) -> Result<(), Strin
     let force = cx.curve().newtons_from_volts(volts);
     if force.abs() > UNLOADED_MAX {
         return Err(format!(
-            "the load cell reads {force:.2} before anything touches the probe; free it or recalibrate"
+            "the load cell reads {force:.2} before anything touches the probe; free the probe or recalibrate"
         ));
     }
     Ok(())

@@ -15,7 +15,7 @@ pub struct Sine {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Oscillate between the present depth and twice the amplitude deeper. The motion begins and ends at rest.",
+    about: "Oscillate between the present depth and a depth that is greater by twice the amplitude. The motion begins and ends at rest.",
     keys: &[
         Key::needed(
             "amplitude",
@@ -39,7 +39,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
     ..StepFacts::of(
         "sine",
         Phase::Sine,
-        PauseBehaviour::Measure("an interrupted oscillation is another experiment"),
+        PauseBehaviour::Measure("the tissue relaxes while an oscillation is interrupted"),
     )
 };
 
@@ -103,7 +103,7 @@ impl StepKind for Sine {
     fn doubt(&self, done: &StepResult<'_>) -> Option<String> {
         let lowest = done.lowest_force().filter(|lowest| *lowest <= FORCE_FLOOR)?;
         Some(format!(
-            "the force fell to {lowest:.3} N, and below {FORCE_FLOOR} N contact is uncertain: the probe may have lost the tissue; go deeper or reduce the amplitude"
+            "the force fell to {lowest:.3} N, and below {FORCE_FLOOR} N contact is uncertain: the probe may have left the tissue; go deeper or reduce the amplitude"
         ))
     }
 }

@@ -17,7 +17,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         "for",
         QuantityKind::Time,
         "4 s",
-        "duration in whole seconds, which contain whole mains cycles; from 2 s the drift is measured too",
+        "duration in whole seconds, so that mains hum averages out; with 2 s or more the drift is measured too",
     )],
     build: Some(|args| Ok(Tare { duration: args.seconds("for")? }.into())),
     needs: &[Need::Outside],

@@ -31,7 +31,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
     ..StepFacts::of(
         "unload",
         Phase::Unload,
-        PauseBehaviour::Measure("an interrupted unloading is another experiment"),
+        PauseBehaviour::Measure("the tissue relaxes while an unloading is interrupted"),
     )
 };
 

@@ -106,7 +106,7 @@ impl WaitCondition {
                 if from >= to || from.is_nan() || to.is_nan() =>
             {
                 Err(format!(
-                    "the bath cannot be between {from} and {to} °C; give the lower temperature as 'bath_from'"
+                    "the range from {from} to {to} °C is empty; give the lower temperature as 'bath_from'"
                 ))
             }
             _ => Ok(()),
@@ -192,7 +192,7 @@ impl RunningStep for WaitRun {
         if cx.now < self.deadline {
             return Ok(Progress::Continue);
         }
-        let missed = format!("within {timeout:.0} it did not come to pass that {condition}");
+        let missed = format!("the condition '{condition}' was not met within {timeout:.0}");
         Ok(match on_timeout {
             OnTimeout::Stop => Progress::Stop(missed),
             OnTimeout::Continue => {

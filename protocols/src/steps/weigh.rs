@@ -70,7 +70,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
 impl StepKind for Weigh {
     fn warning(&self, known: &Preconditions) -> Option<&'static str> {
         known.motor.then_some(
-            "'weigh' with the motor on stops at the force limit of the rig; remove { do = \"self-test\" } from a protocol that only weighs",
+            "while the motor is on, a mass above the force limit of the rig stops the run; remove { do = \"self-test\" } from a protocol that only weighs",
         )
     }
 
@@ -164,7 +164,7 @@ impl EngineState {
             {
                 Ok(at - 2)
             }
-            _ => Err("no weight was read just before"),
+            _ => Err("no weight has just been read, so none can be read again"),
         }
     }
 }

@@ -292,7 +292,7 @@ fn a_protocol_cannot_be_made_endless() {
     for (steps, words) in [
         (nested, "more than 10000 steps"),
         (hollow, "steps"),
-        (deep, "6 deep"),
+        (deep, "6 levels deep"),
         (brackets, "not TOML"),
     ] {
         let problems = Protocol::read(&format!("{head}steps = [ {steps} ]\n")).unwrap_err();

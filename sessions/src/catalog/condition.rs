@@ -73,7 +73,7 @@ struct Comparison {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ConditionError {
     #[error(
-        "'{text}' is not a condition; write a name, a sign (= != < <= > >=) and a value, as in depth>=2mm"
+        "'{text}' is not a condition; write a name, a comparison sign (= != < <= > >=) and a value, as in depth>=2mm"
     )]
     Form { text: String },
     #[error("'{value}' in '{text}' is not a number; compare a text with = or !=")]

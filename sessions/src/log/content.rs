@@ -137,11 +137,11 @@ impl<'v> Content<'v> {
     pub fn take_chunk(&mut self, records: &[u8]) -> Result<(), String> {
         let mut rest = Fields(records);
         while !rest.0.is_empty() && self.refusal.is_none() {
-            match rest.record().ok_or("a record runs past the end of its chunk")? {
+            match rest.record().ok_or("a record runs past the end of its data block")? {
                 (op::SCHEMA, _) => {}
                 (op::CHANNEL, body) => self.take_channel(body)?,
                 (op::MESSAGE, body) => self.take_message(body)?,
-                _ => return Err("a chunk holds a record of an unexpected kind".into()),
+                _ => return Err("a data block contains a record of an unexpected kind".into()),
             }
         }
         Ok(())
@@ -369,7 +369,7 @@ impl<'v> Content<'v> {
             return Ok(());
         }
         Err(format!(
-            "{} samples and {} entries were recorded, but the log has {samples} and {entries}",
+            "{} samples and {} entries were recorded, but the log has {samples} samples and {entries} entries",
             end.samples, end.entries
         ))
     }

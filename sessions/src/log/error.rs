@@ -11,20 +11,20 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum LogError {
     /// The file is not written to again, because a failed write or sync leaves it in an unknown state.
-    #[error("cannot write the session log {path} ({reason}); everything saved before is kept")]
+    #[error("cannot write the session log {path} ({reason}); everything saved until then is kept")]
     Disk { reason: String, path: String },
     /// Another program changed the file, or the disk lost data.
     #[error("another program changed the session log {path} during the recording: {alteration}")]
     Altered { alteration: Alteration, path: String },
     #[error(
-        "the disk of {path} did not keep up for {seconds} s, and no more samples fit in memory; everything saved before is kept; use a faster disk"
+        "the disk of {path} did not keep up for {seconds} s, and no more samples fit in memory; everything saved until then is kept; use a faster disk"
     )]
     TooSlow { seconds: u64, path: String },
     #[error(
         "the {what} is not a number and was not recorded; check the signal and the calibration"
     )]
     NotFinite { what: String },
-    #[error("entry {order} follows entry {previous}; record entries in order")]
+    #[error("entry {order} was recorded after entry {previous}; record entries in ascending order")]
     OutOfOrder { order: u64, previous: u64 },
     #[error("the {what} cannot be recorded ({reason})")]
     Encode { what: &'static str, reason: String },

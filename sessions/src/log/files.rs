@@ -68,7 +68,9 @@ pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
 /// The remark about a missing spare folder.
 pub(crate) fn describe_absent(spare: &Path) -> String {
     let spare = spare.display();
-    format!("a part of the session may be in {spare}, which is missing; connect that disk")
+    format!(
+        "a part of the session may be in the folder {spare}, which is missing; connect its disk"
+    )
 }
 
 /// Refuses a folder without a log.

@@ -69,7 +69,7 @@ impl ChunkReader {
 
     /// The records of a chunk.
     pub fn open(&mut self, body: &[u8]) -> Result<&[u8], String> {
-        let too_short = || "a chunk is too short".to_owned();
+        let too_short = || "a data block of the file is too short".to_owned();
         let mut fields = Fields(body);
         let _times = (fields.u64().ok_or_else(too_short)?, fields.u64().ok_or_else(too_short)?);
         let size = fields.u64().ok_or_else(too_short)?;
@@ -77,28 +77,28 @@ impl ChunkReader {
         let compression = fields.text().ok_or_else(too_short)?;
         let compressed_size = fields.u64().ok_or_else(too_short)?;
         if compressed_size != fields.0.len() as u64 {
-            return Err("a chunk's lengths contradict each other".into());
+            return Err("the two lengths of a data block of the file do not agree".into());
         }
         let size = usize::try_from(size)
             .ok()
             .filter(|&size| size <= FRAME_BYTES_MAX)
-            .ok_or("a chunk claims to be larger than the largest possible chunk")?;
+            .ok_or("a data block of the file states a size above the largest possible size")?;
         self.records.clear();
         match compression {
             "" => self.records.extend_from_slice(fields.0),
             "zstd" => {
                 self.records.reserve_exact(size);
-                self.decompressor
-                    .decompress_to_buffer(fields.0, &mut self.records)
-                    .map_err(|err| format!("a chunk cannot be decompressed ({err})"))?;
+                self.decompressor.decompress_to_buffer(fields.0, &mut self.records).map_err(
+                    |err| format!("a data block of the file cannot be decompressed ({err})"),
+                )?;
             }
-            _ => return Err("a chunk has an unknown compression".into()),
+            _ => return Err("a data block of the file uses an unknown compression method".into()),
         }
         if self.records.len() != size {
-            return Err("a chunk has the wrong length".into());
+            return Err("a data block of the file has the wrong length".into());
         }
         if crc32fast::hash(&self.records) != checksum {
-            return Err("a chunk's checksum is wrong".into());
+            return Err("the checksum of a data block of the file is wrong".into());
         }
         Ok(&self.records)
     }

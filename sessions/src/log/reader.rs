@@ -259,7 +259,7 @@ impl<'v> Reader<'v> {
             notes.push(format!("the recording has no end record, and the data in this folder end at {last:.1} s; {absent}"));
         } else if end.is_none() {
             notes.push(format!(
-                "the recording has no end record: it was interrupted at {last:.1} s; all data before are complete"
+                "the recording has no end record: it was interrupted at {last:.1} s; all data before that time are complete"
             ));
         } else if !self.is_finished {
             notes.push(NO_INDEX.into());
@@ -384,9 +384,9 @@ const NO_INDEX: &str = "the index at the end is missing; all samples and entries
 const LATER_PART: &str =
     "this is a later part of a recording; open the session's folder for the earlier parts";
 
-pub(crate) const NO_BEGINNING: &str = "it does not begin like a segment";
+pub(crate) const NO_BEGINNING: &str = "its first bytes are not those of a segment";
 pub(crate) const NOT_BEGUN: &str =
-    "the recording was interrupted before it began, or its beginning is lost";
+    "the recording was interrupted before any data were written, or its beginning is lost";
 
 pub(crate) fn damaged(path: &Path, offset: u64, reason: &str) -> ReadError {
     ReadError::Damaged { path: path.into(), offset, reason: reason.into() }
@@ -404,7 +404,7 @@ pub(crate) fn check_beginning(
     let reason = if source.length() == 0 {
         "it is empty: nothing was recorded"
     } else if !is_ours {
-        "it does not begin like a session log"
+        "its first bytes are not those of a session log"
     } else {
         return Ok(());
     };

@@ -57,7 +57,7 @@ impl CompanionFiles {
                     if !salvage.has_every_decision || *number as usize > found =>
                 {
                     self.left_out.push(format!(
-                        "the correction of contact {number} by {} is not copied, because missing decisions may change the numbers of the contacts; depths are measured from the recorded contact points",
+                        "the correction of contact {number}, made by {}, is not copied, because missing decisions may change the numbers of the contacts; depths are measured from the recorded contact points",
                         edit.by
                     ));
                 }
@@ -81,10 +81,10 @@ impl CompanionFiles {
                     "its times count from the first sample, which is missing"
                 }
                 AnalysisContent::Recalibration { .. } if !salvage.has_every_decision => {
-                    "the tares that it needs may be among the missing decisions"
+                    "tares that it needs may be among the missing decisions"
                 }
                 AnalysisContent::Fit { .. } => {
-                    "it belongs to the samples of the original; fit the recovered session again"
+                    "it was made from the samples of the original session; fit the recovered session again"
                 }
                 // The withdrawn analysis is not in the copy.
                 AnalysisContent::Withdrawal

@@ -70,7 +70,7 @@ impl MissingData {
             let SampleGap { samples, from_s, .. } = gap;
             sentences.push(match gap.to_s {
                 Some(to_s) if gap.after_sample == 0 => format!(
-                    "the first {samples} samples, before {to_s:.3} s of the recording, are missing; t_s counts from the first remaining sample, so its values are smaller than in the original by the missing time"
+                    "the first {samples} samples, before {to_s:.3} s of the recording, are missing; t_s counts from the first remaining sample, so its values are smaller than in the original session by the duration of the missing samples"
                 ),
                 Some(to_s) => {
                     format!("{samples} samples between {from_s:.3} s and {to_s:.3} s are missing")

@@ -210,7 +210,7 @@ fn absurd_lengths_are_refused() {
     let path = folder.path().join("000.mcap");
     put(&path, &bytes);
     let refusal = Session::open(&path).unwrap_err().to_string();
-    assert!(refusal.contains("largest possible chunk"), "{refusal}");
+    assert!(refusal.contains("largest possible size"), "{refusal}");
 }
 
 /// Of a damaged log the raw bytes that are left are kept, and those that are not are counted to the byte.

@@ -318,7 +318,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
 fn is_spare_reported(folder: &Path, spare: &Path) -> bool {
     let away = spare.with_extension("away");
     fs::rename(spare, &away).unwrap();
-    let words = "connect that disk";
+    let words = "connect its disk";
     let open = Session::open(folder).unwrap();
     if open.end.is_some() {
         fs::rename(away, spare).unwrap();

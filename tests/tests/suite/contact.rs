@@ -94,7 +94,10 @@ fn row(noise: &str, stiffness: &str) -> Row {
         let Some(contact) = found.contact else {
             // The one honest way out: the noise of this search leaves the position open.
             let reason = found.outcome.reason;
-            assert!(reason.contains("known to"), "{noise} mN {stiffness} % seed {seed}: {reason}");
+            assert!(
+                reason.contains("standard error"),
+                "{noise} mN {stiffness} % seed {seed}: {reason}"
+            );
             row.refused += 1;
             continue;
         };
@@ -213,10 +216,10 @@ fn a_second_pass_that_felt_nothing_for_noise_says_so() {
     let searches =
         (1..=8).map(|seed| search(settings(seed, "200", "100"), FindContact::default(), None));
     let reasons = searches.map(|found| found.outcome.reason);
-    let blind: Vec<String> = reasons.filter(|why| why.contains("did not feel")).collect();
+    let blind: Vec<String> = reasons.filter(|why| why.contains("found no contact")).collect();
     assert!(!blind.is_empty(), "no search failed so");
     for why in blind {
-        assert!(why.contains("from 0.0") && why.contains("quieten the signal"), "{why}");
+        assert!(why.contains("instead of 0.0") && why.contains("reduce the noise"), "{why}");
     }
 }
 
@@ -234,7 +237,7 @@ fn a_loaded_cell_is_refused() {
             rig.apply_hand_action(HandAction::LoadCell { mass_g: 10.0 });
         }
     });
-    assert_refused(&found, "tissue is met");
+    assert_refused(&found, "touches the tissue");
 }
 
 #[test]
@@ -264,7 +267,7 @@ fn a_drifting_signal_is_refused_and_a_steady_one_recorded() {
 fn an_interval_wider_than_the_plan_allows_is_refused() {
     let plan = FindContact { std_error_mm_max: 0.005, ..FindContact::default() };
     let found = search(settings(1, "50", "100"), plan, None);
-    assert_refused(&found, "wider than 0.005 mm");
+    assert_refused(&found, "at most 0.005 mm");
 }
 
 /// Taps on the cell on the way to the tissue: 10 g for 30 ms, one per millimetre from 15 mm on.
@@ -288,7 +291,7 @@ fn peaks_of_the_signal_are_not_taken_for_tissue() {
     assert!(error.abs() < 5.0 * contact.std_error_mm, "{error}");
     let first_pass = |record: &&Record| matches!(record, Record::ContactTriggered { pass: 1, raw, .. } if raw.len() == 10);
     assert_eq!(found.records.iter().filter(first_pass).count(), 4);
-    assert_refused(&tapped(12), "quieten the signal");
+    assert_refused(&tapped(12), "without lasting contact");
 }
 
 /// Something done by hand while the probe waits between the two touches.

@@ -116,7 +116,7 @@ fn a_force_that_is_not_there_ends_the_run() {
     let mut lab = lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)]));
     lab.run();
     let reason = &lab.state().holding().unwrap().reason;
-    assert!(reason.contains("not reached"), "{reason}");
+    assert!(reason.contains("the force is only"), "{reason}");
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn a_condition_that_comes_back_with_its_step_ends_the_run() {
     lab.operator(Operator::Start);
     assert!(lab.run_until(Seconds(2000.0), |state| state.holding().is_some()));
     let reason = &lab.state().holding().unwrap().reason;
-    assert!(reason.contains("3 times already"), "{reason}");
+    assert!(reason.contains("already paused the step 3 times"), "{reason}");
     let searches =
         lab.records.iter().filter(|(_, record)| matches!(record, Record::MonitorTripped { .. }));
     assert_eq!(searches.count(), 4);
@@ -360,7 +360,7 @@ fn a_pause_that_cannot_go_on_ends_where_nobody_watches() {
     );
     let end = session.end.as_ref().unwrap();
     assert_eq!(end.outcome, "stop", "{}", end.reason);
-    assert!(end.reason.contains("nobody is there"), "{}", end.reason);
+    assert!(end.reason.contains("no operator can decide"), "{}", end.reason);
 }
 
 /// The hand that loads the cell stands for whoever touches the probe; it does so faster than the interlock on the

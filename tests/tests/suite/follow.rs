@@ -428,7 +428,7 @@ fn what_leads_may_fail_and_the_session_says_so() {
     assert_eq!((records("lead_lost"), records("refused")), (1, 1));
     let remarks = of_session(&session).unwrap().remarks;
     assert!(
-        remarks.iter().any(|remark| remark.contains("the slave has had no lead")),
+        remarks.iter().any(|remark| remark.contains("the master has sent no position")),
         "{remarks:?}"
     );
     let followed = session.rows.iter().filter(|row| row.phase == Phase::Follow).count();

@@ -134,7 +134,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
         ("fast", "\"fast\" is not a speed"),
         ("0,75", "write a point, not a comma"),
         ("3 mm", "\"3 mm\" is a length"),
-        ("0.7501", "cannot make 0.7501 mm/s"),
+        ("0.7501", "cannot move at 0.7501 mm/s"),
         ("900", "outside the range of rig sim"),
         ("", "type a number here"),
     ] {
@@ -169,7 +169,7 @@ fn f12_and_escape_stop_with_a_text_field_focused() {
         assert!(flow.says("State: STOPPED"));
         // No contact was found yet, but a search may have stopped within the tissue.
         assert!(flow.is_enabled("Retract  F8"));
-        assert!(flow.says("retract or close it first"));
+        assert!(flow.says("retract the probe or close the session first"));
         flow.click("Close session");
         let run = flow.wait_for_end();
         assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
@@ -233,7 +233,7 @@ fn commands(window: &TestWindow) -> &[ViewportCommand] {
 #[test]
 fn forces_beyond_the_calibration_ask_for_an_acknowledgement() {
     let mut flow = WindowFlow::open(TimeScale::Max);
-    let tick = "I accept this; it is recorded";
+    let tick = "I accept this, and the session records it";
     assert!(flow.window.query_by_label(tick).is_none());
     flow.type_into("depth", "45");
     assert!(flow.says("calibrated only up to"));

@@ -157,7 +157,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
     check_haptics(&mut flow);
     let looked = screen_of::<HapticsScreen>(&flow.window).check_result().unwrap();
     let checked = &looked.as_ref().unwrap().checked;
-    // The source thesis's body: the model itself returns energy below 0.712 mm.
+    // The source thesis's body: the model returns more energy than it takes below 0.712 mm.
     assert!((checked.margin.cycles[0].to.0 - 0.712).abs() < 1e-3);
     assert!(checked.trials[0].buzz_share > 0.5);
     let sentences = checked.sentences.clone();
@@ -167,7 +167,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
     for words in [
         "relaxation of the model",
         "the device has 0.50 N s/m",
-        "the model itself returns energy",
+        "the model returns more energy than it takes",
         "without guards: limit cycle",
         "with guards: ",
     ] {

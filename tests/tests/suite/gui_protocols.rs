@@ -89,7 +89,7 @@ fn an_interrupted_ramp_is_not_resumed_but_finished_early() {
     flow.window.key_press(Key::F7);
     wait_for(&mut flow, "the pause", is_paused);
     assert!(!flow.is_enabled("Resume  F9"));
-    assert!(flow.says("an interrupted indentation is another experiment"));
+    assert!(flow.says("the tissue relaxes while an indentation is interrupted"));
     // The key does no more than the button.
     flow.window.key_press(Key::F9);
     flow.window.run_steps(10);
@@ -199,7 +199,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     flow.window.run_steps(2);
     let shelf = CalibrationStore::open(flow.folder.path());
     let kept = shelf.in_force("sim").unwrap();
-    assert!(flow.says(&kept.id) && flow.says("in force"));
+    assert!(flow.says(&kept.id) && flow.says("in use"));
     assert!(flow.is_enabled("Use calibration  F6"));
     flow.window.key_press(Key::F6);
     flow.window.run_steps(3);

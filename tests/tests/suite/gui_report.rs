@@ -229,7 +229,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
 #[test]
 fn sessions_shown_together_are_fitted_as_one_body() {
     let mut panel = Panel::open();
-    panel.click("fit this session and the other one shown as one material");
+    panel.click("fit this session and the other session shown as one material");
     panel.type_into("name", "together");
     panel.click("Make analysis");
     panel.wait_for("saved as 'together'");

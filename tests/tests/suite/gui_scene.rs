@@ -57,7 +57,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     // Nothing else that keeps time is started beside it.
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Num9);
     flow.window.run_steps(3);
-    assert!(flow.says("the scene runs and would be disturbed"));
+    assert!(flow.says("the scene runs, and this would disturb its timing"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.wait("the end of the path", |window| {
         let touch = screen_of::<SceneScreen>(window).live_scene().unwrap();
@@ -153,7 +153,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     flow.type_into("record to", &called);
     flow.click("Start the scene");
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
-    assert!(flow.says("give a new folder that may be written"));
+    assert!(flow.says("give a new folder in a writable place"));
     flow.type_into("record to", "");
     // Another body gives other forces, and a changed line is reported.
     let settings = folder.join("settings.toml");
@@ -215,13 +215,13 @@ fn a_missed_budget_is_reported_before_anything_was_measured_and_a_button_leads_t
         touch.is_some_and(|touch| touch.kept().work.count > 0)
     });
     flow.window.run_steps(2);
-    assert!(flow.says("over the budget of 0.000001 µs"));
+    assert!(flow.says("but the budget is 0.000001 µs"));
     // It is that of the scene that ran, whatever stands in the form.
     flow.click("Stop the scene");
     flow.click("Built in");
     flow.wait("the usual scene", |window| window.query_by_label("thesis body").is_some());
     flow.window.run_steps(2);
-    assert!(flow.says("500 µs") && flow.says("over the budget of 0.000001 µs"));
+    assert!(flow.says("500 µs") && flow.says("but the budget is 0.000001 µs"));
     flow.click("Measure on Trade...");
     assert!(flow.says("nothing measured on this machine yet") && flow.says("mm of error"));
 }

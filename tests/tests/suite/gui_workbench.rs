@@ -118,7 +118,7 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     flow.type_into("distance", "far");
     assert!(flow.says("not a finite number") && !flow.is_enabled("Jog"));
     flow.type_into("distance", "500");
-    assert!(flow.says("up to 150 mm either way"));
+    assert!(flow.says("at most 150 mm in either direction"));
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     flow.window.run_steps(3);
     flow.click("+5 mm");
     flow.window.run_steps(10);
-    assert!(flow.says("the daily check failed: zero; run the daily check, or accept"));
+    assert!(flow.says("the daily check failed: zero; run the daily check, or acknowledge"));
     assert!(flow.run().is_none() && flow.sessions().is_empty());
     // Away from everything it may go, to find home.
     flow.click("Find home");

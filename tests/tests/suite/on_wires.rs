@@ -31,7 +31,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// What a run says that a busy computer has ended.
-const LATE: [&str; 3] = ["sample age interlock", "stood still", "samples arrived"];
+const LATE: [&str; 3] = ["sample age interlock", "was suspended", "samples arrived"];
 
 /// An emulated controller; unplugged when dropped.
 struct Emulator(Arc<AtomicBool>, Option<JoinHandle<()>>);

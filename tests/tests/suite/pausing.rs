@@ -146,7 +146,7 @@ fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
         });
         let reason = refused.unwrap();
         assert!(!why.is_empty() && reason.contains(why), "{reason}");
-        assert!(reason.contains("finish early or stop"), "{reason}");
+        assert!(reason.contains("finish the run early or stop it"), "{reason}");
         lab.operator(Operator::Finish);
     }
     go_on(&mut lab, |_| false);

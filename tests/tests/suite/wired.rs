@@ -114,7 +114,7 @@ fn a_computer_that_stands_still_before_a_rig_on_wires_ends_the_run() {
         let session = run(Box::new(rig), TimeScale::Factor(40.0), &out);
         let end = session.end.as_ref().unwrap();
         assert_eq!(end.outcome, ending, "{}", end.reason);
-        let is_reported = end.reason.contains("stood still");
+        let is_reported = end.reason.contains("was suspended");
         assert_eq!(is_reported, !is_virtual, "{}", end.reason);
         let worst = session.auxiliary.health.worst.unwrap();
         assert!(worst.lateness_s >= 0.5, "{worst:?}");

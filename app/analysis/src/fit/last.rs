@@ -71,7 +71,9 @@ impl KnownFit {
                 }
                 found = fit;
             }
-            Some(_) => return Err(bad(&"a newer palpate wrote it; update palpate")),
+            Some(_) => {
+                return Err(bad(&"a newer version of palpate wrote the file; update palpate"));
+            }
         }
         serde_json::from_value(found).map_err(|err| bad(&err))
     }

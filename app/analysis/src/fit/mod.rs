@@ -73,7 +73,7 @@ pub enum SourceFitError {
     Source(#[from] SourceError),
     #[error(transparent)]
     Fit(#[from] FitError),
-    #[error("the fit was not begun, because the batch was cancelled")]
+    #[error("the fit was not started, because the batch was cancelled")]
     NotBegun,
     #[error("the fit ended unexpectedly; report this with the session or table that was fitted")]
     Died,

@@ -63,8 +63,8 @@ impl CalibrationEntry {
         match (&self.superseded_by, is_old, self.is_in_force) {
             (Some(by), _, _) => format!("superseded by {by}"),
             (None, true, _) => "expired".to_owned(),
-            (None, false, true) => "in force".to_owned(),
-            (None, false, false) => "older than the calibration in force".to_owned(),
+            (None, false, true) => "in use".to_owned(),
+            (None, false, false) => "older than the calibration in use".to_owned(),
         }
     }
 }
@@ -251,7 +251,7 @@ fn spread(quality: &CalibrationQuality) -> String {
     };
     let zero_shift = match (quality.zero_shift_v, quality.zero_shift_n) {
         (Some(volts), Some(newtons)) => {
-            format!("zero shift: {:+.2} mV or {newtons:+.3} N", volts * 1e3)
+            format!("zero shift: {:+.2} mV ({newtons:+.3} N)", volts * 1e3)
         }
         _ => {
             "zero shift: not measured; read the empty cell before and after the weights".to_owned()

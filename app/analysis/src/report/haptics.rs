@@ -42,7 +42,7 @@ pub fn tried_text(tried: &SimulatedTrial) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
     let buzz = match (tried.buzz, tried.buzz_until_s) {
         (Some((frequency, amplitude)), Some(until)) => format!(
-            "limit cycle in {:.0} % of the hold, until {until:.2} s after the hand arrived, amplitude up to {amplitude:.3} mm at {frequency:.0} Hz",
+            "limit cycle in {:.0} % of the hold, until {until:.2} s after the start of the hold, amplitude up to {amplitude:.3} mm at {frequency:.0} Hz",
             100.0 * tried.buzz_share
         ),
         _ => "no limit cycle".to_owned(),
@@ -70,7 +70,9 @@ pub fn force_loss_reasons(flags: Flags, missed: u64) -> Vec<String> {
         causes.flat_map(|flags| flags.sentences().map(str::to_owned)).collect();
     if missed > 0 {
         let ticks = if missed == 1 { "tick" } else { "ticks" };
-        causes.push(format!("the loop was late and missed {missed} {ticks}; the force was held"));
+        causes.push(format!(
+            "the loop was late and missed {missed} {ticks}; the force kept its last value"
+        ));
     }
     causes
 }
@@ -195,7 +197,7 @@ pub fn follow_text(followed: &FeedbackCheck) -> String {
     ];
     if let Some(found) = &followed.calibration {
         lines.push(format!(
-            "bias       {:.4} ± {:.4} N/V at the rack, a straight line from {:.3} to {:.3}",
+            "bias       {:.4} ± {:.4} N/V at the rack; the force is linear in the bias from {:.3} to {:.3}",
             found.slope, found.slope_error, found.rising.line[0], found.rising.line[1]
         ));
     }
@@ -215,7 +217,7 @@ pub fn follow_text(followed: &FeedbackCheck) -> String {
 /// The cause of the difference between the fits of measured and commanded force.
 fn difference(followed: &FeedbackCheck) -> &'static str {
     if followed.settings.friction_share > 0.0 {
-        "the drive compensates friction only while the rack moves: the measured force steps when the hold begins, and the fit takes this step for relaxation"
+        "the drive compensates friction only while the rack moves: the measured force jumps when the hold begins, and the fit mistakes this jump for relaxation"
     } else {
         "friction and drag add a constant force while the rack moves, and friction remains during the hold: the fit reports this force as f_offset, and the other parameters hardly change"
     }

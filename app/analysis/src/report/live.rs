@@ -83,7 +83,7 @@ impl RunPlots {
             () if cycles.len() > LOOPS_MAX => {
                 Some(format!("only the newest {LOOPS_MAX} cycles are drawn over depth"))
             }
-            () => (of_each > 1).then(|| format!("thinned to min/max of {of_each} samples")),
+            () => (of_each > 1).then(|| format!("thinned to min/max of every {of_each} samples")),
         };
         let force_time = banded("Force over time", "session time (s)", over_time);
         Self { force_time, force_depth, cycles, remark }

@@ -46,7 +46,7 @@ pub fn records(selection: &ModelSelection) -> String {
 #[must_use]
 pub fn table(selection: &ModelSelection) -> Vec<Vec<String>> {
     let mut names = head(
-        "family | free | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | states | ops",
+        "family | fitted values | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | state variables | operations",
     );
     names.extend(selection.tolerance_n.map(|_| "within".to_owned()));
     std::iter::once(names).chain(selection.candidates.iter().map(row)).collect()
@@ -78,7 +78,7 @@ fn row(one: &ModelCandidate) -> Vec<String> {
 /// Rows of the ladder, the head first.
 #[must_use]
 pub fn ladder(selection: &ModelSelection) -> Vec<Vec<String>> {
-    let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | ops")];
+    let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | operations")];
     let change =
         |[before, after]: [f64; 2]| format!("{} > {}", digits(1e3 * before), digits(1e3 * after));
     rows.extend(selection.steps.iter().map(|step| {
@@ -99,11 +99,11 @@ pub fn ladder(selection: &ModelSelection) -> Vec<Vec<String>> {
 pub fn tested(selection: &ModelSelection) -> String {
     let known = selection.candidates.iter().find_map(|one| one.prediction.as_ref());
     let what = known.map_or_else(
-        || "Nothing was held out: errors are those of the fit itself.".to_owned(),
+        || "No record was held out, so the errors are those of the fit itself.".to_owned(),
         |prediction| {
             let has = |unseen: HeldOutKind| prediction.records.iter().any(|one| one.unseen == unseen);
             if has(HeldOutKind::Rest) {
-                return "One record: the body fitted to the ramp and to the first third of the record after it predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
+                return "There is only one record: a fit to the ramp and the first third of the record after the ramp predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
             }
             let kinds = [HeldOutKind::Speed, HeldOutKind::Depth, HeldOutKind::SpeedAndDepth, HeldOutKind::Specimen];
             let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {
@@ -112,7 +112,7 @@ pub fn tested(selection: &ModelSelection) -> String {
             });
             let kinds: Vec<String> = kinds.collect();
             format!(
-                "Held out: a fit to the other records predicts each of {} records ({}). Only the sensor offset is fitted to the predicted record; for 'scaled', a common factor of the model force is fitted too.",
+                "Each of {} records is held out in turn and predicted by a fit to the other records ({}). Only the sensor offset is fitted to the held-out record; for 'scaled', a common factor of the model force is fitted too.",
                 prediction.records.len(),
                 kinds.join(", ")
             )

@@ -99,7 +99,9 @@ pub fn measure_scene(
     let mut curves = SceneCurves::default();
     let mut jobs = Vec::new();
     for &nodes in meshes {
-        let Some(()) = next(&format!("shape on {nodes} x {nodes} nodes")) else { return Ok(None) };
+        let Some(()) = next(&format!("shape error on {nodes} x {nodes} nodes")) else {
+            return Ok(None);
+        };
         let error = scene.mesh_error_against(nodes, reference);
         curves.meshes.push(MeshPoint {
             nodes: nodes as u32,
@@ -120,7 +122,7 @@ pub fn measure_scene(
         });
         jobs.push(job(&scene, CUT_NODES, cut)?);
     }
-    let Some(()) = next("force of integrators and families") else { return Ok(None) };
+    let Some(()) = next("force errors of integrators and families") else { return Ok(None) };
     let body = ModifiedKelvin::THESIS.into();
     for scheme in Scheme::ALL {
         for step_s in STEPS {

@@ -17,7 +17,7 @@ pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
     );
     let _ = writeln!(
         out,
-        "time: the fastest round; spread: the median round above the fastest; even and odd rounds differ by {} at most; *: no other row is both cheaper and more exact",
+        "time: the fastest round; spread: how far the median round is above the fastest; even and odd rounds differ by {} at most; *: no other row is both cheaper and more exact",
         percent(curves.worst_halves())
     );
     integrators(&mut out, curves);
@@ -74,7 +74,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
     steps.dedup();
     let _ = write!(
         out,
-        "\nintegrators of the modified Kelvin body: largest error in percent of the peak force, by step in ms\n{:34}{:>10}  {:>7} ",
+        "\nintegrators of the modified Kelvin body: largest error in percent of the peak force, for each step in ms\n{:34}{:>10}  {:>7} ",
         "", "a step", "spread"
     );
     for step in &steps {
@@ -108,7 +108,7 @@ fn integrators(out: &mut String, curves: &TradeCurves) {
 fn families(out: &mut String, curves: &TradeCurves) {
     let _ = writeln!(
         out,
-        "\nfamilies: time of a step at any rate, and largest error in percent of the peak force of the approximated model\n{:34}{:>10}  {:>7} {:>10}",
+        "\nfamilies: time of a step, which is the same at every rate, and largest error in percent of the peak force of the approximated model\n{:34}{:>10}  {:>7} {:>10}",
         "", "a step", "spread", "error"
     );
     let mut target = "";
@@ -167,7 +167,7 @@ fn recommended(out: &mut String, recommendation: &Recommendation) {
 
 pub fn terms(recommendation: &Recommendation) -> String {
     format!(
-        "{} and {} updates a second, using at most {} of each period",
+        "a tolerance of {} and {} updates a second, using at most {} of each period",
         recommendation.tolerance,
         plain(recommendation.rate_hz),
         percent(recommendation.share_allowed)
@@ -196,7 +196,7 @@ pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
         .chain(families)
         .chain([
             ("recording to fit".to_owned(), words(&recommendation.fit)),
-            ("bank of the live fit".to_owned(), words(&recommendation.live)),
+            ("live fit".to_owned(), words(&recommendation.live)),
         ])
         .collect()
 }

@@ -56,7 +56,7 @@ pub(super) fn run(
         WorkEvent::Done(count) => {
             bar.set_position(count as u64);
             if is_ending.load(Ordering::Relaxed) {
-                bar.set_message("ending after the fits in progress");
+                bar.set_message("the batch ends after the fits in progress");
             }
         }
         WorkEvent::Next(answer) => {

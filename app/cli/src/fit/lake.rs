@@ -100,7 +100,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
 fn hash_file(file: &str) -> Result<String, Failure> {
     sha256_of_file(Path::new(file)).map_err(|err| {
         Failure::usage(format!(
-            "--compliance {file} is not a readable file ({err}); give a file, so that every machine fits the lake with the same compliance"
+            "--compliance {file} is not a readable file ({err}); give a file, so that every computer fits the lake with the same compliance"
         ))
     })
 }

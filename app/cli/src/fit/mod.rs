@@ -115,7 +115,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     intervals::check(args)?;
     if args.unload && args.family.is_none() {
         return Err(Failure::usage(
-            "--unload needs --family: the default model has no unloading; add --family unloading-3",
+            "--unload needs --family, because the default model does not describe unloading; add --family unloading-3",
         ));
     }
     let recipe = FitRecipe {
@@ -152,7 +152,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     if args.profile || args.bootstrap.is_some() {
         return Err(Failure::usage(
-            "--profile and --bootstrap work on one fit; give a single session or table, or fit several together with --share",
+            "--profile and --bootstrap apply to one fit; give a single session or table, or fit several together with --share",
         ));
     }
     let found = recordings::find(&args.sources).map_err(sources_failure)?;

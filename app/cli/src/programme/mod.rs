@@ -80,7 +80,7 @@ pub(super) fn run(
             reasons if options.acknowledge => Ok(reasons),
             reasons => match reasons.first() {
                 Some(reason) => Err(format!(
-                    "{reason}; or run anyway with --acknowledge, which the session records"
+                    "{reason}, or add --acknowledge to run anyway; the session records the acknowledgement"
                 )),
                 None => Ok(reasons),
             },

@@ -91,7 +91,7 @@ pub(super) fn preview(
     }
     lines.push(String::new());
     lines.push(format!(
-        "total {}, at most {}; {:.3} s of the total are exact",
+        "total {}, at most {}; {:.3} s of the total are known exactly",
         clock(preview.expected.0),
         clock(preview.longest.0),
         preview.steps.iter().filter(|step| step.is_exact).map(|step| step.expected.0).sum::<f64>()

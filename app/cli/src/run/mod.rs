@@ -48,12 +48,13 @@ pub struct RunArgs {
     session: SessionArgs,
 }
 
-const SHORT: &str = "Short for --set, for ramp-hold and every protocol with the same parameter";
+const SHORT: &str =
+    "Short forms of --set, for ramp-hold and every protocol with the same parameters";
 
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
 #[derive(Debug, Args)]
 #[command(
-    next_help_heading = "Short for --set, for ramp-hold and every protocol with the same parameter"
+    next_help_heading = "Short forms of --set, for ramp-hold and every protocol with the same parameters"
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s
@@ -149,7 +150,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     if !options.preview {
         protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
-                "{reason}; add --operator, --specimen or --about KEY=VALUE for each"
+                "{reason}; add --operator, --specimen or --about KEY=VALUE for each label"
             ))
         })?;
     }
@@ -209,7 +210,7 @@ pub(super) fn run_plan(
     match &gate {
         DailyCheckGate::Acknowledge(reason) if !options.acknowledge => {
             return Err(Failure::usage(format!(
-                "{reason}; or run anyway with --acknowledge, which the session records"
+                "{reason}, or add --acknowledge to run anyway; the session records the acknowledgement"
             )));
         }
         DailyCheckGate::Note(note) => output.note(note),
@@ -219,7 +220,7 @@ pub(super) fn run_plan(
     let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed(
-            "the thread that runs protocols ended without a run; start the run again",
+            "the thread that runs protocols ended before the run began; start the run again",
         ));
     };
     report(view, leader.as_ref(), output)

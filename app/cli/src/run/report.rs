@@ -44,7 +44,7 @@ pub(super) fn report(
     }
     if let Some(late) = view.lateness.map(|late| late.given_up.0).filter(|late| *late > 0.0) {
         output.note(&format!(
-            "the computer did not keep up: the run took {late:.1} s longer than its session time"
+            "the computer was too slow: the run took {late:.1} s longer than the session shows"
         ));
     }
     let command = leader.map_or("run", |leader| leader.command);

@@ -91,7 +91,7 @@ impl PlaybackApp {
                         "decisions recomputed, because another version of palpate made the recording"
                             .to_owned()
                     }
-                    None => "as recorded; nothing here moves a rig".to_owned(),
+                    None => "decisions as recorded; a replay moves no rig".to_owned(),
                 };
                 ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).truncate());
             });

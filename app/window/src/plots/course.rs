@@ -18,7 +18,7 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
         });
     }
     let words = format!(
-        "{PLAN_CAPTION}. A force of {} ends the run; the rig moves at up to {}.",
+        "{PLAN_CAPTION}. The run ends if the force exceeds {}; the fastest speed of the rig is {}.",
         limits.force, limits.speed
     );
     quiet_ui(ui, words);

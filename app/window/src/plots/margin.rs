@@ -89,7 +89,7 @@ fn part(picture: &MarginPicture<'_>, [from, to]: [f64; 2]) -> Plot {
         .cycles
         .iter()
         .map(|band| PlotStretch {
-            name: "the model itself returns energy".to_owned(),
+            name: "the model returns more energy than it takes".to_owned(),
             ends: [band.from.0, band.to.0],
             ink: Some(Ink::Line),
         })

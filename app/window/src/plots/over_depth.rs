@@ -123,7 +123,7 @@ impl DepthLines {
         let points: usize = found.lines.iter().map(|line| line.points).sum();
         if self.texture.is_some() {
             return Some(format!(
-                "the plot marks every pixel that the line through {samples} samples crosses, to a quarter of a pixel"
+                "the plot marks every pixel that the line through the {samples} samples crosses, accurate to a quarter of a pixel"
             ));
         }
         (samples > points as u64).then(|| {

@@ -196,7 +196,8 @@ impl SceneView {
         force_shape(painter, &lens, shown, size, tokens, &font);
         bar_shape(painter, rect, look.deepest, tokens, &font);
         if drawn.every > 1 {
-            let words = format!("one of every {} nodes along a side is drawn", drawn.every);
+            let words =
+                format!("the picture shows one of every {} nodes along each side", drawn.every);
             let at = rect.left_bottom() + vec2(EDGE, -EDGE);
             painter.text(at, Align2::LEFT_BOTTOM, words, font, tokens.text_quiet);
         }

@@ -69,7 +69,7 @@ impl Screen for ChecksScreen {
         section_ui(ui, &format!("Daily checks of {}", self.rig));
         quiet_ui(
             ui,
-            "A check reads the empty cell and one known weight, and touches the home switch twice. A run in tissue needs a check that passed on the same day, or an acknowledgement.",
+            "A daily check reads the empty load cell and one known weight, and touches the home switch twice. A run in tissue needs a check that passed on the same day, or an acknowledgement by the operator.",
         );
         ui.add_space(8.0);
         work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);
@@ -83,7 +83,7 @@ impl Screen for ChecksScreen {
         if checks.is_empty() {
             heading_ui(ui, "No daily check of this rig yet");
             ui.label(format!(
-                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows how zero and weight drift."
+                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows the drift of both readings, the empty load cell and the weight."
             ));
             return;
         }

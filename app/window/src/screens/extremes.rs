@@ -59,7 +59,7 @@ impl Screen for ExtremesScreen {
         section_ui(ui, "Test");
         ui.add(
             Label::new(
-                "The test runs every model family, integrator and fit with the smallest and largest values of every input. A case passes if its result is correct, or if an error message states why there is none.",
+                "The test runs every model family, integrator and fit with the smallest and largest values of every input. A case passes if its result is correct, or if an error message states why there is no result.",
             )
             .wrap(),
         );

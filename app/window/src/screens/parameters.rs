@@ -174,16 +174,16 @@ fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
         false => format!("{} not yet", missing.join(", ")),
     };
     let why = match phase {
-        Phase::Ramp => "a longer part of the ramp is needed",
-        Phase::Hold => "a longer part of the hold is needed",
-        Phase::Creep | Phase::Sine | Phase::Follow => "the live fit works in ramps and holds only",
+        Phase::Ramp => "the ramp is still too short",
+        Phase::Hold => "the hold is still too short",
+        Phase::Creep | Phase::Sine | Phase::Follow => "the live fit covers only ramps and holds",
         Phase::Unload
         | Phase::Retract
         | Phase::Stopped
         | Phase::Ended
         | Phase::Paused
         | Phase::Jog => "the ramp and hold were too short",
-        _ => "the probe has not indented",
+        _ => "the probe has not indented the specimen",
     };
     Some(format!("{names}: {why}"))
 }

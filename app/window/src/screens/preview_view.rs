@@ -34,10 +34,10 @@ pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
         return;
     }
     for warning in &warnings {
-        alarm_ui(ui, format!("Mind: {warning}"));
+        alarm_ui(ui, format!("Warning: {warning}"));
     }
     let mut is_acknowledged = form.is_acknowledged();
-    if tick_box(ui, &mut is_acknowledged, "I accept this; it is recorded").changed() {
+    if tick_box(ui, &mut is_acknowledged, "I accept this, and the session records it").changed() {
         form.acknowledge(is_acknowledged);
     }
 }

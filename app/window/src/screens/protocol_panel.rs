@@ -186,7 +186,7 @@ pub fn start_ui(ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands)
         }
     });
     if workbench.snapshot.rig.link_error.is_some() {
-        let hint = "opens the devices again and stops the axis; nothing moves, and the axis must be homed again";
+        let hint = "reconnects the devices and stops the axis if it moves; it starts no motion, and the axis must be homed again afterwards";
         let button = ui.add_enabled(!is_busy, Button::new("Connect again"));
         if button.on_hover_text(hint).clicked() {
             commands.push(UiCommand::Reconnect);

@@ -92,10 +92,11 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
 fn cycles_ui(ui: &mut Ui, cycles: &[LiveCycle]) {
     let Some(first) = cycles.first().and_then(|one| one.peak) else { return };
-    section_ui(ui, "Peak of each cycle and change from the first");
+    section_ui(ui, "Peak force of each cycle and change from the first cycle");
     let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);
     if left_out > 0 {
-        let words = format!("the session also has the first {left_out} cycles");
+        let words =
+            format!("the first {left_out} cycles are not listed here, but the session has them");
         quiet_ui(ui, words);
     }
     for one in cycles.iter().skip(left_out) {

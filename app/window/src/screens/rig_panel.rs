@@ -55,8 +55,8 @@ fn axis_words(status: AxisStatus) -> String {
     let mut words = vec![motor, motion];
     for (bit, word) in [
         (AxisStatus::HOME, "on the home switch"),
-        (AxisStatus::FORWARD_LIMIT, "at the far limit"),
-        (AxisStatus::REVERSE_LIMIT, "at the limit behind home"),
+        (AxisStatus::FORWARD_LIMIT, "at the far limit switch"),
+        (AxisStatus::REVERSE_LIMIT, "at the limit switch behind home"),
     ] {
         if status.has(bit) {
             words.push(word);

@@ -204,10 +204,12 @@ pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLim
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
             placeholder_ui(
                 ui,
-                "this protocol does not indent, so it has no depth or force to draw",
+                "this protocol does not indent the specimen, so no depth or force can be drawn",
             );
         }
         Some(checked) => course_ui(ui, &checked.outline, limits),
-        None => placeholder_ui(ui, "correct the protocol and its values to see the course"),
+        None => {
+            placeholder_ui(ui, "correct the protocol and its values to see the expected course")
+        }
     }
 }

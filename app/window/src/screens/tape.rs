@@ -82,7 +82,7 @@ impl TapePanel {
         if self.recording.take().is_some() {
             self.message = Some(match ended {
                 Some(ended) => ended.map(describe_finished),
-                None => Err("the loop failed, and its recording has no end".to_owned()),
+                None => Err("the loop failed, so its recording has no end record".to_owned()),
             });
         }
     }

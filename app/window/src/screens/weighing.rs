@@ -183,7 +183,7 @@ impl WeightDeviation {
 
 fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &RunSetup) {
     let words =
-        format!("Force by the calibration in use ({}) minus weight", bench.calibration.name);
+        format!("Force from the calibration in use ({}) minus the weight", bench.calibration.name);
     ui.label(RichText::new(words).strong());
     let plot = weighing_plot(run, &bench.curve);
     legend_ui(ui, &[&plot]);

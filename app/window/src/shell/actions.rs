@@ -56,8 +56,8 @@ impl WorkbenchApp {
                 .if_ok(bench.move_verdict()),
             PaletteAction::new("Connect the rig again", "", UiCommand::Reconnect).if_ok(is_lost),
             PaletteAction::new("List the serial ports again", "", UiCommand::ListPorts),
-            PaletteAction::new("Begin the work of this screen", "F6", UiCommand::Work),
-            PaletteAction::new("Cancel the work of this screen", "", UiCommand::CancelWork),
+            PaletteAction::new("Start this screen's task", "F6", UiCommand::Work),
+            PaletteAction::new("Cancel this screen's task", "", UiCommand::CancelWork),
         ]);
         actions.extend(self.screens.actions(bench));
         for screen in SCREENS {

@@ -145,7 +145,7 @@ fn pause_words(run: &RunView) -> String {
         }
         PauseView::Paused { no_resume: Some(why) } => {
             format!(
-                "Paused. The run cannot resume: {why}. Finish early keeps the data and retracts."
+                "Paused. The run cannot be resumed: {why}. Finish early keeps the data and retracts."
             )
         }
         PauseView::Pending { step_index } => match &run.next_checkpoint {
@@ -177,7 +177,7 @@ fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Com
                     control_ui(ui, run, RunControl::Redo, "Last weight again", commands);
                 }
                 let left = match run.pause {
-                    PauseView::Paused { .. } => "the pause stops this clock".into(),
+                    PauseView::Paused { .. } => "the time to answer is paused too".into(),
                     _ => format!("{} left to answer", clock(prompt.time_left.0)),
                 };
                 ui.label(RichText::new(left).color(tokens.text_quiet));

@@ -21,11 +21,11 @@ const STOPS: [(&str, &str); 7] = [
     ),
     (
         rig::SCREEN.name,
-        "Readings of the rig in large letters, and manual moves. Start palpate with 'palpate window --rig FILE.toml' to open a rig on wires.",
+        "Readings of the rig in large letters, and manual moves. Start palpate with 'palpate window --rig FILE.toml' to open a rig that is connected to this computer.",
     ),
     (
         calibration::SCREEN.name,
-        "Volts to newtons. Measure... asks for one weight after the other, shows when the signal is steady, and can read a weight again.",
+        "Volts to newtons. Measure... asks for one weight after another, shows when the signal is steady, and can read a weight again.",
     ),
     (
         library::SCREEN.name,

@@ -119,7 +119,7 @@ pub fn tolerance_ui(ui: &mut Ui, text: &mut String, without: Option<&str>) {
     });
     match (text.trim(), without, text.parse::<Tolerance>()) {
         ("", Some(words), _) => quiet_ui(ui, words),
-        (_, _, Ok(tolerance)) => quiet_ui(ui, format!("an error of {tolerance} does not matter")),
+        (_, _, Ok(tolerance)) => quiet_ui(ui, format!("errors up to {tolerance} are acceptable")),
         (_, _, Err(reason)) => small_alarm_ui(ui, reason.to_string()),
     }
 }

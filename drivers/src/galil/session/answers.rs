@@ -29,7 +29,7 @@ impl GalilSession {
             ExpectedReply::Elements => self.on_elements(now, reply),
             ExpectedReply::Segment => {
                 if !reply.is_accepted && self.sine.take().is_some() {
-                    self.end_sine(now, "the controller refuses further increments");
+                    self.end_sine(now, "the controller refuses further segments of the sine");
                 }
             }
             ExpectedReply::Renewal => {
@@ -214,7 +214,7 @@ impl GalilSession {
     /// A sine that cannot go on: the axis is stopped.
     pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
         self.send_urgent(RigCommand::Stop, ExpectedReply::Stop(PendingStop::QUIET));
-        let detail = format!("the sine was broken off: {why}");
+        let detail = format!("the sine was aborted: {why}");
         self.report_in_order(now, RigEventBody::refusal(detail));
     }
 

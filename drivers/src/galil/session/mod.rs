@@ -259,7 +259,7 @@ impl Dialogue for GalilSession {
     fn is_dead(&self, now: Nanos) -> Option<String> {
         self.resync?.is_over(now).then(|| {
             format!(
-                "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
+                "the controller gave no valid answer to {MARKERS_MAX} queries; check cable and power"
             )
         })
     }

@@ -154,7 +154,7 @@ impl GalilSession {
             self.sine = None;
             self.end_sine(
                 now,
-                "this computer did not send the next part of the sine in time; close other programs",
+                "this computer did not send the next segment of the sine in time; close other programs",
             );
             return self.urgent.pop_front();
         }

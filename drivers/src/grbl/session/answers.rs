@@ -8,7 +8,7 @@ use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};
 
-const LOCKED: &str = "the board is locked; look at the axis, then open the rig again";
+const LOCKED: &str = "the board is locked; check the axis, then open the rig again";
 
 impl GrblSession {
     pub(super) fn on_ok(&mut self, now: Nanos) {
@@ -199,7 +199,7 @@ impl GrblSession {
             }
             (None, Some(started)) if queried_at > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
-                    self.fault(now, "the link is too slow to keep the axis moving, so the axis has stopped; lower the speed or repair the link");
+                    self.fault(now, "the link is too slow to keep the axis moving, so the axis has stopped; lower the speed or use a faster link");
                 } else if steps != motion.to {
                     let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
                     self.fault(now, format!("the board reports a stop at pulse {there}, but the target is pulse {wanted}; home the axis again"));
@@ -230,7 +230,7 @@ impl GrblSession {
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
-            self.fault(now, format!("the board reports pulse {here:.0} where pulse {late:.0} is commanded, so the axis is stopped; check the cable and home the axis"));
+            self.fault(now, format!("the board reports pulse {here:.0} instead of the commanded pulse {late:.0}, so the axis is stopped; check the cable and home the axis"));
             return self.cancel(now);
         }
         let sampled = queried_at + Nanos(self.facts.round_trip.0 / 2);

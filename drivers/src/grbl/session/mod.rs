@@ -172,7 +172,7 @@ impl GrblSession {
         if (wanted.acceleration.0 / settings.acceleration.0 - 1.0).abs() > 1e-6 {
             let (wanted, own) = (wanted.acceleration, settings.acceleration);
             return Err(format!(
-                "an acceleration of {wanted} differs from the board's acceleration of {own}"
+                "the acceleration of {wanted} differs from the board's fixed acceleration of {own}"
             ));
         }
         let to = settings.sign() * (wanted.target_pulses + self.zero);

@@ -107,7 +107,7 @@ impl GrblSession {
         self.reset_pending =
             Some(PendingReset { owed: vec![(number, command)], begun: now, written: now });
         self.locked = Some(
-            "a reset has cut the motion short, so the position is lost; open the rig again and home the axis"
+            "a reset has interrupted the motion, so the position is lost; open the rig again and home the axis"
                 .into(),
         );
         self.refuse_waiting(now, OVERTAKEN, |_| true);
@@ -161,10 +161,10 @@ impl GrblSession {
         let is_wanted = std::mem::take(&mut self.track().is_stop_wanted);
         let is_unattended = now.since(self.attended_at) > ATTENDED_MAX;
         if is_wanted {
-            let why = "the load cell has failed, so the motion was not begun";
+            let why = "the load cell has failed, so the motion was not started";
             self.refuse_waiting(now, why, RigCommand::is_motion);
         } else if is_unattended {
-            let why = "no samples were taken for half a second, so the motion was not begun";
+            let why = "no samples were taken for half a second, so the motion was not started";
             self.refuse_waiting(now, why, RigCommand::is_motion);
         }
         let Some(motion) = &mut self.motion else {

@@ -51,7 +51,7 @@ impl CellDevice for GaugeSettings {
         let filters = filters(&set);
         let description = CellDescription {
             identity: format!(
-                "{model}firmware {}, {} to {}, {rate} readings a second{filters}",
+                "{model}firmware {}, {} to {}, {rate} readings per second{filters}",
                 set.firmware, step.0, self.capacity
             ),
             adc: scale.adc(),
@@ -104,11 +104,11 @@ fn silence_gauge(console: &mut TextConsole<'_>) -> Result<(), DeviceError> {
     let lines: Vec<GaugeLine> = received.lines().map(GaugeLine::parse).collect();
     Err(if lines.iter().any(|line| matches!(line, GaugeLine::Error)) {
         unfit(
-            "it refuses the command LIST, like a gauge of Series 4, which sends single readings only; use a gauge of Series 5, 7 or 7i",
+            "it refuses the command LIST, so it may be a gauge of Series 4, which sends only single readings; use a gauge of Series 5, 7 or 7i",
         )
     } else if lines.iter().any(|line| matches!(line, GaugeLine::Reading(_))) {
         unfit(
-            "the gauge sends readings but does not receive commands; check its cable and the choice of USB or RS-232 in its menu",
+            "it sends readings but does not receive commands; check its cable and the choice of USB or RS-232 in its menu",
         )
     } else {
         console.no_answer(
@@ -185,32 +185,33 @@ pub(crate) fn ask_text(
 
 /// Whether a gauge has taken the settings.
 fn check_list(set: &GaugeList, settings: &GaugeSettings) -> Result<(), DeviceError> {
-    let wrong =
-        |what: &str| unfit(format!("it does not accept {what}; its settings are {}", set.line));
+    let wrong = |what: &str| {
+        unfit(format!("it does not accept the setting {what}; its settings are {}", set.line))
+    };
     if let Err(unit) = &set.unit {
         return Err(unfit(format!(
             "it measures in {unit}, which is not a unit of force; choose newtons in its menu"
         )));
     }
     if set.mode != "CUR" {
-        return Err(wrong("CUR, the mode of current readings"));
+        return Err(wrong("CUR (current readings)"));
     }
     if !set.has_units {
-        return Err(wrong("FULL, readings with their units"));
+        return Err(wrong("FULL (readings with units)"));
     }
     let is_reversed = set.is_inverted.unwrap_or(settings.is_reversed);
     if is_reversed != settings.is_reversed {
         let polarity = u8::from(settings.is_reversed);
-        return Err(wrong(&format!("IPOL{polarity}, the sign of pressing")));
+        return Err(wrong(&format!("IPOL{polarity} (sign of compression)")));
     }
     if set.is_unsigned == Some(true) {
-        return Err(wrong("OPOL0, readings with their signs"));
+        return Err(wrong("OPOL0 (readings with signs)"));
     }
     let has_filters = [set.filter_displayed, set.filter_current]
         .iter()
         .all(|n| settings.filter.is_none() || n.is_none() || *n == settings.filter);
     if !has_filters {
-        return Err(wrong("FLTC and FLTP, its filters"));
+        return Err(wrong("FLTC or FLTP (filters)"));
     }
     Ok(())
 }

@@ -113,7 +113,7 @@ fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
         );
     }
     console.no_answer(
-        "check its power, its USB cable, and that its menu has CONTROL: CONSOLE off and 8-1n",
+        "check its power, its USB cable, and that its menu shows CONTROL: CONSOLE off and 8-1n",
     )
 }
 
@@ -194,7 +194,7 @@ fn describe(
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{devices}, {:.0} samples a second; without a watchdog of its own: it stops at the target of the move under way, at most {:.0} mm on; positions within {REST_TOLERANCE_MM} mm and {} s of the commanded course",
+            "{devices}, {:.0} samples per second; no watchdog: after a lost link the crosshead runs to the target of its move, at most {:.0} mm further; positions agree with the commanded path within {REST_TOLERANCE_MM} mm and {} s",
             1e9 / pace.every.0 as f64,
             settings.travel.0,
             LAG.0

@@ -207,10 +207,10 @@ impl MarginReport {
         }
         let Margin { depth, friction_needed, friction, .. } = self.loudest;
         all.push(if self.loudest.is_quiet() {
-            format!("Friction of {friction:.3} suppresses the vibration of single encoder counts.")
+            format!("A friction of {friction:.3} suppresses limit cycles of one or two encoder counts.")
         } else {
             format!(
-                "A limit cycle of one or two encoder counts is possible at a depth of {depth:.1}: suppressing it takes a friction of {friction_needed:.3}, but the device has {friction:.3}. A finer encoder needs less friction."
+                "A limit cycle of one or two encoder counts is possible at a depth of {depth:.1}: a friction of {friction_needed:.3} is needed to suppress it, but the device has {friction:.3}. A finer encoder needs less friction."
             )
         });
         if !self.cycles.is_empty() {
@@ -238,13 +238,13 @@ impl MarginReport {
         };
         let why = match cause {
             MarginCause::Lag => {
-                "the relaxation of the model demands this damping, so a faster loop does not help"
+                "the relaxation of the model requires this damping, so a faster loop does not help"
             }
             MarginCause::Tick => {
-                "the period and the delay of the loop demand this damping, so a faster loop helps"
+                "the period and the delay of the loop require this damping, so a faster loop helps"
             }
             MarginCause::Sudden => {
-                "sudden moves demand this damping, so a faster loop or a shorter delay helps"
+                "sudden moves require this damping, so a faster loop or a shorter delay helps"
             }
         };
         if self.worst.is_enough() {

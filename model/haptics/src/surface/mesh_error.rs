@@ -35,7 +35,7 @@ pub enum MeshError {
     },
     /// No limit.
     #[error(
-        "a largest height difference of {0} mm between neighbouring nodes is not possible; choose zero, a positive number or infinity"
+        "a limit of {0} mm for the height difference of neighbouring nodes is not possible; choose zero, a positive number or infinity"
     )]
     Shear(f64),
     /// The surface at rest breaks its own limits.

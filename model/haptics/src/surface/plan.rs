@@ -120,9 +120,7 @@ pub fn plan(
             "; within the budget, {} nodes a side and the family {} have errors of {:.3} mm and {:.3} N",
             plan.mesh.nodes, plan.family.family, plan.shape_error_mm, plan.force_error_n
         ),
-        None => {
-            "; no measured scene keeps within the budget, so allow more time for a tick".to_owned()
-        }
+        None => "; no measured scene is within the budget; allow more time per tick".to_owned(),
     };
     Err(ScenePlanError { reason: why + &advice, nearest: nearest.map(Box::new) })
 }

@@ -117,10 +117,10 @@ impl CutPoint {
     pub fn description(&self) -> String {
         match (self.range, self.threshold_mm > 0.0) {
             (Some(range), true) => {
-                format!("{range} nodes or where nodes move {} mm", self.threshold_mm)
+                format!("{range} nodes or where nodes move < {} mm", self.threshold_mm)
             }
             (Some(range), false) => format!("{range} nodes"),
-            (None, _) => format!("where nodes move {} mm", self.threshold_mm),
+            (None, _) => format!("where nodes move < {} mm", self.threshold_mm),
         }
     }
 }

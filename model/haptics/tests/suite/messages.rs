@@ -11,7 +11,7 @@ fn what_a_mesh_refuses_is_worded() {
         MeshError::Spacing(-0.5) => ["-0.5 mm"],
         MeshError::Count { what: "rest heights", given: 5, nodes: 6 } => ["5 rest heights", "6 nodes"],
         MeshError::Height { column: 1, row: 2, height: 2e6 } => ["column 1", "row 2", "2000000 mm"],
-        MeshError::Shear(-1.0) => ["height difference of -1 mm"],
+        MeshError::Shear(-1.0) => ["limit of -1 mm", "height difference"],
         MeshError::Steep { column: 1, row: 0, rise: 1.5, limit: 1.0 } => ["column 1", "row 0", "1.5 mm", "1 mm"],
     }
 }

@@ -39,7 +39,7 @@ pub enum PredictionError {
     )]
     TooFew { measured: usize },
     #[error(
-        "the prediction is not a number; check the parameters of the body and the order of the times of the record"
+        "the prediction is not a number; check the parameters of the model, and that the times of the record increase"
     )]
     NotFinite,
 }

@@ -6,7 +6,7 @@ use crate::fit::{FitOptions, FitSample, fit};
 use std::sync::Arc;
 
 /// Name among the subjects of the fit that needs no family named.
-pub(super) const DEFAULT_FIT: &str = "fit of the thesis body";
+pub(super) const DEFAULT_FIT: &str = "fit of the modified Kelvin model";
 
 /// Fits a family; the error is that of the worst parameter of the body against `truth`.
 pub(super) fn fit_answer(

@@ -52,7 +52,7 @@ pub(super) fn rows(
         for value in [0.0, -1.0] {
             let mut model = usual();
             model.outer[index] = value;
-            let name = format!("relaxation time or other outer parameter of {value}");
+            let name = format!("relaxation time or other non-linear parameter of {value}");
             rows.push(plain(&name).run_on(&FamilyBody(model)));
         }
     }
@@ -89,7 +89,7 @@ fn after_bad_steps(family: &dyn Family) -> ExtremesRow {
         }
     }
     let steps = vec![(0.1, 1.0), (0.5, 9.0), (0.2, 9.0), (0.1, 4.0)];
-    let path = PathCase::new(GROUP, "refused steps between good ones", 0.0, steps);
+    let path = PathCase::new(GROUP, "refused steps between valid steps", 0.0, steps);
     path.run_on(&BodyAfterRefusals(FamilyBody(make_member(family, 1.0, 20.0, 2.0))))
 }
 

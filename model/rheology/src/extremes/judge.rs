@@ -86,7 +86,7 @@ pub fn judge(
         SubjectAnswer::Number { error, .. } if expected == ExpectedAnswer::Refusal => (
             ExtremesVerdict::Wrong,
             Some(error),
-            "a number is given where no answer exists".to_owned(),
+            "the answer is a number, but no answer exists".to_owned(),
         ),
         SubjectAnswer::Number { error, .. } if error <= tolerance => {
             (ExtremesVerdict::Right, Some(error), String::new())
@@ -97,7 +97,7 @@ pub fn judge(
         SubjectAnswer::Number { error, .. } => (
             ExtremesVerdict::Wrong,
             Some(error),
-            format!("the error is {error:.1e}, more than {tolerance:.0e}"),
+            format!("the error of {error:.1e} exceeds the tolerance of {tolerance:.0e}"),
         ),
     };
     ExtremesRow {

@@ -71,9 +71,13 @@ fn special_paths() -> Vec<PathCase> {
         crossings.extend([(0.01, 1e-3), (0.01, -1e-3)]);
     }
     vec![
-        path("touches at the last 1e-12 of a step", -1.0, &[(1.0, 1e-12), (1.0, 2e-12)]),
         path(
-            "leaves at the last 1e-12 of a step",
+            "touches the surface in the last 1e-12 of a step",
+            -1.0,
+            &[(1.0, 1e-12), (1.0, 2e-12)],
+        ),
+        path(
+            "leaves the surface in the last 1e-12 of a step",
             5.0,
             &[(1.0, 5.0), (1e3, -1e-12), (1e-3, -1e-12), (1.0, 4.0)],
         ),
@@ -95,12 +99,12 @@ fn special_paths() -> Vec<PathCase> {
             &[(0.0, 1_000.000_000_001), (1.0, 1_000.000_000_001), (0.0, 1e3)],
         ),
         path(
-            "a jump to 10 mm, 1 s, a jump out",
+            "a jump to 10 mm, a hold of 1 s and a jump out",
             -1.0,
             &[(0.0, 10.0), (0.5, 10.0), (0.5, 10.0), (0.0, -1.0), (1.0, -1.0)],
         ),
         path(
-            "steps of 1e-9 s and of 1e3 s by turns",
+            "alternating steps of 1e-9 s and 1e3 s",
             0.0,
             &[
                 (1e-9, 1.0),

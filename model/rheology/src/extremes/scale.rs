@@ -53,12 +53,13 @@ fn cases(extent: ExtremesExtent, family: &dyn Family) -> Vec<(PathCase, Model)> 
         cases.push((poke(format!("depths of 1e{length} mm"), 10f64.powi(*length), 0.1), usual()));
         let time = 10f64.powi(*length);
         cases.push((
-            poke(format!("steps and times of 1e{length} s"), 20.0, 0.1 * time),
+            poke(format!("time steps and relaxation times of 1e{length} s"), 20.0, 0.1 * time),
             make_member(family, time, 20.0, 2.0),
         ));
-        cases.push((poke(format!("steps of 1e{length} s, times of 1 s"), 20.0, time), usual()));
+        let long_steps = format!("time steps of 1e{length} s, relaxation times of 1 s");
+        cases.push((poke(long_steps, 20.0, time), usual()));
         cases.push((
-            poke(format!("steps of 0.1 s, times of 1e{length} s"), 20.0, 0.1),
+            poke(format!("time steps of 0.1 s, relaxation times of 1e{length} s"), 20.0, 0.1),
             make_member(family, time, 20.0, 2.0),
         ));
     }

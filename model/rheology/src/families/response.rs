@@ -27,15 +27,15 @@ pub enum StepError {
     )]
     Jump { from: f64, to: f64 },
     #[error(
-        "the speed of a move from {} mm to {} mm in {} s is beyond the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
+        "the speed of a move from {} mm to {} mm in {} s is too large to compute; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
     Speed { from: f64, to: f64, dt: f64 },
     #[error(
-        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the model", plain(.depth)
+        "the force at rest at a depth of {} mm is too large to compute; check the unit of depth (mm) and the parameters of the model", plain(.depth)
     )]
     Rest { depth: f64 },
     #[error(
-        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the model", plain(.from), plain(.to), plain(.dt)
+        "the force of a move from {} mm to {} mm in {} s is too large to compute; check the units of depth (mm) and the parameters of the model", plain(.from), plain(.to), plain(.dt)
     )]
     Overflow { from: f64, to: f64, dt: f64 },
 }

@@ -23,7 +23,7 @@ static STRETCHED: Spectrum = Spectrum {
     word: "stretched",
     name: "stretched exponential (Kohlrausch-Williams-Watts)",
     equation: "F = k0 x + k1 int exp(-((t - s)/tau)^beta) x' ds",
-    cannot_represent: "stiffness that grows with depth; unloading that differs from loading; beta above 0.9, which is nearly a Kelvin body",
+    cannot_represent: "stiffness that grows with depth; unloading that differs from loading; an exponent beta above 0.9, which is practically the standard linear solid",
     adds: "relaxation that slows down with time",
     exponent: ("beta", OuterRange::Share(0.1, 0.9)),
     digits_max: 10,

@@ -65,7 +65,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
     for parameter in own.map(|k| &report.parameters[k]) {
         if parameter.value.abs() > LEVEL_LARGE * (high - low) {
             warnings.push(format!(
-                "{} is far larger than the range of the force, so it stands for something that the model \
+                "{} is far larger than the range of the force, so it describes something that the model \
                  does not contain; fix this parameter, or check the start of the record",
                 parameter.name
             ));
@@ -89,7 +89,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
         {
             warnings.push(format!(
                 "lack of fit: the residuals are autocorrelated over a long time, so the model does not \
-                 describe the record to within its noise, and intervals from about {} are rough",
+                 describe the record to within its noise, and intervals based on about {} are rough",
                 independent_words(noise.effective_samples)
             ));
         }
@@ -115,7 +115,7 @@ pub(super) fn findings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
         let about = if time > LONGEST_SHARE * length { "at least" } else { "about" };
         findings.push(format!(
             "autocorrelated residuals: {} samples carry the information of {}, because {} % of the residual \
-             variance has a correlation time of {about} {}; the intervals allow for it",
+             variance has a correlation time of {about} {}; the intervals take this into account",
             report.samples,
             independent_words(noise.effective_samples),
             percent_words(noise.slow_share),
@@ -151,7 +151,7 @@ fn edge_warning(
     };
     let (low, high) = fitted.system.ranges[record].outers[outer];
     format!(
-        "{name} lies at the {end} end of what this record can show ({:.3e} s to {:.3e} s); \
+        "{name} lies at the {end} end of the range that this record can resolve ({:.3e} s to {:.3e} s); \
          the other parameters are conditional on this value",
         low.exp(),
         high.exp()

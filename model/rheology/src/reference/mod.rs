@@ -28,10 +28,10 @@ const EXPONENT_MAX: f64 = 1e5;
 pub enum ReferenceError {
     #[error("a reference cannot have {0} digits; choose from 20 to 1000")]
     Digits(usize),
-    #[error("the force at rest at that depth is beyond the largest number")]
+    #[error("the force at rest at this depth is too large to compute")]
     Overflow,
     #[error(
-        "a term with a relaxation time below zero or a coefficient that is not finite has no force"
+        "a term with a negative relaxation time or a coefficient that is not finite gives no force"
     )]
     Term,
 }

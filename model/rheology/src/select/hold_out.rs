@@ -38,7 +38,7 @@ pub enum HoldOutError {
     #[error("'{0}' cannot be held out; choose auto, speed, depth, specimen or none")]
     Unknown(String),
     #[error(
-        "no {what} can be held out, because the {records} record(s) have one {what} only; add records of another {what}, or hold out 'auto'"
+        "no {what} can be held out, because the {records} record(s) contain only one {what}; add records of another {what}, or hold out 'auto'"
     )]
     AllAlike { what: &'static str, records: usize },
     #[error(

@@ -13,7 +13,7 @@ pub enum CurveError {
     #[error("the curves give {what} of {value}, which is not possible; measure again")]
     Number { what: String, value: f64 },
     #[error(
-        "the curves contradict themselves at {0}, so they were changed after the measurement; measure again"
+        "the numbers of {0} contradict each other, so the curves were edited after the measurement; measure again"
     )]
     Contradiction(String),
     #[error(

@@ -58,7 +58,7 @@ fn widest(fidelity: &Fidelity) -> Option<String> {
     // Rounding must not name a force whose tolerance is exactly one in twenty.
     (share(widest) > 1.001 * WIDE).then(|| {
         format!(
-            "{} counts as met within {:.4} {unit} of {:.4} {unit}",
+            "{} has a wide tolerance of {:.4} {unit} around its target of {:.4} {unit}",
             place(widest),
             widest.allowed,
             widest.target,
@@ -128,7 +128,7 @@ mod tests {
         });
         let (verdict, reason) = of(EndingKind::Finish, &wide);
         assert_eq!(verdict, DataQuality::Valid);
-        for fact in ["step 5", "cycle 2", "0.0500 N of 0.2000 N"] {
+        for fact in ["step 5", "cycle 2", "0.0500 N around its target of 0.2000 N"] {
             assert!(reason.contains(fact), "{fact}: {reason}");
         }
         for (change, expected) in [

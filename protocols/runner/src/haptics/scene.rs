@@ -236,7 +236,9 @@ impl SceneLoop {
         let task = SceneTask::new(scene, device, recorder);
         let first = task.first();
         let beat = RealTimeLoop::start(task, period, first).map_err(|err| {
-            format!("the thread of the scene cannot be started ({err}); close other programs")
+            format!(
+                "the thread that computes the scene cannot be started ({err}); close other programs"
+            )
         })?;
         Ok(Self { beat, hand: None })
     }

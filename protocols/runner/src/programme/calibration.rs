@@ -16,11 +16,11 @@ const TOLERANCE_G: f64 = 0.05;
 #[derive(Debug, Error)]
 pub enum CalibrationSessionError {
     #[error(
-        "session {0} holds no reading under a known mass; run the protocol load-cell-calibration"
+        "session {0} contains no reading of the load cell under a known mass; run the protocol load-cell-calibration"
     )]
     NoReadings(String),
     #[error(
-        "session {session} ended by {ending} before its plan was complete; a calibration must be complete, so run the protocol again"
+        "session {session} ended ({ending}) before its plan was complete; run the protocol load-cell-calibration again to its end"
     )]
     Incomplete { session: String, ending: String },
     /// The readings make none.

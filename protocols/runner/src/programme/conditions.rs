@@ -69,7 +69,7 @@ impl Conditions {
                 if was != is {
                     let quoted = |value: Option<&String>| match value {
                         Some(value) => format!("'{value}'"),
-                        None => "the usual one".into(),
+                        None => "the default".into(),
                     };
                     changes.push(format!(
                         "{} was {} and is {} now",
@@ -84,7 +84,7 @@ impl Conditions {
         compare(&self.rig, &now.rig, &|name| format!("the rig's {name}"));
         compare(&self.limits, &now.limits, &|name| format!("the rig's limit {name}"));
         compare(&self.protocols, &now.protocols, &|task| {
-            format!("the protocol of task '{task}' (by its CRC-32)")
+            format!("the CRC-32 of the protocol of task '{task}'")
         });
         if self.calibration != now.calibration {
             let named = |one: &Self| {

@@ -10,7 +10,7 @@ pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]
     let plan = task.plan(1, None);
     if task.calibrates && !plan.as_ref().is_some_and(has_weighing) {
         find_contradictions.push(format!(
-            "calibrates = true needs readings under known masses, but protocol {} takes none; remove calibrates, or use the protocol load-cell-calibration",
+            "calibrates = true needs readings under known masses, but protocol {} takes none; remove 'calibrates', or use the protocol load-cell-calibration",
             task.protocol.name
         ));
     }
@@ -18,13 +18,13 @@ pub(super) fn find_contradictions(task: &ProgrammeTask, before: &[ProgrammeTask]
         let fitted = before.iter().find(|one| one.name == model.task);
         if let Some(reason) = fitted.and_then(reason_unfitted) {
             find_contradictions.push(format!(
-                "validates = \"{}\" names a task that has no fitted model, because {reason}; give the name of a task with one ramp and hold",
+                "task '{}' under 'validates' has no fitted model, because {reason}; name a task with one ramp and hold",
                 model.task
             ));
         }
         if let Some(reason) = reason_unfitted(task) {
             find_contradictions.push(format!(
-                "validates = \"{}\" has nothing to compare, because {reason}; remove validates, or use a protocol with one ramp and hold",
+                "this task cannot be compared with the model of task '{}', because {reason}; remove 'validates', or use a protocol with one ramp and hold",
                 model.task
             ));
         }
@@ -47,7 +47,7 @@ fn reason_unfitted(task: &ProgrammeTask) -> Option<String> {
     let is_sine = |step: &Step| matches!(step, Step::Sine(_));
     let is_way_in = |step: &Step| matches!(step, Step::Ramp(_) | Step::LoadTo(_));
     if plan.steps.iter().any(|planned| is_sine(&planned.step)) {
-        return Some(format!("its protocol {name} follows a sine"));
+        return Some(format!("its protocol {name} applies a sine"));
     }
     let ways_in = plan.steps.iter().filter(|one| is_way_in(&one.step));
     // Steps outside any loop belong to the first cycle.
@@ -55,6 +55,6 @@ fn reason_unfitted(task: &ProgrammeTask) -> Option<String> {
     match cycles.len() {
         0 => Some(format!("its protocol {name} does not indent")),
         1 => None,
-        count => Some(format!("its protocol {name} has {count} cycles")),
+        count => Some(format!("its protocol {name} has {count} cycles instead of one")),
     }
 }

@@ -96,7 +96,7 @@ impl ProgrammeTask {
         let fresh = self.specimen.filter(|_| repeat == 1);
         if let Some(specimen) = fresh.or(remount) {
             before.push(Step::Prompt(Prompt {
-                message: format!("Clip in specimen {specimen}, with the probe clear of it"),
+                message: format!("Mount specimen {specimen}; the probe must not touch it"),
                 timeout: MOUNT_TIMEOUT,
                 on_timeout: OnTimeout::Stop,
                 hand: Some(HandAction::Mount { specimen }),

@@ -63,8 +63,10 @@ pub fn forecast_programme(
             notes.extend(plan.limits.unused(limits).iter().map(warned));
             if !programme.is_acknowledged {
                 to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
-                    let message =
-                        format!("{}; write acknowledge = true in the file", for_task(reason));
+                    let message = format!(
+                        "{}; to accept this, write acknowledge = true in the file",
+                        for_task(reason)
+                    );
                     ProtocolProblem::warning(task.line, message)
                 }));
             }

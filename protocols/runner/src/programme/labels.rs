@@ -72,7 +72,7 @@ fn report_specimen(entry: &DocumentEntry, problems: &mut Problems) {
     problems.error(
         entry.line,
         format!(
-            "'{}' is not the table of a specimen; write labels of specimen 2 into [specimen.2], and labels of all specimens into [about]",
+            "'{}' is not a table of labels for one specimen; write labels of, for example, specimen 2 into [specimen.2], and labels of all specimens into [about]",
             entry.key
         ),
     );

@@ -130,7 +130,7 @@ impl Reader {
                 if !SIMULATED.contains(&key.as_str()) {
                     let [first, second, third] = SIMULATED;
                     let message = format!(
-                        "[simulated] has no setting '{key}'; it has {first}, {second} and {third}"
+                        "[simulated] has no setting '{key}'; its settings are {first}, {second} and {third}"
                     );
                     self.problems.error(*line, message);
                 }
@@ -239,7 +239,7 @@ impl Reader {
         let validates = self.text(table, "validates");
         if let Some(model) = validates.as_ref().filter(|one| !tasks.names.contains(*one)) {
             let message = format!(
-                "no task before this one is called '{model}'; validates must name an earlier task"
+                "no task before this one is called '{model}'; 'validates' must name an earlier task"
             );
             self.problems.error(line("validates"), message);
         }

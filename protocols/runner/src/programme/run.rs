@@ -70,14 +70,16 @@ pub enum ProgrammeRunError {
     Refused { task: String, reason: String },
     /// A run ended before its plan did.
     #[error(
-        "task '{task}', repeat {repeat}, ended by {ending}: {reason}; run the programme again to go on from there"
+        "task '{task}', repeat {repeat}, ended by {ending}: {reason}; run the programme again to continue from there"
     )]
     Ended { task: String, repeat: u32, ending: String, reason: String },
     #[error("task '{task}': {source}")]
     Calibrating { task: String, source: CalibrationSessionError },
     #[error(transparent)]
     Session(#[from] ReadError),
-    #[error("the runner ended unexpectedly; the session in progress is incomplete")]
+    #[error(
+        "the thread that controls the rig ended unexpectedly; the session in progress is incomplete"
+    )]
     NoRunner,
 }
 
@@ -92,8 +94,10 @@ pub fn run_programme(
     let _lock =
         HolderLock::acquire(&lock).map_err(|err| ProgrammeRunError::Folder(err.to_string()))?;
     if laboratory.folder.join(LOG_FILE).exists() {
-        let reason =
-            format!("the folder {} is a session; choose a new folder", laboratory.folder.display());
+        let reason = format!(
+            "the folder {} already holds a session; choose a new folder",
+            laboratory.folder.display()
+        );
         return Err(ProgrammeRunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
@@ -182,7 +186,9 @@ impl ProgrammeRun<'_> {
         let specimen = programme.specimen_at(place.task);
         let remount = specimen.filter(|_| std::mem::take(&mut self.is_remounting));
         let plan = task.plan(place.repeat, remount).ok_or_else(|| {
-            refused("its protocol gives no plan; check the values under set".into())
+            refused(
+                "its protocol gives no plan with these values; check the values under 'set'".into(),
+            )
         })?;
         let to_acknowledge = (self.laboratory.gate)(&plan).map_err(refused)?;
         let session = session_folder(&task.name, &place);

@@ -36,7 +36,7 @@ fn describe_effect(effect: &Effect) -> String {
         Effect::Finished(outcome) => format!("{}: {}", outcome.ending, outcome.reason),
         Effect::ByHand(action) => match action {
             HandAction::LoadCell { mass_g } => format!("{mass_g} g on the load cell"),
-            HandAction::Mount { specimen } => format!("specimen {specimen} clipped in"),
+            HandAction::Mount { specimen } => format!("specimen {specimen} mounted"),
             HandAction::Unmount => "the specimen taken out".to_owned(),
         },
         Effect::Command(command) => match command {
@@ -45,7 +45,7 @@ fn describe_effect(effect: &Effect) -> String {
                 format!("move to pulse {} at {}", to.target_pulses, to.speed)
             }
             RigCommand::Oscillate(sine) => format!(
-                "oscillate by {} pulses with a period of {} ticks, {} times",
+                "oscillate with an amplitude of {} pulses and a period of {} ticks, {} cycles",
                 sine.amplitude_pulses, sine.period_ticks, sine.cycles
             ),
             RigCommand::Stop => "stop".to_owned(),

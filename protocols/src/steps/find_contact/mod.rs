@@ -95,7 +95,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "press_dwell",
             QuantityKind::Time,
-            "dwell at the end of each pass, in which the force relaxes",
+            "dwell at the end of each pass, during which the force relaxes",
         )
         .zero_allowed(),
     ],
@@ -162,7 +162,7 @@ impl ContactPress {
             ));
         } else if self.force >= most {
             walk.refuse(format!(
-                "find-contact presses to {}, but the force limit of {most} stops the run; allow more force or press less",
+                "find-contact presses to {}, but the force limit of {most} stops the run before; raise the limit or press less",
                 self.force
             ));
         }

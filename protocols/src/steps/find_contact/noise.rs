@@ -31,12 +31,12 @@ pub(in crate::steps) fn second_touch_error(
 ) -> String {
     let advice = if criterion > target {
         format!(
-            "noise raised the criterion from {target:.3} to {criterion:.3}; quieten the signal, tare and search again"
+            "because of noise, the contact criterion is {criterion:.3} instead of {target:.3}; reduce the noise, tare and search again"
         )
     } else {
-        "look whether the specimen or its support moved, then search again".to_owned()
+        "check whether the specimen or its support moved, then search again".to_owned()
     };
-    format!("the second {touch} did not feel what the first one felt: {advice}")
+    format!("the second {touch} found no contact where the first one did: {advice}")
 }
 
 /// Refuses a drift that surely moves the force by half of the criterion within the time an approach may take.

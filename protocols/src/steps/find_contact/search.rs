@@ -105,7 +105,7 @@ impl ContactSearch {
         let (criterion, noise) = above_noise(cx, &unloaded, plan.criterion, samples);
         if criterion > CRITERION_MAX {
             return Err(format!(
-                "noise of {noise:.3} would need a contact criterion of {criterion:.3}, above {CRITERION_MAX}; quieten the signal"
+                "a noise of {noise:.3} needs a contact criterion of {criterion:.3}, but at most {CRITERION_MAX} is allowed; reduce the noise"
             ));
         }
         let end = Position(cx.limits().travel_max.0 - TRAVEL_MARGIN_MM);
@@ -254,12 +254,14 @@ impl ContactSearch {
     fn check_force(&self, filtered: Newtons, fast: Newtons) -> Result<(), String> {
         if self.seen == self.filtered && filtered.abs() >= self.criterion {
             return Err(format!(
-                "the load cell reads {filtered:.3} before the tissue is met; free the probe and tare again"
+                "the load cell reads {filtered:.3} before the probe touches the tissue; free the probe and tare again"
             ));
         }
         let is_searching = matches!(self.stage, Stage::Approach | Stage::Press | Stage::SlowPass);
         if is_searching && filtered > FORCE_MAX {
-            return Err(format!("the force reached {filtered:.2} before contact was certain"));
+            return Err(format!(
+                "the force reached {filtered:.2} before the contact point was found, but a search may press with {FORCE_MAX} at most; approach more slowly"
+            ));
         }
         // Tissue leaves time to stop; a base or a holder does not, whatever the fit says.
         let is_stopping = matches!(
@@ -268,12 +270,12 @@ impl ContactSearch {
         );
         if is_stopping && filtered > FORCE_MAX {
             return Err(format!(
-                "the force rose to {filtered:.2} while the axis stopped: what was met is no tissue, or too hard for this speed; look what stands before the probe"
+                "the force rose to {filtered:.2} while the axis was stopping: the surface is not tissue, or too stiff for this speed; check what is in front of the probe"
             ));
         }
         if self.plan.press.is_some() && self.stage == Stage::Approach && fast >= FORCE_FAST_MAX {
             return Err(format!(
-                "the force rose to {fast:.2} at once: what was met is too hard for this speed; approach more slowly"
+                "the force rose to {fast:.2} within milliseconds: the surface is too stiff for this speed; approach more slowly"
             ));
         }
         Ok(())
@@ -289,7 +291,7 @@ impl ContactSearch {
         self.false_triggers += 1;
         if self.false_triggers > FALSE_TRIGGERS_MAX {
             return Err(format!(
-                "the force rose above {:.3} and fell again {} times without tissue; quieten the signal",
+                "the criterion of {:.3} was exceeded {} times without lasting contact; reduce the noise",
                 self.criterion, self.false_triggers
             ));
         }
@@ -380,9 +382,9 @@ impl ContactSearch {
                 let TouchEstimate { contact, separation_mm } = self.fit()?;
                 // Half of the distance is an error of the position.
                 if let Some(apart) = separation_mm.filter(|apart| apart.abs() > 2.0 * limit) {
-                    let way = if apart > 0.0 { "after" } else { "before" };
+                    let way = if apart > 0.0 { "deeper" } else { "shallower" };
                     return Err(format!(
-                        "the second touch met the tissue {:.2} mm {way} where the first did; check that the specimen is held and let it rest longer",
+                        "the second touch detected contact {:.2} mm {way} than the first; check that the specimen is fixed, and let it rest longer",
                         apart.abs()
                     ));
                 }
@@ -392,7 +394,7 @@ impl ContactSearch {
         };
         if found.std_error_mm > limit {
             return Err(format!(
-                "the contact position is only known to {:.3} mm, wider than {limit:.3} mm; quieten the signal or press further",
+                "the standard error of the contact point is {:.3} mm, but at most {limit:.3} mm is allowed; reduce the noise or press further",
                 found.std_error_mm
             ));
         }
@@ -445,7 +447,7 @@ struct SearchSample<'a> {
 }
 
 fn no_tissue(position: Position) -> String {
-    format!("no tissue before {:.1} mm; check the specimen", position.0)
+    format!("no tissue was found up to {:.1} mm; check the specimen", position.0)
 }
 
 fn is_cruising(velocity: MmPerS, speed: MmPerS) -> bool {

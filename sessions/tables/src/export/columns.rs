@@ -118,7 +118,7 @@ impl Field {
             Self::Host => {
                 ("host_ns", "ns", "time of arrival at the computer, from the start of the session")
             }
-            Self::Status => ("status", "1", "bits of the axis' status"),
+            Self::Status => ("status", "1", "status bits of the axis"),
             Self::Age => (
                 "age_ns",
                 "ns",
@@ -147,13 +147,13 @@ impl Field {
     fn origin(self) -> &'static str {
         match self {
             Self::SessionId => {
-                "set when the session starts; alphabetical order is the order in time"
+                "set when the session starts; alphabetical order is chronological order"
             }
             Self::Specimen => "typed by the operator",
             Self::Sample | Self::EveryNth => "counted",
             Self::Time => "controller ticks times the true length of a tick",
             Self::Depth => {
-                "commanded path from the recorded or corrected contact; agrees with the column pulses to within one pulse"
+                "commanded path, measured from the recorded or corrected contact point; agrees with the column pulses to within one pulse"
             }
             Self::Force => "signal converted by the load-cell calibration, minus the tare",
             Self::Signal | Self::Counts | Self::Pulses | Self::Tick | Self::Status => "as received",

@@ -43,7 +43,7 @@ const HAND_ROWS: usize = 1 << 10;
 pub enum ExportError {
     #[error("{} exists already; move it away or export to another folder", path.display())]
     Exists { path: PathBuf },
-    #[error("{} already exists with other content, and files of a lake never change; use another lake, or move the file away if it is wrong", path.display())]
+    #[error("{} already exists with different content, and files in a lake are never overwritten; use another lake, or move the existing file away if it is wrong", path.display())]
     Different { path: PathBuf },
     #[error("{0}")]
     Columns(String),

@@ -104,7 +104,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Measurem
             return Err("the table already names its columns in its first line; leave out the separate names".into());
         }
         (false, None) => {
-            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or separately".into());
+            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or give the names separately".into());
         }
     };
     let mut table = MeasurementTable::default();

@@ -24,7 +24,7 @@ pub enum WeightsError {
     #[error("cannot read {} ({source}); check the path", path.display())]
     Io { path: PathBuf, source: io::Error },
     #[error(
-        "the table has no column {expected} in its first line; name its columns mass_g,volts and, where they are known, direction,repeat,noise_v,samples,waited_s"
+        "the table has no column {expected} in its first line; name its columns mass_g,volts and, if known, direction,repeat,noise_v,samples,waited_s"
     )]
     NoColumn { expected: &'static str },
     #[error("line {line} has \"{cell}\" for {column}, which is not {expected}; correct the line")]
@@ -46,7 +46,7 @@ pub enum WeightsError {
         cell: String,
     },
     #[error(
-        "line {line} has {mass_g} g after {before_g} g; add a column named 'direction' that says loading or unloading"
+        "line {line} has {mass_g} g after {before_g} g; for decreasing weights, add a column named 'direction' that contains loading or unloading"
     )]
     Falling {
         /// Line, counted from 1.

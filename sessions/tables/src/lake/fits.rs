@@ -38,7 +38,7 @@ impl FitFile<'_> {
     }
 }
 
-/// Refuses a fit with other settings, because files of a lake never change.
+/// Refuses a fit with other settings, because files in a lake are never overwritten.
 pub fn find_fit(file: &FitFile) -> Result<FitState, ExportError> {
     let path = file.path();
     if !path.exists() {

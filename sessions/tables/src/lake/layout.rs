@@ -80,7 +80,7 @@ pub struct Shard {
 }
 
 #[derive(Debug, Error)]
-#[error("{text} is not a part; write i/n with i from 1 to n, as in 2/8")]
+#[error("{text} is not a shard of a lake; write i/n with i from 1 to n, as in 2/8")]
 pub struct ShardError {
     text: String,
 }

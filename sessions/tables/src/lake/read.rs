@@ -23,7 +23,7 @@ pub enum LakeError {
     NoLake { path: PathBuf },
     #[error("{} cannot be read ({reason}); export its session again to another lake", path.display())]
     Bad { path: PathBuf, reason: String },
-    #[error("{} is a session of record version {version}, newer than this program; update palpate", path.display())]
+    #[error("{} is a session of record version {version}, which this palpate is too old to read; update palpate", path.display())]
     Newer { path: PathBuf, version: u32 },
     #[error("cannot read {} ({source}); check its permissions", path.display())]
     Io { path: PathBuf, source: io::Error },

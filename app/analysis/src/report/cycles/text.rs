@@ -74,7 +74,7 @@ fn loops(report: &CycleReport) -> String {
 fn steady(report: &CycleReport) -> String {
     let (percent, row) = (report.rule.percent, report.rule.in_a_row);
     let criterion = format!(
-        "the peak changes by less than {percent} % of the peak and the shift by less than {percent} % of the depth, {row} times in a row"
+        "from one cycle to the next the peak force changes by less than {percent} % and the loop shifts by less than {percent} % of the depth, {row} times in a row"
     );
     match (report.steadiness.steady_from, report.cycles.len()) {
         (Some(cycle), _) => format!("steady from cycle {cycle} on: {criterion}"),
@@ -132,7 +132,7 @@ fn prediction(report: &CycleReport) -> Option<String> {
         Err(err) => vec![one.cycle.to_string(), err.to_string()],
     });
     let title = "prediction minus measurement, percent of the measured peak";
-    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | at s | at peak N | at peak % | at end N | at end %";
+    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | time of worst s | N at peak | % at peak | N at end | % at end";
     section(title, head, rows.collect())
 }
 

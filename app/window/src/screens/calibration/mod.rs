@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
-    purpose: "calibrations of the library, from volts to newtons",
+    purpose: "load-cell calibrations in the library, which convert volts to newtons",
     key: Key::Num2,
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),
 };
@@ -43,9 +43,10 @@ pub fn calibration_session(run: Option<&RunView>) -> Result<&Path, String> {
     };
     match &run.outcome {
         None => Err("the run is still in progress".into()),
-        Some(outcome) if outcome.ending != EndingKind::Finish => {
-            Err("the last run did not finish; a calibration must be complete".into())
-        }
+        Some(outcome) if outcome.ending != EndingKind::Finish => Err(
+            "the last run ended before its calibration was complete; measure the calibration again"
+                .into(),
+        ),
         Some(_) => Ok(&run.folder),
     }
 }

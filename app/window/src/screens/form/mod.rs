@@ -190,14 +190,13 @@ impl ProtocolForm {
         let words = |problems: Vec<ProtocolProblem>| {
             problems.first().map_or_else(String::new, ToString::to_string)
         };
-        let protocol =
-            built_in(manual.protocol).ok_or("the protocol of this move is not built in")?;
+        let protocol = built_in(manual.protocol).ok_or("this move has no built-in protocol")?;
         let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // A button of a manual move acknowledges nothing.
         if let (true, Some(reason)) = (needs_daily_check(&plan), bench.to_acknowledge.first()) {
             return Err(format!(
-                "{reason}; run the daily check, or accept this on the Run screen with the protocol {}",
+                "{reason}; run the daily check, or acknowledge this on the Run screen, where the protocol {} makes the same move",
                 manual.protocol
             ));
         }

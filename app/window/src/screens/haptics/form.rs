@@ -96,7 +96,7 @@ impl HapticsForm {
     /// Draws the fields; true when the button of the session dialog is pressed.
     pub fn ui(&mut self, ui: &mut Ui, offers: &ScreenOffers) -> bool {
         section_ui(ui, "Material");
-        text_row(ui, "body", "a session's folder, a table, or thesis", &mut self.body);
+        text_row(ui, "body", "a session's folder, a table, or 'thesis'", &mut self.body);
         let mut is_dialog_pressed = false;
         ui.horizontal_wrapped(|ui| {
             if ui.button("Source thesis").clicked() {
@@ -118,8 +118,8 @@ impl HapticsForm {
             ui.radio_value(&mut self.is_current, true, "current").named("current");
         });
         let damps = match self.is_current {
-            false => "the motor's back-EMF damps",
-            true => "the motor does not damp",
+            false => "the motor's back-EMF adds damping",
+            true => "the motor adds no damping",
         };
         quiet_ui(ui, damps);
         quantity_ui(ui, "damping", "N s/m, own", &mut self.damping);

@@ -81,7 +81,7 @@ fn tried_ui(ui: &mut Ui, tried: &SimulatedTrial, ends: [f64; 2]) {
     };
     let from = tried.trace.first().map_or(0.0, |point| point[0]);
     let to = tried.trace.last().map_or(1.0, |point| point[0]);
-    let time = PlotAxis::linear("time since contact of the hand (s)");
+    let time = PlotAxis::linear("time since the hand made contact (s)");
     let plot = Plot::new("", time, PlotAxis::linear("position (mm)").with_visible_values(&ends))
         .with([PlotSeries::line(&buzz, ink, 1.4, tried.trace.clone())]);
     legend_ui(ui, &[&plot]);

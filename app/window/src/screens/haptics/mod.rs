@@ -34,7 +34,7 @@ pub struct HapticsCheck {
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
-    purpose: "feel a material through a device: stability margin, limit cycle and loop",
+    purpose: "feel a material through a haptic device: stability margin, limit cycle and force loop",
     key: Key::Num9,
     open: |_| Box::new(HapticsScreen::default()),
 };

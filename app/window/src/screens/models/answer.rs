@@ -19,13 +19,13 @@ const PLOT_SHARE: f32 = 0.46;
 const COLUMNS: [(&str, f32); 11] = [
     ("family", 92.0),
     ("predicted mN", 100.0),
-    ("ops", 44.0),
+    ("operations", 74.0),
     ("within", 46.0),
     ("rms mN", 60.0),
     ("dBIC", 78.0),
-    ("free", 36.0),
+    ("fitted values", 86.0),
     ("worst mN", 68.0),
-    ("states", 46.0),
+    ("state variables", 98.0),
     ("scaled mN", 72.0),
     ("dAICc", 78.0),
 ];
@@ -109,7 +109,7 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &SelectionReport) {
     if steps.is_empty() {
         placeholder_ui(
             ui,
-            "add a second family of the same kind, such as prony-1 and prony-2, to see the gain of a term",
+            "add a second family of the same kind, such as prony-2 beside prony-1, to see what one more term improves",
         );
     }
     for step in steps {

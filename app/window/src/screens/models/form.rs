@@ -138,7 +138,7 @@ impl ModelsForm {
     }
 
     pub(super) fn choices_ui(&mut self, ui: &mut Ui) {
-        let without = Some("none: information criteria alone decide");
+        let without = Some("no tolerance: the information criteria alone decide");
         tolerance_ui(ui, &mut self.tolerance, without);
         choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
         tick_box(ui, &mut self.with_unload, "unloading too, where recorded");

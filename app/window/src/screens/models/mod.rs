@@ -45,7 +45,7 @@ impl Screen for ModelsScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        let before = "Add recordings on the left and compare them. Recordings at two speeds or depths of one specimen are best, because each fit then predicts the recordings that are held out.";
+        let before = "Add recordings on the left and compare them. Recordings at two speeds or depths of one specimen are best, because each fit is then tested on recordings that it was not fitted to.";
         if let Some(selected) = answer_ui(ui, &self.task, before) {
             answer::families_ui(ui, &selected.selection);
         }

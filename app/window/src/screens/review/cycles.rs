@@ -102,7 +102,7 @@ impl ReviewScreen {
         self.moves_ui(ui);
         let height = (0.55 * ui.available_height()).max(160.0);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
-        let words = "peak force of every cycle; 'palpate analyse' computes hysteresis, relaxation and shift";
+        let words = "peak force of every cycle; 'palpate analyse' also computes hysteresis, relaxation and the shift of the loops";
         head_ui(ui, "Cycles", words);
         let columns = [
             Column::words("session", 200.0),

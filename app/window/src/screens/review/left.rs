@@ -50,7 +50,7 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
             return pressed;
         }
         Stage::Cancelled => {
-            quiet_ui(ui, format!("only {:.0} % of the session is read", 100.0 * share))
+            quiet_ui(ui, format!("reading was cancelled at {:.0} % of the session", 100.0 * share))
         }
         Stage::Failed(reason) => alarm_ui(ui, reason),
     }
@@ -104,7 +104,10 @@ impl ReviewScreen {
     fn sessions_ui(&mut self, ui: &mut Ui) {
         let tokens = tokens_of(ui);
         if self.subjects.is_empty() {
-            quiet_ui(ui, "none yet: choose sessions in the library, or type the path of a session");
+            quiet_ui(
+                ui,
+                "no session is shown yet: choose some in the library, or type the path of a session",
+            );
         }
         let mut pressed = None;
         for (index, subject) in self.subjects.iter().enumerate() {
@@ -160,7 +163,7 @@ impl ReviewScreen {
         for subject in &self.subjects {
             if subject.is_settled() && subject.moment(self.time_origin).is_none() {
                 let words = format!(
-                    "{} has no {}; its time counts from its start",
+                    "{} has no {}, so its time counts from the start of the session",
                     subject.name,
                     self.time_origin.name()
                 );

@@ -73,11 +73,11 @@ impl ReviewScreen {
         }
         let words = match self.view {
             View::OverDepth | View::Cycles if self.depth_lines.is_busy() => {
-                Some("finding the lines for this view".to_owned())
+                Some("computing the lines of this view".to_owned())
             }
             View::OverDepth | View::Cycles => self.depth_lines.remark(),
             _ if self.thinned > 1 => {
-                Some(format!("thinned to min/max of {} samples", self.thinned))
+                Some(format!("thinned to min/max of every {} samples", self.thinned))
             }
             _ => Some("every sample is drawn".to_owned()),
         };

@@ -21,7 +21,7 @@ fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {
 
 impl ReviewScreen {
     pub(super) fn parameters_ui(&self, ui: &mut Ui) {
-        let words = "value, statistical and total 95 % interval of each session's fit; sessions of one specimen stand together";
+        let words = "value with its statistical and its total 95 % interval from each session's fit; sessions of one specimen are grouped";
         head_ui(ui, "Parameters", words);
         let sorted = by_specimen(&self.subjects);
         let first = sorted.iter().find_map(|(subject, _)| subject.fitted());

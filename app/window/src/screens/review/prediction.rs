@@ -42,7 +42,10 @@ impl ReviewScreen {
         };
         ui.label(sentence(&found, &known, &other));
         let Some(index) = self.subjects.iter().position(|one| one.name == other) else {
-            return quiet_ui(ui, format!("{other} is no longer shown"));
+            return quiet_ui(
+                ui,
+                format!("{other} is no longer shown, so its plots are missing here"),
+            );
         };
         self.prediction_plots(ui, &found, index);
     }

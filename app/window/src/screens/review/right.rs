@@ -35,7 +35,7 @@ impl ReviewScreen {
         }
         match &front.recording.facts {
             Some(facts) => facts_ui(ui, facts),
-            None => quiet_ui(ui, "more facts follow when the whole session is read"),
+            None => quiet_ui(ui, "more facts appear when the whole session has been read"),
         }
         let moved = events_ui(ui, front);
         match &front.fit {

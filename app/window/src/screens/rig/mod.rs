@@ -75,7 +75,9 @@ impl RigScreen {
             quantity_ui(ui, "jog speed", "mm/s", &mut self.speed);
         });
         self.distance.check(|mm| {
-            let words = format!("type a distance other than 0, up to {furthest:.0} mm either way");
+            let words = format!(
+                "type a distance other than 0, at most {furthest:.0} mm in either direction"
+            );
             require(mm != 0.0 && mm.abs() <= furthest, words)
         });
         self.speed.check(|speed| {
@@ -115,7 +117,7 @@ impl RigScreen {
                 commands.push(UiCommand::ManualMove(ManualMove::home()));
             }
             let words = if rig.is_homed {
-                "Position zero is known. The axis touches the home switch again and compares."
+                "Position zero is known. The axis touches the home switch again to verify it."
             } else {
                 "Position zero is not known. The probe moves away from the tissue until the home switch closes."
             };
@@ -151,7 +153,7 @@ fn values_ui(ui: &mut Ui, rig: &RigView, curve: &CalibrationCurve) {
     let health = match (&rig.link_error, &rig.link) {
         (Some(reason), _) => RichText::new(format!("Link lost: {reason}")).color(tokens.alarm_text),
         (None, Some(words)) => RichText::new(format!("link: {words}")),
-        (None, None) => RichText::new("link: the rig is part of this program"),
+        (None, None) => RichText::new("link: connected"),
     };
     ui.add(Label::new(health).wrap());
     let age = rig.reading.and_then(|reading| reading.age);
@@ -175,9 +177,9 @@ fn limits_ui(ui: &mut Ui, rig: &RigView, limits: &Limits) {
             ("furthest position", format!("{:.1} mm from home", limits.travel_max.0)),
             ("force above tare", format!("{:.1} to {:.1}", limits.force_min, limits.force_max)),
             ("change of force", format!("{:.0} N/s", limits.force_rate_max)),
-            ("signal", format!("{:.2} whatever the calibration says", limits.volts_max)),
+            ("signal", format!("{:.2}, independent of the calibration", limits.volts_max)),
             (
-                "silence",
+                "time without a sample",
                 format!(
                     "{:.0} ms at rest, {:.0} ms at {fastest} mm/s",
                     silence(0.0),

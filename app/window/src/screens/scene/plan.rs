@@ -84,8 +84,9 @@ impl SceneScreen {
         if took <= budget {
             return;
         }
-        let words =
-            format!("one tick in a thousand took {took:.0} µs, over the budget of {budget} µs");
+        let words = format!(
+            "one tick in a thousand took more than {took:.0} µs, but the budget is {budget} µs"
+        );
         alarm_ui(ui, words);
         let planned = self.planned.as_ref();
         if let Some(PlannedScene { curves, .. }) = planned {
@@ -103,9 +104,11 @@ fn after_miss(file: &SceneFile, curves: &SceneCurves, took: f64) -> String {
                 Ok(plan) => plan_text(&plan),
                 Err(none) => none.reason,
             };
-            format!("planned again with that time:\n{again}")
+            format!("planned again with the measured time:\n{again}")
         }
-        Ok(_) => "the scene that ran does not follow its plan; use the plan and start again".into(),
+        Ok(_) => {
+            "the scene does not follow its plan; use the plan and start the scene again".into()
+        }
         Err(none) => none.reason,
     }
 }

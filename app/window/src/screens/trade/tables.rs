@@ -211,7 +211,7 @@ pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
     ];
     lines.extend(plan.dropped.iter().map(|one| {
         format!(
-            "left out: {}: {} {} of error, {} µs saved",
+            "left out: {} (error {} {}, {} µs saved)",
             one.what,
             digits(one.error),
             one.unit,

@@ -100,10 +100,12 @@ impl SessionFacts {
         let late = worst.lateness_s * 1e3;
         let is_well = missed == 0 && self.health.clock_jumps == 0;
         let words = match (is_well, missed) {
-            (true, _) => format!("no reading missing; readings at most {late:.1} ms late"),
+            (true, _) => {
+                format!("no readings are missing, and none is more than {late:.1} ms late")
+            }
             (false, 0) => format!("the wall clock was set {} times", self.health.clock_jumps),
             (false, missed) => {
-                format!("{missed} readings missing; the others at most {late:.1} ms late")
+                format!("{missed} readings are missing; the others are at most {late:.1} ms late")
             }
         };
         (words, is_well)

@@ -150,7 +150,7 @@ impl ReviewRecording {
                 Err(TryRecvError::Empty) => return,
                 Err(TryRecvError::Disconnected) => {
                     if self.stage == Stage::Reading {
-                        let gone = "reading the session ended unexpectedly; show the session again, and report this if it happens twice";
+                        let gone = "the session was not read to its end; show it again, and report this if it happens twice";
                         self.stage = Stage::Failed(gone.into());
                     }
                     self.updates = None;

@@ -137,7 +137,7 @@ fn words_at_the_start_and_the_rest_of_a_line_are_passed_over() {
     let found = cell.description;
     assert_eq!((found.adc.counts_max, found.newtons_per_volt), (2_500, Some(1.0)));
     assert!((found.rate - 50.0).abs() < 1.0, "{}", found.rate);
-    assert!(found.identity.contains("in N, 2 digits behind the point"), "{}", found.identity);
+    assert!(found.identity.contains("in N, 2 digits after the point"), "{}", found.identity);
 }
 
 #[test]
@@ -169,14 +169,14 @@ fn what_is_not_as_the_rig_file_says_is_reported() {
     let mut lines = vec!["1.5\n"; 20];
     lines.push("1.25\n");
     let mixed = refused(Script::new(&lines, 20), "unit = \"N\"\nfull_scale = 25\n");
-    assert!(mixed.contains("1 and now have 2 digits"), "{mixed}");
+    assert!(mixed.contains("has changed from 1 to 2"), "{mixed}");
     let timed = format!("{USUAL}time_column = \"us\"\n");
     let without = refused(Script::new(&["100\r\n"], 20), &timed);
     assert!(without.contains("a time, a comma and a number"), "{without}");
     let words = refused(Script::new(&["hello\r\n"], 20), USUAL);
     assert!(words.contains("\"hello\"") && words.contains("a number alone"), "{words}");
     let slow = refused(Script::new(&["100\r\n"], 1_500), USUAL);
-    assert!(slow.contains("less than one number a second"), "{slow}");
+    assert!(slow.contains("less than one number per second"), "{slow}");
     let fine = refused(Script::new(&["1.00000\r\n"], 20), "unit = \"gF\"\nfull_scale = 100000\n");
     assert!(fine.contains("full_scale"), "{fine}");
     let gauge = refused(Script::new(&["4.285 N\r\n"], 20), USUAL);

@@ -226,9 +226,9 @@ fn drive(
                     story.note(format!("{:.3} s {fault}", at(start)));
                     match fault {
                         Fault::LinkLost { .. } => is_lost = true,
-                        // A sine that was broken off had been acknowledged before.
+                        // A sine that was aborted had been acknowledged before.
                         Fault::CommandRefused { detail }
-                            if detail.contains("broken off")
+                            if detail.contains("was aborted")
                                 || detail.contains("stopped recording") => {}
                         Fault::CommandRefused { .. } => answered += 1,
                         _ => {}

@@ -137,7 +137,7 @@ fn the_identity_is_the_same_each_time() {
         let first = try_connect(&wire, &settings).unwrap();
         let second = try_connect(&wire, &settings).unwrap();
         assert_eq!(first.description.identity, second.description.identity);
-        assert!(first.link.contains("an answer takes"), "{}", first.link);
+        assert!(first.link.contains("the controller answers in"), "{}", first.link);
     }
 }
 

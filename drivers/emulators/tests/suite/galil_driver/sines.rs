@@ -124,7 +124,7 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
         wire.emulator.advance(now);
     }
     host.until("printed", |host| !host.faults.is_empty());
-    assert!(host.faults[0].to_string().contains("broken off"), "{:?}", host.faults);
+    assert!(host.faults[0].to_string().contains("was aborted"), "{:?}", host.faults);
     host.settle();
     host.tell(to(40, 4.98));
     host.settle();

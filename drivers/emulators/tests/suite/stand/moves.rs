@@ -92,7 +92,7 @@ fn a_stop_ends_a_move_before_it_has_begun() {
     host.pass(1.0);
     assert_eq!(host.acks, [RigCommand::Stop]);
     assert!(
-        matches!(&host.faults[..], [Fault::CommandRefused { detail }] if detail.contains("a stop came first"))
+        matches!(&host.faults[..], [Fault::CommandRefused { detail }] if detail.contains("a stop came before"))
     );
     assert_eq!(host.travel(), 0.0);
     // And right behind the letter.

@@ -56,7 +56,7 @@ fn opening_stops_sets_and_reads_back() {
     );
     assert!(sent.starts_with(expected), "{sent}");
     let found = &connected.description;
-    for part in ["3519042", "target of the move", "100 mm", "0.05 mm"] {
+    for part in ["3519042", "target of its move", "100 mm", "0.05 mm"] {
         assert!(found.identity.contains(part), "{part} in {}", found.identity);
     }
     assert_eq!((found.mm_per_pulse, found.tick_nanos), (0.01, 1_000_000));

@@ -69,7 +69,7 @@ impl StandSession {
         self.quiet = quiet;
         if let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
-            let why = "the stand's answer was lost or garbled, so the motion was not begun; check the cable";
+            let why = "the stand's answer was lost or garbled, so the motion was not started; check the cable";
             self.refuse(now, why);
         }
         // It stops at its limit by itself; no reason to wait for that.

@@ -76,7 +76,7 @@ impl StandSession {
                         self.stop_due = true;
                         self.refuse(
                             now,
-                            "the crosshead has not begun to move; check PC control, its emergency stop and its limit switches",
+                            "the crosshead does not start to move; check PC control, the emergency stop and the limit switches",
                         );
                     }
                     return (self.at_rest(true_pulses), none);

@@ -199,7 +199,7 @@ impl StandSession {
             if !matches!(self.motion, Motion::Rest) || self.tick.is_none() {
                 return self.refuse(
                     now,
-                    "the crosshead moves, so its position cannot be defined; stop it first",
+                    "the position cannot be defined while the crosshead moves; stop the crosshead first",
                 );
             }
             self.offset = pulses - self.settings.pulses(self.travel);
@@ -223,7 +223,7 @@ impl StandSession {
             return self.refuse(
                 now,
                 format!(
-                    "the stand takes speeds up to 9999.9 mm/min and travel limits up to 999.99 mm, not a speed of {} and a limit of {:.2} mm",
+                    "the stand accepts speeds up to 9999.9 mm/min and travel limits up to 999.99 mm, but the command has a speed of {} and a limit of {:.2} mm",
                     to.speed,
                     target as f64 * MM_PER_PULSE
                 ),
@@ -341,7 +341,11 @@ impl Dialogue for StandSession {
         } else if self.is_going()
             && let Some(command) = self.orders.pop_front()
         {
-            self.finish_order(now, command, "the crosshead still moves; stop it first");
+            self.finish_order(
+                now,
+                command,
+                "the crosshead is still moving; stop the crosshead first",
+            );
         }
         if let Motion::Setting(stand_move, steps) = &mut self.motion
             && let Some((text, question)) = steps.pop_front()
@@ -385,7 +389,7 @@ impl Dialogue for StandSession {
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
         (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
-            "the stand no longer gives sensible answers, and the crosshead stops at its travel limit; check cable and power"
+            "the stand no longer gives valid answers, and the crosshead stops at its travel limit at the latest; check cable and power"
                 .into()
         })
     }

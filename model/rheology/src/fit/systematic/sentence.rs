@@ -70,13 +70,13 @@ impl SystematicUncertainty {
         };
         let beyond = match self.is_extrapolated {
             true => {
-                "; forces beyond its heaviest weight are extrapolated, so the true error is larger"
+                "; forces beyond the heaviest weight of the calibration are extrapolated, so the true error is larger"
             }
             false => "",
         };
         let doubt = match self.is_contradicted {
             true => {
-                "; the record departs from model and calibration by more than is stated, so these errors are propagated without the help of the record: check the load cell with known weights, and compare model families"
+                "; the record differs from model and calibration by more than the stated errors explain, so the record is not used to reduce these errors; check the load cell with known weights, and compare model families"
             }
             false => "",
         };

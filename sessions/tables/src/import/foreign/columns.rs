@@ -210,7 +210,7 @@ fn column(
         Some(Some(value)) => Zero::At(value),
     };
     let inverted = if is_inverted { ", its sign inverted" } else { "" };
-    let assumed = if is_assumed { ", assumed because it has no unit" } else { "" };
+    let assumed = if is_assumed { ", assumed because the column has no unit" } else { "" };
     let from = match zero {
         Zero::Unchanged => String::new(),
         Zero::First => ", counted from the first row".into(),

@@ -27,11 +27,14 @@ pub(super) fn decode(
     let body = marked.map_or(bytes, |(_, length)| &bytes[length..]);
     let (encoding, reason) = match (chosen, marked) {
         (Some(TextEncoding(chosen)), _) => (chosen, ""),
-        (None, Some((encoding, _))) => (encoding, ", by its byte order mark"),
+        (None, Some((encoding, _))) => (encoding, ", from the byte order mark"),
         (None, None) => match detect_utf16(bytes) {
-            Some(encoding) => (encoding, ", by the zeros in every other byte"),
+            Some(encoding) => (encoding, ", from the zeros in every other byte"),
             None if std::str::from_utf8(bytes).is_ok() => (UTF_8, ""),
-            None => (WINDOWS_1252, ", because it is not UTF-8; other 8-bit encodings look alike"),
+            None => (
+                WINDOWS_1252,
+                ", assumed because the file is not UTF-8; other 8-bit encodings cannot be told apart",
+            ),
         },
     };
     let text = encoding

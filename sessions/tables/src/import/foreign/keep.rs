@@ -100,14 +100,14 @@ fn ticks(samples: &[ForeignSample]) -> Result<Vec<u64>, StoreImportError> {
         // From 2^63 ticks, 106 days, differences of ticks would overflow.
         if !(0.0..9.2e18).contains(&tick) {
             return Err(refused(format!(
-                "the time {} s is more than 106 days after the first time; give the unit of time, or divide the file",
+                "the time {} s is more than 106 days after the first row, too long for one session; give the unit of time if it is not seconds, or split the file",
                 sample.t
             )));
         }
         let tick = tick as u64;
         if ticks.last().is_some_and(|last| tick <= *last) {
             return Err(refused(format!(
-                "the time {} s is less than a picosecond after the previous time; give the unit of time",
+                "the time {} s is less than a picosecond after that of the previous row; give the unit of time if it is not seconds",
                 sample.t
             )));
         }

@@ -79,7 +79,7 @@ pub(super) fn find(
     let find_row = |what: &str, number: usize| {
         rows.index_of(number).ok_or_else(|| {
             format!(
-                "the {0} {number} for the {what} is missing or blank; give another {0}",
+                "{0} {number}, given for the {what}, is missing or blank; give another {0}",
                 rows.word()
             )
         })
@@ -104,7 +104,7 @@ pub(super) fn find(
         Some(index) => (texts(&rows.words(index)), format!("{word} {}", rows.number(index))),
         None => {
             return Err(format!(
-                "the numbers from {word} {} on have no column names above them; name every column, as in t_s,depth_mm,force_N, or give the {word} of the names",
+                "the numbers from {word} {} on have no column names above them; name every column, as in t_s,depth_mm,force_N, or give the {word} that contains the names",
                 rows.number(first)
             ));
         }

@@ -219,7 +219,7 @@ fn gaps(rows: &Rows<'_>, samples: &[ForeignSample], numbers: &[usize]) -> Option
     let count = steps.iter().filter(|step| is_gap(step)).count();
     let first = steps.iter().position(is_gap)?;
     Some(format!(
-        "{count} time step(s) are longer than the usual {median:.6} s: the first, after {} {}, is {:.6} s; palpate adds no rows",
+        "{count} time step(s) are longer than the usual {median:.6} s: the first, after {} {}, is {:.6} s; palpate does not fill the gaps",
         rows.word(),
         numbers[first],
         steps[first]

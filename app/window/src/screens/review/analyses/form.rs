@@ -99,8 +99,10 @@ impl AnalysisForm {
         tick_box(ui, &mut self.with_profile, "profile intervals too");
         if others > 0 {
             let words = match others {
-                1 => "fit this session and the other one shown as one material".to_owned(),
-                _ => format!("fit this session and the {others} others shown as one material"),
+                1 => "fit this session and the other session shown as one material".to_owned(),
+                _ => format!(
+                    "fit this session and the {others} other sessions shown as one material"
+                ),
             };
             tick_box(ui, &mut self.is_together, &words);
         }
@@ -143,7 +145,7 @@ impl AnalysisForm {
             Kind::Mask => {
                 let [from, until] = self.span.each_ref().map(|field| field.value.clone());
                 let (from, until) = (from?, until?);
-                require(from < until, "type two times, the earlier first")?;
+                require(from < until, "type a start time and a later end time")?;
                 Ok(SessionAction::Mask { name, left_out_s: vec![[from, until]] })
             }
         }

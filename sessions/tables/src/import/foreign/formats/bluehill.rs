@@ -230,7 +230,7 @@ fn name(parts: &mut [TextPart<'_>]) {
 fn strange_line(lines: &[Line<'_>], number: usize) -> String {
     let text = lines.iter().find(|(one, _)| *one == number);
     format!(
-        "line {number}: '{}' is among or after the numbers, and no column names follow it; correct or remove the line, or restore the end of the file",
+        "line {number}: '{}' stands among or after the numbers and is not followed by column names; correct or remove the line, or restore the end of the file",
         short(text.map_or("", |(_, text)| text))
     )
 }
