@@ -72,7 +72,7 @@ impl LoadCell {
     pub fn new(settings: &SimSettings, tick: Seconds) -> Self {
         let curve = calibration(settings.profile)
             .curve()
-            .expect("the built-in tables rise from step to step, as the tests of this file show");
+            .expect("a built-in calibration table rises from step to step");
         let error = match settings.profile {
             SimProfile::Lab => {
                 let mut drift = Random::new(settings.seed, RandomStream::Drift);

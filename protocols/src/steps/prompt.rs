@@ -48,7 +48,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
             "on_timeout",
             QuantityKind::Text,
             "stop",
-            "what follows without an answer: `stop` or `continue`",
+            "what the run does if nobody answers: `stop` or `continue`",
         )
         .one_of(OnTimeout::WORDS),
         Key::optional(

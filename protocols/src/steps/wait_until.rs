@@ -52,7 +52,7 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "bath_to",
             QuantityKind::Temperature,
-            "highest temperature of the bath that ends the wait",
+            "temperature of the bath above which the wait does not end",
         ),
         Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait"),
         Key::usual(

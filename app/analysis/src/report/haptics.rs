@@ -91,7 +91,7 @@ pub fn margin_text(margin: &Margin) -> String {
             )
         }
         Some(ratio) => format!(
-            "At a depth of {depth:.2} the device has {ratio:.2} times the damping it needs; the guard adds the rest."
+            "At a depth of {depth:.2} the device has {ratio:.2} times the damping that stability needs; the energy guard adds what is missing."
         ),
     }
 }

@@ -103,7 +103,7 @@ pub fn tested(selection: &ModelSelection) -> String {
         |prediction| {
             let has = |unseen: HeldOutKind| prediction.records.iter().any(|one| one.unseen == unseen);
             if has(HeldOutKind::Rest) {
-                return "There is only one record: a fit to the ramp and the first third of the record after the ramp predicts the rest. Add a second speed, depth or specimen to test more than time.".to_owned();
+                return "There is only one record, so each family is fitted to the ramp and the first third of the time after it, and predicts the rest. This tests prediction in time only; add a second speed, depth or specimen to test those.".to_owned();
             }
             let kinds = [HeldOutKind::Speed, HeldOutKind::Depth, HeldOutKind::SpeedAndDepth, HeldOutKind::Specimen];
             let kinds = kinds.into_iter().filter(|kind| has(*kind)).map(|kind| {

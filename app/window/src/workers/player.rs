@@ -38,7 +38,7 @@ impl PlayerThread {
         std::thread::Builder::new()
             .name("player".into())
             .spawn(move || play(&mut player, &rung, &own, &wake))
-            .map_err(|err| format!("the thread of the replay cannot be started: {err}"))?;
+            .map_err(|err| format!("the replay cannot be started ({err}); close other programs"))?;
         Ok(Self { desk, bell })
     }
 

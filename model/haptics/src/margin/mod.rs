@@ -201,7 +201,7 @@ impl MarginReport {
         let mut all = vec![self.damping_sentence()];
         if !self.bands.is_empty() {
             all.push(format!(
-                "The damping is too small at depths {}; the guard adds the missing damping there.",
+                "The damping is too small at depths {}; the energy guard adds what is missing there.",
                 bands::words(&self.bands, self.deepest)
             ));
         }

@@ -86,7 +86,7 @@ fn choose_by_criterion(candidates: &[ModelCandidate], counts: SampleCounts) -> S
             (
                 SelectionOutcome::NoneAdequate,
                 format!(
-                    "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} samples carry the information of {:.0} independent samples), so the lowest BIC proves nothing; state a tolerance, which is the largest acceptable error",
+                    "no winner: every family shows lack of fit; {residuals} are autocorrelated ({} samples carry the information of {:.0} independent ones), so the lowest BIC is no evidence; to choose by the size of the error, state a tolerance, which is the largest error that you accept",
                     counts.samples, counts.effective
                 ),
             )

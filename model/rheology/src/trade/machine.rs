@@ -45,7 +45,7 @@ impl TradeCurves {
             ));
         } else if there.profile != here.profile {
             doubts.push(format!(
-                "these curves are from a {} build, but this is a {} build; measure again",
+                "these curves were measured with a {} build of palpate, but this is a {} build; measure them again",
                 there.profile, here.profile
             ));
         }

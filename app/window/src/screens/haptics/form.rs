@@ -70,7 +70,7 @@ impl HapticsForm {
     /// The source of the material and the setting, or the first thing that is wrong.
     pub fn request(&self) -> Result<(PathBuf, HapticSettings), String> {
         let body = self.body.trim();
-        let words = format!("type the folder of a session, a table, or '{THESIS}'");
+        let words = format!("type the path of a session folder or of a table, or '{THESIS}'");
         require(!body.is_empty(), words)?;
         let rate = self.rate.named_value("rate")?;
         let period = Period::of_rate(rate).map_err(|err| err.to_string())?;

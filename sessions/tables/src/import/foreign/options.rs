@@ -115,7 +115,7 @@ impl std::str::FromStr for ZeroChoice {
     fn from_str(text: &str) -> Result<Self, String> {
         let (quantity, rest) = split_quantity(text, "first|NUMBER")?;
         if quantity == Quantity::Time {
-            return Err("time always counts from the first row; give depth, force or signal".into());
+            return Err("time always counts from the first row and has no other zero; name depth, force or signal".into());
         }
         let value = match rest.as_str() {
             "first" => None,
