@@ -181,7 +181,7 @@ fn home(records: &[&Record]) -> Result<(bool, String), String> {
         Record::HomeChecked { missed_pulses } => Some(*missed_pulses),
         _ => None,
     });
-    let missed = missed.ok_or("the check did not reach the home switch twice; repeat the check")?;
+    let missed = missed.ok_or("the check needs two homings, but the axis did not reach the home switch both times; repeat the check")?;
     let sentence =
         format!("two homings differ by {missed} pulses; the limit is {HOME_PULSES} pulses");
     let advice = "check the home switch, its cable and whether the slider moves freely";

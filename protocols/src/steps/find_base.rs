@@ -24,7 +24,7 @@ pub struct FindBase {
 }
 
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Find the base without a specimen on it. The distance from a contact point found before is the thickness of the specimen.",
+    about: "Find the base without a specimen on it. The thickness of the specimen is the distance from its contact point, found earlier, to the base.",
     keys: &[
         Key::usual("speed", QuantityKind::Speed, "0.6 mm/s", "speed of the first touch"),
         Key::usual("criterion", QuantityKind::Force, "0.05 N", "force that ends the first touch"),
@@ -151,7 +151,7 @@ impl Executable for FindBase {
         self.check_speeds()?;
         if criterion >= self.pass_force {
             return Err(format!(
-                "a noise of {noise:.3} needs a criterion of {criterion:.3}, but it must be below the {:.3} that end the second touch; reduce the noise",
+                "a noise of {noise:.3} needs a contact criterion of {criterion:.3}, but the criterion must be below the force of {:.3} that ends the second touch; reduce the noise",
                 self.pass_force
             ));
         }

@@ -52,7 +52,7 @@ pub fn describe_health(health: &HealthSummary) -> Vec<(&'static str, String)> {
             format!("queue at most {:.1} % full", worst.queue_share * 100.0),
         ];
         let sync = worst.sync_s.map(|secs| secs * 1e3);
-        parts.extend(sync.map(|millis| format!("disk synchronisation at most {millis:.1} ms")));
+        parts.extend(sync.map(|millis| format!("longest disk synchronisation {millis:.1} ms")));
         let free = worst.free_bytes.map(|bytes| bytes as f64 / 1e9);
         parts.extend(free.map(|gigabytes| format!("at least {gigabytes:.1} GB of disk free")));
         parts.push(format!("{} readings missing", worst.missed_readings));

@@ -19,7 +19,7 @@ pub enum SourceError {
     TableAnalysis { name: String },
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("the session was imported from {file}, so it has no decisions and nothing to report")]
+    #[error("the session was imported from {file}, so it contains no record of a run to report on")]
     Imported { file: String },
     #[error(
         "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; if the forces are wrong, import the file again with other units"

@@ -45,7 +45,7 @@ impl WorkbenchApp {
         };
         let is_lost = match bench.snapshot.rig.link_error {
             Some(_) => Ok(()),
-            None => Err("the link to the rig is not lost".to_owned()),
+            None => Err("the rig is connected; there is nothing to reconnect".to_owned()),
         };
         actions.extend([
             PaletteAction::new("Retract after a stop", "F8", UiCommand::Retract).if_ok(can_retract),
