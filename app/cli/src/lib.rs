@@ -12,6 +12,7 @@ mod completions;
 mod compliance;
 mod correct_contact;
 mod daily_check;
+mod demo;
 mod doctor;
 #[cfg(feature = "emulators")]
 mod emulate;
@@ -107,6 +108,7 @@ commands! { windows;
     Run(run::RunArgs) => run::run;
     #[command(subcommand)] Protocol(protocol::ProtocolCommand) => protocol::run;
     DailyCheck(daily_check::DailyCheckArgs) => daily_check::run;
+    Demo(demo::DemoArgs) => demo::run;
     Fit(fit::FitArgs) => fit::run;
     #[command(alias = "analyze")] Analyse(analyse::AnalyseArgs) => analyse::run;
     Select(select::SelectArgs) => select::run;

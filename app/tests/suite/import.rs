@@ -76,7 +76,7 @@ fn fits_agree_and_replay_has_nothing_to_do() {
         // The same numbers but for the last digit of a time.
         assert!((session - table).abs() <= 1e-9 * table.abs().max(1e-3), "{session} {table}");
     }
-    for (command, printed) in [("replay", "no decisions"), ("report", "nothing to report")] {
+    for (command, printed) in [("replay", "no decisions"), ("report", "no record of a run")] {
         let output = palpate(at, &[command, "in/zug"]);
         assert_eq!(output.status.code(), Some(2), "{command}");
         assert!(stderr(&output).contains(printed), "{command}: {}", stderr(&output));

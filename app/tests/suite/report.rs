@@ -319,7 +319,7 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
     let session = session.display().to_string();
     succeeded(&palpate(at, &["report", &session, "--html", "page.html"]));
     let texts = strict(&fs::read_to_string(at.join("page.html")).unwrap()).join("\n");
-    for words in ["imported from", "in its file", "tau_eps", "no decisions"] {
+    for words in ["imported from", "in its file", "tau_eps", "no record of a run"] {
         assert!(texts.contains(words), "no '{words}'");
     }
     assert!(!texts.contains("total 95 %") && !texts.contains("Uncertainty budget"));

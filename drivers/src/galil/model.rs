@@ -135,8 +135,8 @@ mod tests {
     #[test]
     fn unsupported_controllers_are_refused_by_name() {
         for (revision, why) in [
-            ("DMC1820 Rev 1.0", "bus"),
-            ("DMC1842 Rev 1.0", "bus"),
+            ("DMC1820 Rev 1.0", "plug-in card"),
+            ("DMC1842 Rev 1.0", "plug-in card"),
             ("RIO47120 Rev 1.1b", "drives no axis"),
             ("DMC52010 Rev 1.0", "series"),
             ("DMC4103 Rev 1", "number of axes"),

@@ -152,7 +152,7 @@ fn mistakes_of_controller_and_cell_are_reported_together() {
     let lines: Vec<usize> = found.iter().map(|(line, _)| *line).collect();
     assert_eq!(lines, [0, 7, 12, 13], "{found:?}");
     assert!(found[0].1.contains("cell.capacity_n: this key is missing"));
-    assert!(found[2].1.contains("'cell.board' means nothing"));
+    assert!(found[2].1.contains("'cell.board' is not a key"));
     let one = PARTS.replace("ttyACM1", "ttyACM0");
     assert!(mistakes(&one)[0].1.contains("another"));
 }

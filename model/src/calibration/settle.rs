@@ -357,6 +357,6 @@ mod tests {
         let Some(SettleState::TimedOut(blind)) = verdict else {
             panic!("{verdict:?}");
         };
-        assert!(blind.to_string().contains("without gaps"), "{blind}");
+        assert!(blind.to_string().contains("gap-free"), "{blind}");
     }
 }

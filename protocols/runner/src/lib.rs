@@ -9,6 +9,7 @@ mod active_run;
 pub mod base;
 mod board;
 mod clock;
+pub mod demonstration;
 pub mod fidelity;
 #[cfg(feature = "haptics")]
 pub mod haptics;

@@ -77,7 +77,10 @@ impl ChunkReader {
         let compression = fields.text().ok_or_else(too_short)?;
         let compressed_size = fields.u64().ok_or_else(too_short)?;
         if compressed_size != fields.0.len() as u64 {
-            return Err("the file states the length of a data block twice, and the two values differ".into());
+            return Err(
+                "the file states the length of a data block twice, and the two values differ"
+                    .into(),
+            );
         }
         let size = usize::try_from(size)
             .ok()

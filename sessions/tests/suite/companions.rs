@@ -138,8 +138,8 @@ fn companions_with_the_same_meaning_are_copied_and_others_reported() {
             ("mask 'stretch'", !has_first),
             ("'mistake'", false),
             ("recalibration 'lab'", !is_sure),
-            ("contact 1 by Ada", !is_sure),
-            ("contact 2 by Ada", !is_sure),
+            ("contact 1, made by Ada", !is_sure),
+            ("contact 2, made by Ada", !is_sure),
             ("t_s counts", !has_first),
         ] {
             assert_eq!(note.contains(words), is_reported, "{place}: {words}: {note}");
@@ -164,7 +164,7 @@ fn a_copy_of_an_interrupted_session_keeps_its_edits_but_those_of_contacts_it_lac
     assert_eq!(copy.entries.len(), 1, "the cut is elsewhere");
     let remaining = Edits::read(&recovery.folder, &recovery.session_id).unwrap();
     assert_eq!(remaining.all, edits()[..3]);
-    assert!(copy.notes[0].contains("contact 2 by Ada"), "{:?}", copy.notes);
+    assert!(copy.notes[0].contains("contact 2, made by Ada"), "{:?}", copy.notes);
 }
 
 #[test]

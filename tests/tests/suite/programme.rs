@@ -368,7 +368,7 @@ fn what_could_never_work_is_refused_with_its_line() {
         ("protocol = \"zeroing\"", compared.into(), 7, "zeroing"),
         ("protocol = \"sine\"", compared.into(), 7, "sine"),
         (cycles, compared.into(), 7, "10 cycles"),
-        (press, "protocol = \"zeroing\"\nvalidates = \"one\"".into(), 7, "validates = \"one\""),
+        (press, "protocol = \"zeroing\"\nvalidates = \"one\"".into(), 7, "model of task 'one'"),
         (press, "protocol = \"zeroing\"\ncalibrates = true".into(), 7, "zeroing"),
         (press, with_key("specimen = \"two\""), 10, "[specimen.2]"),
         (press, with_key("specimen = -1"), 10, "specimen cannot be -1"),

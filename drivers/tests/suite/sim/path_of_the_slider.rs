@@ -283,7 +283,7 @@ fn settings_are_rounded_down_and_read_back() {
 fn refusals_give_a_reason() {
     let mut rig = ideal(8);
     let why = |rig: &mut SimRig, command| answer_to(rig, command).unwrap_err();
-    assert!(why(&mut rig, move_to(100, 1.0)).contains("motor off"));
+    assert!(why(&mut rig, move_to(100, 1.0)).contains("motor is off"));
     answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
     for speed in [0.0, 0.02, -1.0, 20.1, f64::NAN, f64::INFINITY] {
         assert!(why(&mut rig, move_to(100, speed)).contains("speed"), "{speed}");
@@ -308,7 +308,8 @@ fn refusals_give_a_reason() {
     answer_to(&mut rig, move_to(100, 1.0)).unwrap();
     let define = RigCommand::DefinePosition { pulses: 0 };
     for command in [move_to(200, 1.0), oscillate(20, 1000, 1), define] {
-        assert!(why(&mut rig, command).contains("axis moves"), "{command:?}");
+        let message = why(&mut rig, command);
+        assert!(message.contains("axis moves") || message.contains("while it moves"), "{message}");
     }
     let last = *host::samples_to_rest(&mut rig).last().unwrap();
     assert_eq!(last.pulses, 100);

@@ -62,7 +62,8 @@ fn what_is_not_the_rig_of_the_file_is_refused_in_words() {
     let serial = GalilSettings { serial_number: Some(7), ..thesis() };
     let axis = GalilSettings { axis: 'F', ..thesis() };
     let speed = GalilSettings { speed_max: palpate_model::MmPerS(1e6), ..thesis() };
-    for (settings, words) in [(serial, "serial number 1820"), (axis, "no axis F"), (speed, "SPA=")]
+    for (settings, words) in
+        [(serial, "serial number 1820"), (axis, "axis F does not exist"), (speed, "SPA=")]
     {
         let wire = wired(galil::EmulatedGalilSettings::default());
         let err = try_connect(&wire, &settings).unwrap_err().to_string();

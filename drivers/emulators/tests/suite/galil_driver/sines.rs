@@ -135,8 +135,8 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
 fn what_the_axis_cannot_follow_is_refused() {
     let mut host = at_forty(&thesis());
     for (command, why) in [
-        (sine(2000, 1000, 1), "reaches"),
-        (sine(100, 100, 1), "reaches"),
+        (sine(2000, 1000, 1), "needs a speed"),
+        (sine(100, 100, 1), "needs a speed"),
         (sine(0, 100, 1), "zero"),
     ] {
         let before = host.faults.len();

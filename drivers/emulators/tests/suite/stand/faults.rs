@@ -94,7 +94,7 @@ fn a_stand_that_does_not_begin_is_reported() {
     }
     host.pass(2.0);
     let printed = host.faults.last().expect("a fault").to_string();
-    assert!(printed.contains("not started"), "{printed}");
+    assert!(printed.contains("does not start"), "{printed}");
     assert_eq!(host.travel(), 0.0);
 }
 

@@ -130,7 +130,7 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
     host.send(to(2_000, 1.0));
     host.pass(0.2);
     let printed = host.faults.last().expect("a refusal").to_string();
-    assert!(printed.contains("still moves"), "{printed}");
+    assert!(printed.contains("still moving"), "{printed}");
 }
 
 #[test]
