@@ -39,7 +39,7 @@ pub fn plot(selection: &ModelSelection) -> Plot {
         false => "error of the fit, rms (mN)",
     };
     let scatter = ScatterPlot {
-        axes: ["operations an evaluation", name],
+        axes: ["operations per evaluation", name],
         marks: &marks,
         has_front: true,
         chosen: drawn.iter().position(|(one, _)| is_chosen(selection, &one.family)),

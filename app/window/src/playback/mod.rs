@@ -88,8 +88,7 @@ impl PlaybackApp {
                 let words = match run.and_then(|run| run.prompt.as_ref()) {
                     Some(prompt) => format!("prompt: {}", prompt.message),
                     None if !self.is_same_engine => {
-                        "decisions of the engine are recomputed, because another version of palpate made the recording"
-                            .to_owned()
+                        "engine decisions recomputed: another version recorded them".to_owned()
                     }
                     None => "decisions as recorded; a replay moves no rig".to_owned(),
                 };
