@@ -209,6 +209,7 @@ fn parse() -> Result<Cli, ExitCode> {
 
 /// A file that reaches the limit of its size (`ulimit -f`) ends a program by a signal, in the middle of a run. Where
 /// the signal is handled, the write fails instead, which the log survives.
+#[cfg(unix)]
 fn outlive_file_limits() {
     // Without a handler the signal ends the program, as by default.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
@@ -218,6 +219,7 @@ const NO_WINDOW: &str = "this palpate was built without its window; 'palpate --h
 
 /// Runs the command of the arguments; `windows` opens windows, if this program has any.
 pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
+    #[cfg(unix)]
     outlive_file_limits();
     let cli = match parse() {
         Ok(cli) => cli,
