@@ -68,7 +68,6 @@ use palpate_analysis::window_requests::WindowOpener;
 use palpate_model::metadata::SessionLabels;
 use palpate_sessions::log::ReadError;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
 #[derive(Debug, Parser)]
@@ -212,7 +211,7 @@ fn parse() -> Result<Cli, ExitCode> {
 #[cfg(unix)]
 fn outlive_file_limits() {
     // Without a handler the signal ends the program, as by default.
-    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
 }
 
 const NO_WINDOW: &str = "this palpate was built without its window; 'palpate --help' lists the commands that need no window";
