@@ -3,9 +3,9 @@
 //! A [`Draft`] is written under a hidden name in the target folder and stays locked meanwhile. The lock distinguishes
 //! a draft in use from one that a killed process left behind.
 
-use std::fs::{File, Permissions, TryLockError};
+use same_file::Handle;
+use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use walkdir::WalkDir;
@@ -38,13 +38,12 @@ impl Draft {
         let name: String = name.to_string_lossy().chars().take(NAME_LETTERS_MAX).collect();
         let prefix = format!(".{name}.");
         loop {
-            let file = Builder::new()
-                .prefix(&prefix)
-                .suffix(ENDING)
-                // Like any new file, subject to the user's umask.
-                .permissions(Permissions::from_mode(0o666))
-                .tempfile_in(folder_of(path))
-                .map_err(without_hidden_name)?;
+            let mut builder = Builder::new();
+            builder.prefix(&prefix).suffix(ENDING);
+            // Like any new file, subject to the user's umask.
+            #[cfg(unix)]
+            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+            let file = builder.tempfile_in(folder_of(path)).map_err(without_hidden_name)?;
             // Between creation and lock, a sweep may have deleted it as abandoned.
             match file.as_file().try_lock() {
                 Err(TryLockError::WouldBlock) => continue,
@@ -62,8 +61,10 @@ impl Draft {
         BufWriter::new(self.file.as_file())
     }
 
-    pub fn hidden_path(&self) -> &Path {
-        self.file.path()
+    /// Another handle to the file, which stays open when the draft is gone. The hidden path cannot be opened again on
+    /// Windows, because the draft is locked.
+    pub fn reader(&self) -> io::Result<File> {
+        self.file.as_file().try_clone()
     }
 
     /// Gives the file its name. Once this returns, name and content survive a power cut.
@@ -74,7 +75,7 @@ impl Draft {
             ExistingFile::Keep => self.file.persist_noclobber(&self.path),
         };
         named.map_err(|err| err.error)?;
-        // A folder without read permission can be written but not synchronised.
+        // A folder without read permission can be written but not synchronised, and Windows has nothing to synchronise.
         match File::open(folder_of(&self.path)) {
             Ok(folder) => folder.sync_all(),
             Err(_) => Ok(()),
@@ -137,9 +138,8 @@ fn folder_of(path: &Path) -> &Path {
 
 /// Whether `path` still names the open file.
 fn is_at(file: &File, path: &Path) -> bool {
-    let id = |facts: std::fs::Metadata| (facts.dev(), facts.ino());
-    let there = std::fs::metadata(path).map(id).ok();
-    there.is_some() && there == file.metadata().map(id).ok()
+    let open = file.try_clone().and_then(Handle::from_file);
+    open.is_ok_and(|open| Handle::from_path(path).is_ok_and(|there| there == open))
 }
 
 /// The system's error without the hidden name, which means nothing to a user.

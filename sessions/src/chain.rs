@@ -11,7 +11,7 @@
 
 use crate::atomic;
 use crate::folder::{create_folder, sync_folder_of};
-use crate::lock::{LockFailure, LockTimeout, lock_waiting};
+use crate::lock::{LockFailure, LockTimeout, lock_data};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -245,7 +245,7 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
     let mut options = OpenOptions::new();
     let mut file = options.read(true).append(true).create(true).open(path).map_err(failed)?;
     // The lock is for two programs that append at the same time.
-    lock_waiting(&file, path).map_err(|err| match err {
+    let _lock = lock_data(&file, path).map_err(|err| match err {
         LockFailure::LockTimeout(busy) => busy.into(),
         LockFailure::Io(source) => failed(source),
     })?;
@@ -255,7 +255,9 @@ pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(
     chain.check(path, ChainHead::read(path)?)?;
     if chain.is_torn {
         store_torn(path, &bytes[chain.whole..]).map_err(failed)?;
-        file.set_len(chain.whole as u64).map_err(failed)?;
+        // A file opened for appending cannot be cut on Windows.
+        let cut = OpenOptions::new().write(true).open(path);
+        cut.and_then(|file| file.set_len(chain.whole as u64)).map_err(failed)?;
     }
     let line = Line { checksum: checksum(chain.last(), &body), body };
     write_line(&mut file, &line).map_err(failed)?;

@@ -88,7 +88,12 @@ pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
 /// Makes the name of a file or folder survive a power cut, which requires synchronising its folder (fsync(2)).
 pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
     let path = std::path::absolute(path)?;
-    path.parent().map_or(Ok(()), |folder| fs::File::open(folder)?.sync_all())
+    path.parent().map_or(Ok(()), sync_folder)
+}
+
+/// Makes the names in a folder survive a power cut. Windows has no such call: NTFS writes names to its own journal.
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(windows) { Ok(()) } else { fs::File::open(folder)?.sync_all() }
 }
 
 fn holds_more_than_lock(path: &Path) -> io::Result<bool> {
@@ -166,15 +171,14 @@ pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc
 
 /// Refuses a disk with less than twice the space that a session needs.
 ///
-/// If `path` does not exist yet, its nearest existing parent is checked (`statvfs`, POSIX.1-2001).
+/// If `path` does not exist yet, its nearest existing parent is checked.
 pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderError> {
     let existing = path
         .ancestors()
         .find(|one| !one.as_os_str().is_empty() && one.exists())
         .unwrap_or(Path::new("."));
-    let disk = rustix::fs::statvfs(existing)
-        .map_err(|errno| FolderError::Io { path: existing.into(), source: errno.into() })?;
-    let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
+    let free_bytes = fs4::available_space(existing)
+        .map_err(|source| FolderError::Io { path: existing.into(), source })?;
     if free_bytes < needed_bytes.saturating_mul(2) {
         return Err(FolderError::NoSpace { path: existing.into(), free_bytes, needed_bytes });
     }

@@ -1,8 +1,8 @@
 //! Locks across processes: lock files that name their holder, and waits with a limit.
 
+use crate::chain::with_ending;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use thiserror::Error;
@@ -70,8 +70,28 @@ pub(crate) fn lock_waiting(file: &File, path: &Path) -> Result<(), LockFailure> 
     locked.unwrap_or_else(|| Err(LockFailure::LockTimeout(LockTimeout::of(path))))
 }
 
+/// Locks a file that others read meanwhile, until it and what is returned are closed. Windows lets no one else read a locked
+/// file, so there a file beside it is locked in its place.
+pub(crate) fn lock_data(file: &File, path: &Path) -> Result<Option<File>, LockFailure> {
+    if !cfg!(windows) {
+        return lock_waiting(file, path).map(|()| None);
+    }
+    let mut options = OpenOptions::new();
+    let options = options.write(true).create(true).truncate(false);
+    let beside = options.open(with_ending(path, ".lock")).map_err(LockFailure::Io)?;
+    lock_waiting(&beside, path).map(|()| Some(beside))
+}
+
+/// Process number of a lock's holder; only Linux tells it.
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn holder_of(_path: &Path) -> Option<u32> {
+    None
+}
+
 /// Process number of a lock's holder, for flock and POSIX locks (proc(5), `/proc/locks`).
+#[cfg(target_os = "linux")]
 pub(crate) fn holder_of(path: &Path) -> Option<u32> {
+    use std::os::unix::fs::MetadataExt;
     let facts = std::fs::metadata(path).ok()?;
     let (major, minor) = (rustix::fs::major(facts.dev()), rustix::fs::minor(facts.dev()));
     let file = format!("{major:02x}:{minor:02x}:{}", facts.ino());

@@ -250,7 +250,10 @@ fn emulate(
     output: &Output,
 ) -> Result<(), Failure> {
     let link = wire.pty.clone().flatten();
-    let place = match (wire.tcp, cell_link) {
+    // Windows has no pseudo-terminals.
+    let own = cfg!(windows).then_some(SocketAddr::from(([127, 0, 0, 1], 0)));
+    let tcp = wire.tcp.or(own);
+    let place = match (tcp, cell_link) {
         (Some(address), None) => EmulatorAddress::Tcp(address),
         (Some(address), Some(cell)) => EmulatorAddress::TcpAndPtys(address, vec![cell]),
         (None, None) => EmulatorAddress::Pty(link),
@@ -266,7 +269,7 @@ fn emulate(
     let stop = ctrl_c_flag()?;
     let orders = read_lines("orders")?;
     let mut notify = |event: ServeEvent| match event {
-        ServeEvent::Ready(at) => announcement.print(&at, wire.tcp.is_none(), output),
+        ServeEvent::Ready(at) => announcement.print(&at, tcp.is_none(), output),
         ServeEvent::Fault(turn) => {
             let verb = if turn.is_on { "begins" } else { "ends" };
             output.note(&format!("{} {verb}", turn.kind));

@@ -69,7 +69,6 @@ use palpate_analysis::window_requests::WindowOpener;
 use palpate_model::metadata::SessionLabels;
 use palpate_sessions::log::ReadError;
 use std::process::ExitCode;
-use std::sync::Arc;
 
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
 #[derive(Debug, Parser)]
@@ -211,15 +210,17 @@ fn parse() -> Result<Cli, ExitCode> {
 
 /// A file that reaches the limit of its size (`ulimit -f`) ends a program by a signal, in the middle of a run. Where
 /// the signal is handled, the write fails instead, which the log survives.
+#[cfg(unix)]
 fn outlive_file_limits() {
     // Without a handler the signal ends the program, as by default.
-    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
 }
 
 const NO_WINDOW: &str = "this palpate was built without its window; 'palpate --help' lists the commands that need no window";
 
 /// Runs the command of the arguments; `windows` opens windows, if this program has any.
 pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
+    #[cfg(unix)]
     outlive_file_limits();
     let cli = match parse() {
         Ok(cli) => cli,

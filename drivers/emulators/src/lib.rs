@@ -15,6 +15,10 @@ pub mod line_cell;
 pub mod mark10;
 pub mod orders;
 mod plant;
+#[cfg(unix)]
+mod pty;
+#[cfg(not(unix))]
+#[path = "no_pty.rs"]
 mod pty;
 pub mod serve;
 mod wire;

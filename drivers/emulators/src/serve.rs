@@ -9,11 +9,11 @@ use super::pty::Pty;
 use super::wire::LineDirection;
 use palpate_model::Nanos;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fd::AsFd;
 use rustix::io::Errno;
 use rustix::net::sockopt::set_socket_linger;
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::os::fd::AsFd;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
@@ -261,7 +261,8 @@ impl<'a> Server<'a> {
             [line.to_device.next_at(), line.from_device.next_at()].into_iter().flatten()
         });
         let until = due.min().unwrap_or(now + SLEEP_MAX).min(now + SLEEP_MAX);
-        let timeout = Timespec { tv_sec: 0, tv_nsec: until.since(now).0 as i64 };
+        let sleep = Duration::from_nanos(until.since(now).0);
+        let timeout = Timespec::try_from(sleep).unwrap_or_default();
         let mut watched: Vec<PollFd<'_>> = Vec::new();
         if let Some(listener) = &self.plug.listener {
             watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN));

@@ -1,12 +1,11 @@
 //! Connections that carry bytes: a serial port, a TCP connection, a pair of sockets within one program.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fd::AsFd;
 use rustix::io::Errno;
 use serialport::SerialPort;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::os::fd::AsFd;
-use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
 /// A connection to a device. An error means that it is gone.
@@ -52,11 +51,28 @@ pub struct SocketLink<S>(S);
 pub type TcpLink = SocketLink<TcpStream>;
 
 /// One end of a wire within the program, for tests and demonstrations; dropping it unplugs the other end.
-pub type MemoryLink = SocketLink<UnixStream>;
+pub type MemoryLink = SocketLink<PairedStream>;
+
+#[cfg(unix)]
+type PairedStream = std::os::unix::net::UnixStream;
+#[cfg(not(unix))]
+type PairedStream = TcpStream;
+
+#[cfg(unix)]
+fn stream_pair() -> io::Result<(PairedStream, PairedStream)> {
+    PairedStream::pair()
+}
+
+#[cfg(not(unix))]
+fn stream_pair() -> io::Result<(PairedStream, PairedStream)> {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0")?;
+    let one = TcpStream::connect(listener.local_addr()?)?;
+    Ok((one, listener.accept()?.0))
+}
 
 /// Both ends of a wire.
 pub fn memory_link_pair() -> (MemoryLink, MemoryLink) {
-    let (one, other) = UnixStream::pair().expect("the operating system has a pair of sockets");
+    let (one, other) = stream_pair().expect("the operating system has a pair of sockets");
     for end in [&one, &other] {
         end.set_nonblocking(true).expect("a new socket takes its settings");
     }
@@ -72,12 +88,10 @@ impl TcpLink {
 }
 
 impl<S: AsFd> SocketLink<S> {
-    /// Waits for one of `flags`. `poll` counts nanoseconds where a socket's own timeout counts the kernel's ticks.
+    /// Waits for one of `flags`. `poll` counts nanoseconds where a socket's own timeout counts the kernel's ticks; on Windows it
+    /// counts milliseconds.
     fn wait(&self, flags: PollFlags, wait: Duration) -> io::Result<()> {
-        let timeout = Timespec {
-            tv_sec: i64::try_from(wait.as_secs()).unwrap_or(i64::MAX),
-            tv_nsec: i64::from(wait.subsec_nanos()),
-        };
+        let timeout = Timespec::try_from(wait).map_err(|_| ErrorKind::InvalidInput)?;
         let mut watched = [PollFd::from_borrowed_fd(self.0.as_fd(), flags)];
         match poll(&mut watched, Some(&timeout)) {
             Ok(_) | Err(Errno::INTR) => Ok(()),

@@ -152,7 +152,16 @@ pub(super) struct HostTimes {
 /// Reads the computer's clocks.
 pub(super) type HostClock = Arc<dyn Fn() -> HostTimes + Send + Sync>;
 
-/// The clocks of the system (clock_gettime(2)). Without a clock that counts suspended time, suspension is not noticed.
+/// Without two clocks of which one counts suspended time, suspension is not noticed by them, but by the wall clock.
+#[cfg(not(target_os = "linux"))]
+pub(super) fn host_times() -> HostTimes {
+    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    let all = START.elapsed();
+    HostTimes { wall: SystemTime::now(), awake: all, all }
+}
+
+/// The clocks of the system (clock_gettime(2)).
+#[cfg(target_os = "linux")]
 pub(super) fn host_times() -> HostTimes {
     use rustix::time::{ClockId, clock_gettime};
     let read = |id| {
@@ -160,11 +169,8 @@ pub(super) fn host_times() -> HostTimes {
         let secs = u64::try_from(time.tv_sec).unwrap_or(0);
         Duration::new(secs, u32::try_from(time.tv_nsec).unwrap_or(0))
     };
-    #[cfg(target_os = "linux")]
-    let all = ClockId::Boottime;
-    #[cfg(not(target_os = "linux"))]
-    let all = ClockId::Monotonic;
-    HostTimes { wall: SystemTime::now(), awake: read(ClockId::Monotonic), all: read(all) }
+    let (awake, all) = (read(ClockId::Monotonic), read(ClockId::Boottime));
+    HostTimes { wall: SystemTime::now(), awake, all }
 }
 
 /// The wall clock, to date what is recorded.

@@ -3,8 +3,7 @@
 use super::frames::{FOOTER_BYTES, FRAME_BYTES_MAX, FRAME_HEADER_BYTES, Fields};
 use mcap::records::op;
 use std::fs::File;
-use std::io;
-use std::os::unix::fs::FileExt;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Bytes per read while searching a file.
@@ -48,7 +47,14 @@ impl LogFile {
     fn fill(&self, buffer: &mut Vec<u8>, offset: u64, count: usize) -> io::Result<()> {
         let count = count.min(usize::try_from(self.length.saturating_sub(offset)).unwrap_or(count));
         buffer.resize(count, 0);
-        self.file.read_exact_at(buffer, offset)
+        self.read_at(buffer, offset)
+    }
+
+    /// Moves the file's own position, so one thread at a time reads.
+    fn read_at(&self, buffer: &mut [u8], offset: u64) -> io::Result<()> {
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(offset))?;
+        file.read_exact(buffer)
     }
 
     pub fn begins_with(&self, bytes: &[u8]) -> io::Result<bool> {
@@ -78,7 +84,7 @@ impl LogFile {
         if body > self.length {
             return Ok(Err(FrameError::PastEnd));
         }
-        self.file.read_exact_at(&mut header, offset)?;
+        self.read_at(&mut header, offset)?;
         let [opcode, length @ ..] = header;
         let length = u64::from_le_bytes(length);
         if length > self.length - body {

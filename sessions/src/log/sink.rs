@@ -1,11 +1,12 @@
 //! Output of a log: appends bytes, synchronises them with the disk, and checks that they are still there.
 
-use crate::folder::{SPARE_FILE, create_folder, segment_file};
+use crate::folder::{SPARE_FILE, create_folder, segment_file, sync_folder_of};
 use crate::text::crc32_of_file;
+use same_file::Handle;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Difference between a file and what was written to it, caused by another program or a failing disk.
@@ -112,8 +113,8 @@ impl SegmentSource for FolderSegments {
 #[derive(Debug)]
 pub struct FileSink {
     file: File,
-    /// The file's folder, until the first synchronisation.
-    folder: Option<File>,
+    /// Whether the file's name survives a power cut.
+    is_named: bool,
     written: WrittenFile,
 }
 
@@ -121,19 +122,14 @@ impl FileSink {
     /// Fails if the file exists.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => File::open(parent)?,
-            _ => File::open(".")?,
-        };
-        let own = file.metadata()?;
         let written = WrittenFile {
             // The current folder of the process may change.
             path: std::path::absolute(path)?,
-            id: (own.dev(), own.ino()),
+            id: Arc::new(Handle::from_file(file.try_clone()?)?),
             bytes: 0,
             sum: crc32fast::Hasher::new(),
         };
-        Ok(Self { file, folder: Some(folder), written })
+        Ok(Self { file, is_named: false, written })
     }
 }
 
@@ -148,9 +144,9 @@ impl Sink for FileSink {
     fn sync(&mut self) -> io::Result<()> {
         self.file.sync_data()?;
         // The name of a new file survives a power cut only if its folder is synchronised (fsync(2)).
-        if let Some(folder) = &self.folder {
-            folder.sync_all()?;
-            self.folder = None;
+        if !self.is_named {
+            sync_folder_of(&self.written.path)?;
+            self.is_named = true;
         }
         Ok(())
     }
@@ -160,8 +156,7 @@ impl Sink for FileSink {
     }
 
     fn free_bytes(&self) -> Option<u64> {
-        let disk = rustix::fs::fstatvfs(&self.file).ok()?;
-        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+        fs4::available_space(self.written.path.parent()?).ok()
     }
 }
 
@@ -169,8 +164,8 @@ impl Sink for FileSink {
 #[derive(Clone, Debug)]
 pub struct WrittenFile {
     path: PathBuf,
-    /// Device and inode.
-    id: (u64, u64),
+    /// Which file it is, whatever its name.
+    id: Arc<Handle>,
     bytes: u64,
     /// CRC-32 of them.
     sum: crc32fast::Hasher,
@@ -179,11 +174,11 @@ pub struct WrittenFile {
 impl WrittenFile {
     /// Quick check of name and length.
     pub fn check(&self) -> Result<(), Alteration> {
-        let there = std::fs::metadata(&self.path).map_err(unreadable)?;
-        if (there.dev(), there.ino()) != self.id {
+        let there = Handle::from_path(&self.path).map_err(unreadable)?;
+        if there != *self.id {
             return Err(Alteration::Replaced);
         }
-        match there.len() {
+        match there.as_file().metadata().map_err(unreadable)?.len() {
             found if found == self.bytes => Ok(()),
             found => Err(Alteration::Length { found, written: self.bytes }),
         }

@@ -8,12 +8,12 @@ use crate::analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisContent};
 use crate::chain::{self, ChainError};
 use crate::contacts::contacts;
 use crate::edits::{EDITS_FILE, Edit, EditChange, Edits};
-use crate::folder::file_beside;
+use crate::folder::{file_beside, sync_folder};
 use crate::import_origin::{ImportOrigin, ORIGINAL_FOLDER};
 use crate::manifest::Manifest;
 use crate::text::crc32_of_file;
 use serde::Serialize;
-use std::fs::{self, File};
+use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -129,10 +129,11 @@ fn copy_files(from: &Path, to: &Path) -> io::Result<()> {
         if item.file_type()?.is_file() {
             let copy = to.join(item.file_name());
             fs::copy(item.path(), &copy)?;
-            File::open(&copy)?.sync_all()?;
+            // Windows synchronises only what may be written.
+            OpenOptions::new().append(true).open(&copy)?.sync_all()?;
         }
     }
-    File::open(to)?.sync_all()
+    sync_folder(to)
 }
 
 /// One sentence for each damaged file.

@@ -170,7 +170,8 @@ pub fn recover(
 }
 
 /// Excludes other recoveries of the session; waits a little for another one. The lock is on the folder itself, so it needs no
-/// file and is the same for every path into the folder. On a file system without locks, nothing is excluded.
+/// file and is the same for every path into the folder. On a file system without locks, and on Windows, where folders have none,
+/// nothing is excluded.
 fn lock_recovery(path: &Path) -> Result<Option<File>, RecoverError> {
     let Ok(session) = File::open(session_folder(path)) else {
         // Reading the session reports the error.

@@ -3,7 +3,7 @@
 use super::ExportError;
 use palpate_sessions::atomic::{Draft, ExistingFile};
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::Path;
 
 /// Result of writing a file that may exist.
@@ -45,11 +45,12 @@ pub(crate) fn write_or_same(
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), ExportError>,
 ) -> Result<WriteOutcome, ExportError> {
     let (draft, ()) = fill_draft(path, fill)?;
-    let written = File::open(draft.hidden_path()).map_err(io_error(path))?;
+    let mut written = draft.reader().map_err(io_error(path))?;
     match draft.persist(ExistingFile::Keep) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {}
         outcome => return outcome.map(|()| WriteOutcome::Written).map_err(io_error(path)),
     }
+    written.rewind().map_err(io_error(path))?;
     match same_content(&written, &File::open(path).map_err(io_error(path))?)
         .map_err(io_error(path))?
     {
