@@ -13,7 +13,7 @@ use palpate_sessions::analyses::{
     Analyses, Analysis, AnalysisContent, AnalysisError, AnalysisInput, changed_inputs,
     document_input, read_session_inputs,
 };
-use palpate_sessions::{LogEntry, ReadError, SampleRow, Session, SessionOutline};
+use palpate_sessions::{LogEntry, Manifest, ReadError, SampleRow, Session, SessionOutline};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -109,11 +109,9 @@ impl AnalysedSession {
         let Some(first) = session.rows.first().copied() else {
             return;
         };
-        let times: Vec<f64> =
-            session.rows.iter().map(|row| time_between(session, &first, row).0).collect();
-        for (row, at) in session.rows.iter_mut().zip(times) {
-            let is_in = |[from, to]: &[f64; 2]| (*from..=*to).contains(&at);
-            if self.left_out_s.iter().any(is_in) {
+        for row in &mut session.rows {
+            let at = time_between(&session.manifest, &first, row);
+            if is_left_out(&self.left_out_s, at) {
                 row.force = None;
             }
         }
@@ -143,9 +141,14 @@ fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
 }
 
 /// Controller time from one sample to a later one.
-pub(super) fn time_between(session: &Session, first: &SampleRow, row: &SampleRow) -> Seconds {
+pub(super) fn time_between(manifest: &Manifest, first: &SampleRow, row: &SampleRow) -> Seconds {
     let ticks = row.tick.saturating_sub(first.tick);
-    session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
+    manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
+}
+
+/// Whether a time since the first sample is in one of these stretches.
+fn is_left_out(left_out_s: &[[f64; 2]], at: Seconds) -> bool {
+    left_out_s.iter().any(|[from, to]| (*from..=*to).contains(&at.0))
 }
 
 /// Recalculates forces: a curve, and the tares, each with the number of samples before it.
@@ -253,6 +256,28 @@ impl StreamedAnalysis {
             for row in &mut own {
                 row.force = recalibration.force(index, row).or(row.force);
                 index += 1;
+            }
+            visit(&own);
+        })
+    }
+
+    /// The same without the forces that do not count, for tables, which know no weights.
+    pub fn table_rows(
+        &self,
+        path: &Path,
+        visit: &mut dyn FnMut(&[SampleRow]),
+    ) -> Result<(), ReadError> {
+        if self.left_out_s.is_empty() {
+            return self.rows(path, visit);
+        }
+        let manifest = &self.edited.outline.manifest;
+        let (mut first, mut own) = (None, Vec::new());
+        self.rows(path, &mut |rows| {
+            own.clear();
+            own.extend_from_slice(rows);
+            for row in &mut own {
+                let at = time_between(manifest, first.get_or_insert(*row), row);
+                row.force = row.force.filter(|_| !is_left_out(&self.left_out_s, at));
             }
             visit(&own);
         })

@@ -6,6 +6,7 @@ use super::catalog::use_updated_catalog;
 use super::output::Output;
 use chrono::{DateTime, Utc};
 use clap::Args;
+use palpate_analysis::catalog_search::find;
 use palpate_analysis::report::catalog as report;
 use palpate_sessions::catalog::{
     CatalogOrder, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end, parse_start,
@@ -98,13 +99,7 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
         skip: limit.saturating_mul(page - 1),
         limit: Some(limit),
     };
-    let (found, doubts) = use_updated_catalog(&library, output, |catalog| {
-        let found = catalog.find(&query)?;
-        let is_none = found.count == 0;
-        let doubts =
-            if is_none { catalog.condition_warnings(&query.conditions)? } else { Vec::new() };
-        Ok((found, doubts))
-    })?;
+    let (found, doubts) = use_updated_catalog(&library, output, |catalog| find(catalog, &query))?;
     doubts.iter().for_each(|doubt| output.note(doubt));
     let pages = found.count.div_ceil(limit);
     let object = serde_json::json!({
