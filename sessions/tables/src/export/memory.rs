@@ -48,6 +48,12 @@ impl SampleTable {
         })
     }
 
+    /// Units and provenance, as in files.
+    pub fn metadata(&self) -> Vec<(String, String)> {
+        let pairs = self.metadata.iter();
+        pairs.map(|(key, text)| (key.to_string(), text.to_string())).collect()
+    }
+
     /// A column of numbers, NaN where a cell is empty; `None` for text and for an unknown name.
     pub fn numbers(&self, name: &str) -> Option<Vec<f64>> {
         let mut numbers = Vec::with_capacity(self.rows());

@@ -1,0 +1,49 @@
+"""Runs on the simulated rig."""
+import palpate
+import pytest
+
+SHORT = {"depth": 4, "hold": 3, "speed": 3, "seed": 5, "time_scale": "max"}
+
+
+def test_a_run_is_that_of_the_command(command, tmp_path):
+    samples = []
+    run = palpate.run("ramp-hold", on_sample=lambda *one: samples.append(one), out=tmp_path / "ours", **SHORT)
+    snapshots = list(run)
+    assert snapshots[-1]["ending"] == "finish" and snapshots[-1]["fraction"] == 1.0
+    times = [one["t_s"] for one in snapshots]
+    assert times == sorted(times) and len(samples) == len(snapshots)
+    report = command("run", "ramp-hold", "--depth", "4", "--hold", "3", "--speed", "3", "--seed", "5",
+                     "--time-scale", "max", "--out", tmp_path / "theirs")
+    assert run.report.keys() == report.keys()
+    differing = {key for key in report if run.report[key] != report[key]}
+    assert differing <= {"session"}
+    ours, theirs = run.session.samples("numpy"), palpate.open(tmp_path / "theirs").samples("numpy")
+    assert all((ours[name] == theirs[name]).sum() + (ours[name] != ours[name]).sum() == len(ours[name]) for name in ours)
+
+
+def test_a_run_is_stopped_and_its_data_kept(tmp_path):
+    run = palpate.run("ramp-hold", out=tmp_path / "stopped", **{**SHORT, "time_scale": "20"})
+    for snapshot in run:
+        if snapshot["samples"] > 1000:
+            run.stop()
+            break
+    assert run.wait()["ending"] == "stop"
+    assert len(run.session) > 1000 and run.session.end["outcome"] == "stop"
+
+
+def test_a_closed_run_lets_go_of_the_rig(tmp_path):
+    with palpate.run("ramp-hold", rig="sim:bench", out=tmp_path / "first", **{**SHORT, "time_scale": "1"}) as run:
+        assert next(run)["ending"] is None
+        with pytest.raises(palpate.PalpateError, match="rig bench: "):
+            palpate.run("ramp-hold", rig="sim:bench", out=tmp_path / "second", **SHORT)
+    assert palpate.run("ramp-hold", rig="sim:bench", out=tmp_path / "third", **SHORT).wait()["ending"] == "finish"
+    with pytest.raises(palpate.PalpateError, match="the run has ended"):
+        run.stop()
+
+
+def test_a_run_that_does_not_finish_is_an_error(tmp_path):
+    # The tissue is twenty times as stiff, so the interlock of the force trips.
+    run = palpate.run("ramp-hold", out=tmp_path / "tripped", **{**SHORT, "depth": 30, "stiffness": 2000})
+    with pytest.raises(palpate.PalpateError, match="the data so far is in"):
+        run.wait()
+    assert run.report["ending"] == "interlock"
