@@ -39,7 +39,7 @@ class Library:
         text, remarks = _native.find(os.fspath(self.folder), query, _frames.arguments(options), is_paged)
         _frames.remark(remarks)
         columns: List[str] = list(json.loads(_native.entry_fields()))
-        return _frames.of_records(json.loads(text)["sessions"], columns, kind)
+        return _frames.of_records(json.loads(text), columns, kind)
 
     def open(self, folder: str, analysis: Optional[str] = None) -> Session:
         """Opens a session by its folder below the library, as :meth:`find` lists it."""

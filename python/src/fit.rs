@@ -129,7 +129,7 @@ fn joint_answer(
     let report = serde_json::to_string(&fitted.object(options, &details)).map_err(refused)?;
     let pairs = records.all.iter().zip(&fitted.overlays);
     let curves =
-        pairs.map(|(one, overlay)| FittedCurve::of(&one.samples, Seconds::default(), overlay));
+        pairs.map(|(one, overlay)| FittedCurve::of(&one.samples, Seconds(0.0), overlay));
     Ok(FitAnswer { report, curves: curves.collect(), notes: fitted.notes })
 }
 

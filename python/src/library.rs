@@ -5,7 +5,6 @@ use palpate_analysis::catalog_search;
 use palpate_sessions::catalog::{Catalog, CatalogEntry};
 use palpate_sessions::library_folder;
 use pyo3::prelude::*;
-use serde_json::json;
 use std::path::PathBuf;
 
 /// The library without a name: `PALPATE_HOME` or `~/palpate`.
@@ -50,11 +49,7 @@ pub fn find(
         });
         let (page, doubts) = found.map_err(refused)?;
         remarks.extend(doubts);
-        let object = json!({ "count": page.count });
-        let mut text = object.to_string();
-        // The entries keep the order of their fields, which a value of JSON would not.
-        let sessions = serde_json::to_string(&page.entries).map_err(refused)?;
-        text.truncate(text.len() - 1);
-        Ok((format!("{text},\"sessions\":{sessions}}}"), remarks))
+        let text = serde_json::to_string(&page.entries).map_err(refused)?;
+        Ok((text, remarks))
     })
 }
