@@ -3,6 +3,7 @@
 use crate::error::refused;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use palpate_analysis::compliance::ComplianceCorrections;
+use palpate_analysis::edits::author;
 use palpate_analysis::fit::{
     BOOTSTRAP_REPEATS_MIN, FitChoice, FitRecipe, IntervalRequest, JointFitRequest, SourceFit,
     fit_together,
@@ -13,7 +14,6 @@ use palpate_analysis::session_actions::{Attribution, FitSettings, FitToStore, st
 use palpate_analysis::source::{FitSource, RecordStretch, SourceSelection};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_rheology::fit::{Bootstrap, FitOptions, FitSample};
-use palpate_sessions::edits::author;
 use palpate_sessions::library_folder;
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -128,8 +128,7 @@ fn joint_answer(
     let details = fitted.details(&records);
     let report = serde_json::to_string(&fitted.object(options, &details)).map_err(refused)?;
     let pairs = records.all.iter().zip(&fitted.overlays);
-    let curves =
-        pairs.map(|(one, overlay)| FittedCurve::of(&one.samples, Seconds(0.0), overlay));
+    let curves = pairs.map(|(one, overlay)| FittedCurve::of(&one.samples, Seconds(0.0), overlay));
     Ok(FitAnswer { report, curves: curves.collect(), notes: fitted.notes })
 }
 

@@ -25,6 +25,7 @@ mod _native {
     use super::run::NativeRun;
     #[pymodule_export]
     use super::session::{NativeSession, NativeTable};
+    #[expect(non_upper_case_globals, reason = "Python's name for it")]
     #[pymodule_export]
     const __version__: &str = env!("CARGO_PKG_VERSION");
 }

@@ -36,7 +36,8 @@ pub fn find(
             library.display()
         )));
     }
-    let mut query = palpate_cli::find_query(&line, &options).map_err(|err| refused(err.sentence()))?;
+    let mut query =
+        palpate_cli::find_query(&line, &options).map_err(|err| refused(err.sentence()))?;
     if !is_paged {
         (query.skip, query.limit) = (0, None);
     }

@@ -92,7 +92,8 @@ impl NativeRun {
         loop {
             py.check_signals()?;
             let found = py.detach(|| self.run().next(PATIENCE));
-            let found: Option<Arc<RunnerSnapshot>> = found.map_err(|err| refused(err.sentence()))?;
+            let found: Option<Arc<RunnerSnapshot>> =
+                found.map_err(|err| refused(err.sentence()))?;
             let Some(snapshot) = found else { continue };
             let Some(view) = &snapshot.run else { continue };
             let ended = view.outcome.is_some().then(|| {
