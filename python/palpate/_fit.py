@@ -272,12 +272,14 @@ def fit(
     ``profile`` adds intervals of the profile likelihood, ``bootstrap`` those of so many repeats.
 
     >>> import numpy as np
-    >>> t = np.arange(0, 60, 0.01)
+    >>> t = np.linspace(0, 60, 6001)
     >>> depth = np.minimum(0.75 * t, 20)
-    >>> force = 0.02 * depth + 0.003 * depth**2 * np.exp(-t / 40)
-    >>> found = palpate.fit(t, depth, force, family="prony-2", fixed={"f_offset": 0})
-    >>> found["samples"], found["family"]
-    (6000, 'prony-2')
+    >>> relaxing = 0.05 + 0.05 * np.exp(-t / 4)
+    >>> noise = np.random.default_rng(1).normal(0, 0.005, len(t))
+    >>> force = np.convolve(np.gradient(depth), relaxing)[:len(t)] + noise
+    >>> found = palpate.fit(t, depth, force, family="prony-1", sigma=0.005, fixed={"f_offset": 0})
+    >>> found["samples"], round(found.parameters["tau_1"].value, 1)
+    (6001, 4.0)
     """
     records = _records(t, depth, force, sigma)
     if share is not None and len(records) < 2:

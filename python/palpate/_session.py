@@ -34,7 +34,7 @@ class Session:
 
     >>> session = palpate.open("demo")
     >>> session
-    Session demo: ramp-hold, 43... samples
+    Session demo: ramp-hold, ... samples
     >>> session.manifest["plan"]["name"]
     'ramp-hold'
     """
@@ -192,6 +192,6 @@ def open(path: "str | os.PathLike[str]", analysis: Optional[str] = None) -> Sess
     >>> palpate.open("nowhere")
     Traceback (most recent call last):
         ...
-    palpate.PalpateError: nowhere does not exist; ...
+    palpate.PalpateError: no session exists at nowhere; check the path
     """
     return Session(path, analysis)

@@ -13,7 +13,7 @@ def test_the_command_is_installed_and_of_the_same_version(command):
 
 def test_exit_codes_and_sentences_are_those_of_the_program(tmp_path):
     done = subprocess.run([sys.executable, "-m", "palpate", "info", tmp_path / "no"], capture_output=True, text=True)
-    assert done.returncode == 2 and done.stderr.startswith("error: ") and "does not exist" in done.stderr
+    assert done.returncode == 2 and done.stderr.startswith("error: ") and "no session exists at" in done.stderr
     done = subprocess.run([sys.executable, "-m", "palpate"], capture_output=True, text=True)
     assert done.returncode == 2 and "without its window" in done.stderr
 

@@ -42,8 +42,16 @@ def test_a_closed_run_lets_go_of_the_rig(tmp_path):
 
 
 def test_a_run_that_does_not_finish_is_an_error(tmp_path):
-    # The tissue is twenty times as stiff, so the interlock of the force trips.
-    run = palpate.run("ramp-hold", out=tmp_path / "tripped", **{**SHORT, "depth": 30, "stiffness": 2000})
-    with pytest.raises(palpate.PalpateError, match="the data so far is in"):
+    # What is ten times as stiff as tissue trips the interlock of the force.
+    run = palpate.run("ramp-hold", out=tmp_path / "hard", **{**SHORT, "depth": 20, "stiffness": 1000})
+    with pytest.raises(palpate.PalpateError, match="force interlock: .*; the data so far is in"):
         run.wait()
-    assert run.report["ending"] == "interlock"
+    assert run.report["ending"] == "interlock" and len(run.session) > 1000
+
+
+def test_unloading_is_recorded_and_fitted(command, tmp_path):
+    run = palpate.run("ramp-hold", out=tmp_path / "unloaded", profile="ideal", unload=1.5, **{**SHORT, "depth": 8})
+    run.wait()
+    fit = run.session.fit("unloading-3", unload=True)
+    theirs = command("fit", tmp_path / "unloaded", "--family", "unloading-3", "--unload")
+    assert [one["value"] for one in fit["parameters"]] == pytest.approx([one["value"] for one in theirs["parameters"]], rel=1e-12)
