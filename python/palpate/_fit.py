@@ -182,10 +182,9 @@ def wish(
     for name, value in (fixed or {}).items():
         if isinstance(value, bool) or not isinstance(value, numbers.Real):
             raise PalpateError(f"{name} cannot be fixed at {value!r}; give a number")
-    for name, number in (("bootstrap", bootstrap), ("seed", seed)):
-        is_whole = isinstance(number, numbers.Integral) and not isinstance(number, bool)
-        if not (is_whole and 0 <= number < 2**63) and not (name == "bootstrap" and number is None):
-            raise PalpateError(f"{name} cannot be {number!r}; give a whole number from 0")
+    counts = {"seed": seed} if bootstrap is None else {"bootstrap": bootstrap, "seed": seed}
+    for name, number in counts.items():
+        check_whole(number, name)
     return {
         "family": family,
         "fixed": [(str(name), float(value)) for name, value in (fixed or {}).items()],
@@ -194,6 +193,13 @@ def wish(
         "bootstrap": bootstrap,
         "seed": seed,
     }
+
+
+def check_whole(value: object, what: str) -> int:
+    """A whole number from 0, or an error."""
+    if not isinstance(value, numbers.Integral) or isinstance(value, bool) or not 0 <= int(value) < 2**63:
+        raise PalpateError(f"{what} cannot be {value!r}; give a whole number from 0")
+    return int(value)
 
 
 def names_of(names: Union[None, str, Sequence[str]]) -> List[str]:

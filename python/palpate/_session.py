@@ -15,10 +15,8 @@ from ._native import NativeSession, PalpateError, fit_session
 
 def _whole(values: Union[None, int, Sequence[int]], what: str) -> List[int]:
     listed = [] if values is None else list(values) if isinstance(values, (list, tuple, range)) else [values]
-    for number in listed:
-        if not isinstance(number, numbers.Integral) or not 0 <= number < 2**32:
-            raise PalpateError(f"{what} cannot be {number!r}; give a whole number from 0")
-    return [int(number) for number in listed]
+    # More cycles than a number of 32 bits counts are in no session.
+    return [min(_fit.check_whole(number, what), 2**32 - 1) for number in listed]
 
 
 def _seconds(value: Optional[float], what: str) -> Optional[float]:
@@ -66,7 +64,8 @@ class Session:
     @property
     def end(self) -> Optional[Dict[str, Any]]:
         """How the recording ended; None if it was interrupted."""
-        return json.loads(self._native.end())
+        end: Optional[Dict[str, Any]] = json.loads(self._native.end())
+        return end
 
     @property
     def notes(self) -> List[str]:
@@ -82,12 +81,14 @@ class Session:
         >>> len(found), found[0]["kind"]
         (1, 'decision')
         """
-        return json.loads(self._native.events())
+        events: List[Dict[str, Any]] = json.loads(self._native.events())
+        return events
 
     @property
     def edits(self) -> List[Dict[str, Any]]:
         """Verdicts, corrections, tags and notes that were added to the session."""
-        return json.loads(self._native.edits())
+        edits: List[Dict[str, Any]] = json.loads(self._native.edits())
+        return edits
 
     @property
     def fits(self) -> Dict[str, Fit]:
@@ -127,14 +128,13 @@ class Session:
         (['t_s', 'force_N'], True)
         """
         kind = _frames.chosen(frame)
-        every = _whole(decimate, "decimate")
         selection = {
             "columns": _fit.names_of(columns),
             "phases": _fit.names_of(phase),
             "cycles": _whole(cycle, "cycle"),
             "from_s": _seconds(from_s, "from_s"),
             "until_s": _seconds(until_s, "until_s"),
-            "decimate": every[0] if len(every) == 1 else 0,
+            "decimate": _fit.check_whole(decimate, "decimate"),
         }
         return _frames.of_table(self._native.samples(selection, kind in ("pandas", "arrow")), kind)
 

@@ -6,12 +6,15 @@
 A task whose worker or whose palpate is killed begins again, and goes on where it was, for fits that are in the lake are
 passed over. A session that cannot be fitted is no reason to begin again: the shard is named, and the exit code is 1.
 """
+from __future__ import annotations
+
 import argparse
 import json
 import os
 import subprocess
 import sys
 import time
+from typing import Any, Dict, List, Optional, Tuple
 
 try:
     import ray
@@ -23,7 +26,7 @@ class Killed(Exception):
     """palpate was ended by a signal: by the system, for want of memory, or by a person."""
 
 
-def fit_shard(command):
+def fit_shard(command: List[str]) -> Tuple[int, Dict[str, Any], str]:
     """Runs one shard. Its exit code, its report, and what it said on standard error."""
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode < 0:
@@ -32,7 +35,7 @@ def fit_shard(command):
     return done.returncode, report, done.stderr.strip()
 
 
-def arguments(words):
+def arguments(words: Optional[List[str]]) -> argparse.Namespace:
     usage = "python -m palpate.ray LAKE --shards N [--palpate PATH] [--address A | --workers N] [--cpus N] [--retries N] [-- FIT OPTIONS]"
     parser = argparse.ArgumentParser(usage=usage, description=__doc__)
     parser.add_argument("lake", metavar="LAKE", help="folder of a lake, on a file system that all computers share")
@@ -53,7 +56,7 @@ def arguments(words):
     return args
 
 
-def begin(args):
+def begin(args: argparse.Namespace) -> None:
     quiet = {"log_to_driver": False, "logging_level": "ERROR"}
     if args.address:
         ray.init(address=args.address, **quiet)
@@ -62,7 +65,7 @@ def begin(args):
         ray.init(num_cpus=cpus, include_dashboard=False, **quiet)
 
 
-def main(words=None):
+def main(words: Optional[List[str]] = None) -> int:
     args = arguments(words)
     if ray is None:
         print("error: Ray is not installed; install it with pip install 'palpate[ray]'", file=sys.stderr)

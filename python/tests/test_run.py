@@ -50,7 +50,9 @@ def test_a_run_that_does_not_finish_is_an_error(tmp_path):
 
 
 def test_unloading_is_recorded_and_fitted(command, tmp_path):
-    run = palpate.run("ramp-hold", out=tmp_path / "unloaded", profile="ideal", unload=1.5, **{**SHORT, "depth": 8})
+    # Slow enough for the probe to stay in contact.
+    slow = {**SHORT, "depth": 20, "unload": 0.3, "softening": 40, "profile": "ideal"}
+    run = palpate.run("ramp-hold", out=tmp_path / "unloaded", **slow)
     run.wait()
     fit = run.session.fit("unloading-3", unload=True)
     theirs = command("fit", tmp_path / "unloaded", "--family", "unloading-3", "--unload")

@@ -374,13 +374,22 @@ mod tests {
         let id = opened.edited.session.manifest.session_id.clone();
         let made = record("heavier", "Ada", "", inputs, what);
         palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
-        for name in [None, Some("heavier")] {
-            let opened = open(&path, name).unwrap().edited.session;
+        let what = AnalysisContent::Mask { left_out_s: vec![[85.0, 86.0], [90.0, 90.5]] };
+        let made = record("knock", "Ada", "", opened.inputs(&path, None).unwrap(), what);
+        palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
+        for name in [None, Some("heavier"), Some("knock")] {
+            let mut analysed = open(&path, name).unwrap();
+            let opened = analysed.edited.session.clone();
             let passing = stream_analysed(&path, name).unwrap();
-            assert_eq!(passing.is_changed(), name.is_some());
+            assert_eq!(passing.is_changed(), name == Some("heavier"));
             let mut rows = Vec::new();
             passing.rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();
             assert!(rows == opened.rows);
+            analysed.blank();
+            rows.clear();
+            passing.table_rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();
+            assert!(rows == analysed.edited.session.rows);
+            assert_eq!(rows == opened.rows, name != Some("knock"));
             let outline = &passing.edited.outline;
             assert_eq!(outline.notes, opened.notes);
             assert_eq!(outline.manifest, opened.manifest);
