@@ -1,4 +1,8 @@
 """Runs on the simulated rig."""
+import signal
+import subprocess
+import sys
+
 import palpate
 import pytest
 
@@ -57,3 +61,28 @@ def test_unloading_is_recorded_and_fitted(command, tmp_path):
     fit = run.session.fit("unloading-3", unload=True)
     theirs = command("fit", tmp_path / "unloaded", "--family", "unloading-3", "--unload")
     assert [one["value"] for one in fit["parameters"]] == pytest.approx([one["value"] for one in theirs["parameters"]], rel=1e-12)
+
+
+PROGRAM = """
+import sys, palpate
+run = palpate.run("ramp-hold", out=sys.argv[1])
+print(next(run)["phase"], flush=True)
+if sys.argv[2] == "interrupted":
+    run.wait()
+"""
+
+
+@pytest.mark.parametrize("ending", ["left", "interrupted"])
+def test_the_rig_stops_when_its_program_ends(ending, tmp_path):
+    process = subprocess.Popen([sys.executable, "-c", PROGRAM, tmp_path / ending, ending], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"self-test\n"
+    if ending == "interrupted":
+        process.send_signal(signal.SIGINT)
+    assert (process.wait(timeout=30) == 0) == (ending == "left")
+    process.stdout.close()
+    assert palpate.open(tmp_path / ending).end["outcome"] == "stop"
+
+
+def test_a_run_that_nobody_holds_is_stopped(tmp_path):
+    next(palpate.run("ramp-hold", out=tmp_path / "dropped"))
+    assert palpate.open(tmp_path / "dropped").end["outcome"] == "stop"
