@@ -13,7 +13,7 @@ use palpate_sessions::analyses::{
     Analyses, Analysis, AnalysisContent, AnalysisError, AnalysisInput, changed_inputs,
     document_input, read_session_inputs,
 };
-use palpate_sessions::{LogEntry, ReadError, SampleRow, Session, SessionOutline};
+use palpate_sessions::{LogEntry, Manifest, ReadError, SampleRow, Session, SessionOutline};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -109,11 +109,9 @@ impl AnalysedSession {
         let Some(first) = session.rows.first().copied() else {
             return;
         };
-        let times: Vec<f64> =
-            session.rows.iter().map(|row| time_between(session, &first, row).0).collect();
-        for (row, at) in session.rows.iter_mut().zip(times) {
-            let is_in = |[from, to]: &[f64; 2]| (*from..=*to).contains(&at);
-            if self.left_out_s.iter().any(is_in) {
+        for row in &mut session.rows {
+            let at = time_between(&session.manifest, &first, row);
+            if is_left_out(&self.left_out_s, at) {
                 row.force = None;
             }
         }
@@ -143,9 +141,14 @@ fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
 }
 
 /// Controller time from one sample to a later one.
-pub(super) fn time_between(session: &Session, first: &SampleRow, row: &SampleRow) -> Seconds {
+pub(super) fn time_between(manifest: &Manifest, first: &SampleRow, row: &SampleRow) -> Seconds {
     let ticks = row.tick.saturating_sub(first.tick);
-    session.manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
+    manifest.time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
+}
+
+/// Whether a time since the first sample is in one of these stretches.
+fn is_left_out(left_out_s: &[[f64; 2]], at: Seconds) -> bool {
+    left_out_s.iter().any(|[from, to]| (*from..=*to).contains(&at.0))
 }
 
 /// Recalculates forces: a curve, and the tares, each with the number of samples before it.
@@ -257,6 +260,28 @@ impl StreamedAnalysis {
             visit(&own);
         })
     }
+
+    /// The same without the forces that do not count, for tables, which know no weights.
+    pub fn table_rows(
+        &self,
+        path: &Path,
+        visit: &mut dyn FnMut(&[SampleRow]),
+    ) -> Result<(), ReadError> {
+        if self.left_out_s.is_empty() {
+            return self.rows(path, visit);
+        }
+        let manifest = &self.edited.outline.manifest;
+        let (mut first, mut own) = (None, Vec::new());
+        self.rows(path, &mut |rows| {
+            own.clear();
+            own.extend_from_slice(rows);
+            for row in &mut own {
+                let at = time_between(manifest, first.get_or_insert(*row), row);
+                row.force = row.force.filter(|_| !is_left_out(&self.left_out_s, at));
+            }
+            visit(&own);
+        })
+    }
 }
 
 /// A new recalibration of a session: its record and its effect on the forces.
@@ -349,13 +374,22 @@ mod tests {
         let id = opened.edited.session.manifest.session_id.clone();
         let made = record("heavier", "Ada", "", inputs, what);
         palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
-        for name in [None, Some("heavier")] {
-            let opened = open(&path, name).unwrap().edited.session;
+        let what = AnalysisContent::Mask { left_out_s: vec![[85.0, 86.0], [90.0, 90.5]] };
+        let made = record("knock", "Ada", "", opened.inputs(&path, None).unwrap(), what);
+        palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
+        for name in [None, Some("heavier"), Some("knock")] {
+            let mut analysed = open(&path, name).unwrap();
+            let opened = analysed.edited.session.clone();
             let passing = stream_analysed(&path, name).unwrap();
-            assert_eq!(passing.is_changed(), name.is_some());
+            assert_eq!(passing.is_changed(), name == Some("heavier"));
             let mut rows = Vec::new();
             passing.rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();
             assert!(rows == opened.rows);
+            analysed.blank();
+            rows.clear();
+            passing.table_rows(&path, &mut |some| rows.extend_from_slice(some)).unwrap();
+            assert!(rows == analysed.edited.session.rows);
+            assert_eq!(rows == opened.rows, name != Some("knock"));
             let outline = &passing.edited.outline;
             assert_eq!(outline.notes, opened.notes);
             assert_eq!(outline.manifest, opened.manifest);

@@ -3,7 +3,8 @@
 use crate::progress::Progress;
 use palpate_runner::Stopwatch;
 use palpate_sessions::catalog::{
-    Catalog, CatalogChanges, CatalogChoices, CatalogEntry, CatalogError, CatalogQuery, HistoryEvent,
+    Catalog, CatalogChanges, CatalogChoices, CatalogEntry, CatalogError, CatalogPage, CatalogQuery,
+    HistoryEvent,
 };
 use palpate_sessions::edits::{Edit, Edits};
 use std::collections::BTreeMap;
@@ -48,6 +49,19 @@ fn with<T>(
         work(catalog)
     });
     done.map_err(|err| err.to_string())
+}
+
+/// Finds a page of sessions in a catalog; where there are none, also the conditions that none can meet.
+pub fn find(
+    catalog: &Catalog,
+    query: &CatalogQuery,
+) -> Result<(CatalogPage, Vec<String>), CatalogError> {
+    let found = catalog.find(query)?;
+    let doubts = match found.count {
+        0 => catalog.condition_warnings(&query.conditions)?,
+        _ => Vec::new(),
+    };
+    Ok((found, doubts))
 }
 
 /// Searches what the catalog knows already: see [`update`].

@@ -1,12 +1,13 @@
 //! Sessions as tables and into lakes, as the command line and the window both write them.
 
+use crate::analysed_session::StreamedAnalysis;
 use crate::edited_session;
 use crate::progress::Progress;
 use crate::source::SourceError;
 use palpate_sessions::recover::is_in_use;
 use palpate_sessions::{Manifest, SessionSummary, atomic};
 use palpate_tables::export::{
-    ExportError, ExtraColumns, RowFeed, SampleSelection, TableExport, TableFormat,
+    ExportError, ExtraColumns, RowFeed, SampleSelection, SampleTable, TableExport, TableFormat,
 };
 use palpate_tables::lake::{self, LakeAddition, LakeQuality};
 use std::collections::BTreeSet;
@@ -96,6 +97,22 @@ pub fn export(
         })
     };
     Ok(target.write(session, &table, &mut feed)?)
+}
+
+/// What is chosen of a session in memory, as one of its analyses has it: the table that [`export`] writes.
+pub fn sample_table(
+    session: &StreamedAnalysis,
+    path: &Path,
+    selection: &SampleSelection,
+) -> Result<SampleTable, ExportFailure> {
+    let outline = &session.edited.outline;
+    let table = TableExport {
+        manifest: &outline.manifest,
+        notes: &outline.notes,
+        extra: &ExtraColumns::default(),
+        selection,
+    };
+    Ok(table.collect(&mut |visit: &mut dyn FnMut(&[_])| session.table_rows(path, visit))?)
 }
 
 /// The name of the session's folder, for its export.

@@ -1,14 +1,16 @@
 //! `palpate find`: searches the sessions of the library.
 
-use super::Failure;
 use super::arguments::{Choice, choice};
 use super::catalog::use_updated_catalog;
 use super::output::Output;
+use super::{Command, Failure};
 use chrono::{DateTime, Utc};
 use clap::Args;
+use palpate_analysis::catalog_search::find;
 use palpate_analysis::report::catalog as report;
 use palpate_sessions::catalog::{
-    CatalogOrder, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end, parse_start,
+    CatalogOrder, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end,
+    parse_query_line, parse_start,
 };
 use palpate_sessions::library_folder;
 use std::num::NonZeroUsize;
@@ -77,34 +79,49 @@ const SORTS: [Choice<CatalogOrder>; 7] = [
     ("review", CatalogOrder::Review, "By review, in alphabetical order"),
 ];
 
+impl FindArgs {
+    fn query(&self) -> CatalogQuery {
+        let limit = self.limit.get();
+        CatalogQuery {
+            words: self.words.join(" "),
+            specimen: self.specimen.clone(),
+            operator: self.operator.clone(),
+            protocol: self.protocol.clone(),
+            rig: self.rig.clone(),
+            cell: self.cell.clone(),
+            since: self.since,
+            before: self.until,
+            conditions: self.conditions.clone(),
+            verdict: self.verdict,
+            review: self.review,
+            tags: self.tags.clone(),
+            order: self.sort,
+            is_reversed: self.reverse,
+            skip: limit.saturating_mul(self.page.get() - 1),
+            limit: Some(limit),
+        }
+    }
+}
+
+/// The query of a line of words and conditions and of options of `palpate find`, for a front end in the same process.
+pub fn find_query(line: &str, options: &[String]) -> Result<CatalogQuery, Failure> {
+    let (words, conditions) = parse_query_line(line).map_err(Failure::usage)?;
+    match super::parse_options("find", options)? {
+        Command::Find(args) => {
+            let mut query = args.query();
+            query.words = format!("{words} {}", query.words);
+            query.conditions.extend(conditions);
+            Ok(query)
+        }
+        _ => Err(Failure::usage("these are not options of 'palpate find'")),
+    }
+}
+
 pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let (limit, page) = (args.limit.get(), args.page.get());
-    let query = CatalogQuery {
-        words: args.words.join(" "),
-        specimen: args.specimen.clone(),
-        operator: args.operator.clone(),
-        protocol: args.protocol.clone(),
-        rig: args.rig.clone(),
-        cell: args.cell.clone(),
-        since: args.since,
-        before: args.until,
-        conditions: args.conditions.clone(),
-        verdict: args.verdict,
-        review: args.review,
-        tags: args.tags.clone(),
-        order: args.sort,
-        is_reversed: args.reverse,
-        skip: limit.saturating_mul(page - 1),
-        limit: Some(limit),
-    };
-    let (found, doubts) = use_updated_catalog(&library, output, |catalog| {
-        let found = catalog.find(&query)?;
-        let is_none = found.count == 0;
-        let doubts =
-            if is_none { catalog.condition_warnings(&query.conditions)? } else { Vec::new() };
-        Ok((found, doubts))
-    })?;
+    let query = args.query();
+    let (found, doubts) = use_updated_catalog(&library, output, |catalog| find(catalog, &query))?;
     doubts.iter().for_each(|doubt| output.note(doubt));
     let pages = found.count.div_ceil(limit);
     let object = serde_json::json!({

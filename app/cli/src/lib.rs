@@ -58,6 +58,9 @@ mod window;
 mod wired;
 mod withdraw;
 
+pub use find::find_query;
+pub use run::{HostedReport, HostedRun};
+
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
@@ -68,6 +71,7 @@ use palpate_analysis::source::SourceError;
 use palpate_analysis::window_requests::WindowOpener;
 use palpate_model::metadata::SessionLabels;
 use palpate_sessions::log::ReadError;
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
@@ -176,7 +180,9 @@ impl Failure {
         }
     }
 
-    fn sentence(&self) -> &str {
+    /// What went wrong and what to do.
+    #[must_use]
+    pub fn sentence(&self) -> &str {
         match self {
             Self::Usage(sentence) | Self::Failed(sentence) => sentence,
         }
@@ -184,28 +190,39 @@ impl Failure {
 }
 
 /// Whether `--json` is given anywhere: among tags, or where the other arguments are wrong.
-fn asks_for_json() -> bool {
-    let mut named = std::env::args_os().take_while(|argument| argument != "--");
+fn asks_for_json(arguments: &[OsString]) -> bool {
+    let mut named = arguments.iter().take_while(|argument| *argument != "--");
     named.any(|argument| argument == "--json")
 }
 
 /// Parses the arguments; a mistake gets one sentence, and one object with `--json`.
-fn parse() -> Result<Cli, ExitCode> {
-    Cli::try_parse().map_err(|err| {
+fn parse(arguments: &[OsString]) -> Result<Cli, u8> {
+    Cli::try_parse_from(arguments).map_err(|err| {
         if !err.use_stderr() || err.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
             // Help and version print themselves; a closed pipe is the reader's choice.
             let _ = err.print();
-            return ExitCode::from(err.exit_code().clamp(0, 2) as u8);
+            return err.exit_code().clamp(0, 2) as u8;
         }
-        let output = Output::new(asks_for_json());
-        let text = err.to_string();
-        // Missing arguments follow on lines of their own.
-        let lines = text.lines().take_while(|line| !line.trim().is_empty());
-        let sentence = lines.map(str::trim).collect::<Vec<_>>().join(" ");
-        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
-        output.error(&format!("{sentence}; see 'palpate --help'"), 2);
-        ExitCode::from(2)
+        let output = Output::new(asks_for_json(arguments));
+        output.error(&format!("{}; see 'palpate --help'", mistake(&err)), 2);
+        2
     })
+}
+
+/// Options of a command, from a front end in the same process that is not a command line.
+fn parse_options(command: &str, options: &[String]) -> Result<Command, Failure> {
+    let words = ["palpate", command].into_iter().chain(options.iter().map(String::as_str));
+    let cli = Cli::try_parse_from(words).map_err(|err| Failure::usage(mistake(&err)))?;
+    cli.command.ok_or_else(|| Failure::usage(format!("'{command}' is not a command")))
+}
+
+/// A mistake in the arguments as one sentence.
+fn mistake(err: &clap::Error) -> String {
+    let text = err.to_string();
+    // Missing arguments follow on lines of their own.
+    let lines = text.lines().take_while(|line| !line.trim().is_empty());
+    let sentence = lines.map(str::trim).collect::<Vec<_>>().join(" ");
+    sentence.strip_prefix("error: ").unwrap_or(&sentence).to_owned()
 }
 
 /// A file that reaches the limit of its size (`ulimit -f`) ends a program by a signal, in the middle of a run. Where
@@ -218,15 +235,21 @@ fn outlive_file_limits() {
 
 const NO_WINDOW: &str = "this palpate was built without its window; 'palpate --help' lists the commands that need no window";
 
-/// Runs the command of the arguments; `windows` opens windows, if this program has any.
+/// Runs the command of the program's arguments; `windows` opens windows, if this program has any.
 pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
+    let arguments: Vec<OsString> = std::env::args_os().collect();
+    ExitCode::from(run_command(&arguments, windows))
+}
+
+/// Runs the command of these arguments, the first of which is the name of the program; its exit code.
+pub fn run_command(arguments: &[OsString], windows: Option<&dyn WindowOpener>) -> u8 {
     #[cfg(unix)]
     outlive_file_limits();
-    let cli = match parse() {
+    let cli = match parse(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let output = Output::new(cli.json || asks_for_json());
+    let output = Output::new(cli.json || asks_for_json(arguments));
     let log = log::begin(cli.verbose);
     log::stop_rigs_on_panic(log.clone());
     let result = match cli.command {
@@ -234,13 +257,13 @@ pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
         Some(command) => command.run(windows, &output),
     };
     let code = match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(failure) => {
             if let Failure::Failed(sentence) = &failure {
                 tracing::error!("{sentence}");
             }
             output.error(failure.sentence(), failure.code());
-            ExitCode::from(failure.code())
+            failure.code()
         }
     };
     if let Some(log) = log {

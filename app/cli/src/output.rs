@@ -5,11 +5,21 @@ use palpate_analysis::progress::Progress;
 use palpate_analysis::report::catalog::one_line;
 use serde::Serialize;
 use serde_json::Value;
+use std::cell::RefCell;
 use std::io::Write;
 use std::ops::ControlFlow;
 
 pub(super) struct Output {
     is_json: bool,
+    /// What is kept instead of printed, for a front end in the same process.
+    kept: Option<RefCell<KeptOutput>>,
+}
+
+/// Objects and remarks of a command.
+#[derive(Debug, Default)]
+pub(super) struct KeptOutput {
+    pub objects: Vec<Value>,
+    pub notes: Vec<String>,
 }
 
 /// A result and the command that it answers.
@@ -22,7 +32,17 @@ struct Answer<'a, T> {
 
 impl Output {
     pub fn new(is_json: bool) -> Self {
-        Self { is_json }
+        Self { is_json, kept: None }
+    }
+
+    /// Prints nothing; [`Self::take`] hands out what would have been printed.
+    pub fn kept() -> Self {
+        Self { is_json: true, kept: Some(RefCell::default()) }
+    }
+
+    /// What was kept so far.
+    pub fn take(&self) -> KeptOutput {
+        self.kept.as_ref().map(RefCell::take).unwrap_or_default()
     }
 
     /// Prints the result of a command: `text` for people, the fields of `result` for machines.
@@ -39,7 +59,9 @@ impl Output {
 
     /// Prints an object, with `--json` only.
     pub fn object(&self, object: &impl Serialize) {
-        if self.is_json {
+        if let Some(kept) = &self.kept {
+            kept.borrow_mut().objects.extend(serde_json::to_value(object));
+        } else if self.is_json {
             let line = serde_json::to_string(object)
                 .unwrap_or_else(|err| format!("{{\"error\":\"{err}\"}}"));
             print(&line);
@@ -54,6 +76,9 @@ impl Output {
     }
 
     pub fn note(&self, text: &str) {
+        if let Some(kept) = &self.kept {
+            return kept.borrow_mut().notes.push(text.to_owned());
+        }
         let _ = writeln!(std::io::stderr(), "note: {}", one_line(text));
     }
 

@@ -83,6 +83,42 @@ fn csv_holds_every_digit_and_reads_back() {
 }
 
 #[test]
+fn table_in_memory_holds_the_same_with_units() {
+    let session = session();
+    let collect = |selection: &SampleSelection| {
+        let table = TableExport {
+            manifest: &session.manifest,
+            notes: &session.notes,
+            extra: &ExtraColumns::default(),
+            selection,
+        };
+        let mut feed = |visit: &mut dyn FnMut(&[SampleRow])| {
+            // As a log hands them out, some at a time.
+            session.rows.chunks(77).for_each(visit);
+            Ok(())
+        };
+        table.collect(&mut feed).unwrap()
+    };
+    let table = collect(&SampleSelection::default());
+    let names = table.names().join(" ");
+    assert_eq!(names, "t_s depth_mm force_N signal_V counts pulses phase cycle");
+    assert_eq!((table.rows(), table.numbers("phase"), table.numbers("none")), (3000, None, None));
+    let (t, counts) = (table.numbers("t_s").unwrap(), table.numbers("counts").unwrap());
+    let force = table.numbers("force_N").unwrap();
+    for (i, row) in session.rows.iter().enumerate() {
+        assert_eq!(t[i], time_of(&session, i));
+        let known = |cell: f64| Some(cell).filter(|cell| !cell.is_nan());
+        assert_eq!((known(force[i]), known(counts[i])), (row.force, row.counts.map(f64::from)));
+    }
+    let id = ("palpate.session".to_owned(), session.manifest.session_id.clone());
+    assert!(table.metadata().contains(&id));
+    // A table without rows still has its columns, and a stream over it is no error.
+    let none = collect(&SampleSelection { cycles: vec![9999], ..SampleSelection::default() });
+    assert_eq!((none.rows(), none.names().len()), (0, 8));
+    drop((none.stream(true), table.stream(false)));
+}
+
+#[test]
 fn parquet_holds_the_same_with_units() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.parquet");

@@ -111,6 +111,7 @@ fn source(session: &Session) -> FitSource {
         samples: fit_samples(session, RecordStretch::RampHold).unwrap(),
         signal: None,
         start: Seconds(0.0),
+        offset: Seconds(0.0),
         notes: Vec::new(),
         specimen: None,
         rig: session.manifest.rig.as_ref().map(|rig| rig.name.clone()),

@@ -1,9 +1,11 @@
 //! From recordings on disk to fits: one, many each by itself, several together, or those of a lake.
 
+mod choice;
 mod lake;
 mod last;
 mod together;
 
+pub use choice::{FitChoice, FitChoiceError};
 pub use lake::{LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally, fit_lake};
 pub use last::{KnownFit, KnownFitError, is_poorly_identified, remember};
 pub use together::{JointFit, JointFitRequest, fit_together};
@@ -105,6 +107,8 @@ pub struct SourceFit {
     pub samples: Vec<FitSample>,
     /// Session time of the first sample.
     pub start: Seconds,
+    /// Time from the first sample of the session to that one, by the controller's clock.
+    pub offset: Seconds,
     pub notes: Vec<String>,
     pub result: Result<FitReport, FitError>,
     /// Wall seconds of the fit alone.
@@ -141,7 +145,7 @@ impl SourceFit {
         options: &FitOptions,
         is_systematic: bool,
     ) -> Self {
-        let FitSource { samples, signal, calibration, start, mut notes, .. } = source;
+        let FitSource { samples, signal, calibration, start, offset, mut notes, .. } = source;
         let watch = Stopwatch::start();
         let record =
             SignalRecord { name: "the record", samples: &samples, signal: signal.as_ref() };
@@ -165,7 +169,18 @@ impl SourceFit {
             }
         }
         drop(solution);
-        Self { samples, start, notes, result, seconds, calibration, signal, systematic, compliance }
+        Self {
+            samples,
+            start,
+            offset,
+            notes,
+            result,
+            seconds,
+            calibration,
+            signal,
+            systematic,
+            compliance,
+        }
     }
 
     #[must_use]
@@ -203,6 +218,9 @@ impl SourceFit {
 pub fn no_systematic(reason: &str) -> String {
     format!("the systematic uncertainty from calibration and compliance is unknown: {reason}")
 }
+
+/// Fewer repeats of a bootstrap do not determine the ends of a 95 % interval.
+pub const BOOTSTRAP_REPEATS_MIN: usize = 40;
 
 /// Request for intervals that take more than one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -24,6 +24,8 @@ pub struct FitSource {
     pub samples: Vec<FitSample>,
     /// Session time of the first sample; 0 for a table, whose times are kept as they are.
     pub start: Seconds,
+    /// Time from the first sample of the session to that one, by the controller's clock; 0 for a table.
+    pub offset: Seconds,
     /// Remarks, such as an interrupted recording.
     pub notes: Vec<String>,
     /// The specimen pressed, where the source says so.
@@ -151,7 +153,8 @@ pub fn of_session(
     }
     let (rows, mut samples) = fitted_rows(&session, stretch)?;
     let signal = signal::of_session(&session, &rows, left_out_s)?;
-    leave_out(left_out_s, since_first(&session, stretch), &mut samples);
+    let offset = since_first(&session, stretch);
+    leave_out(left_out_s, offset, &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;
@@ -162,7 +165,7 @@ pub fn of_session(
         ));
     }
     let rig = session.manifest.rig.map(|rig| rig.name);
-    Ok(FitSource { samples, start, notes, specimen, rig, calibration, signal })
+    Ok(FitSource { samples, start, offset, notes, specimen, rig, calibration, signal })
 }
 
 /// The samples of an imported session, its time from the first one.
@@ -300,7 +303,9 @@ fn leave_out(left_out_s: &[[f64; 2]], offset: Seconds, samples: &mut [FitSample]
 fn since_first(session: &Session, stretch: RecordStretch) -> Seconds {
     let first = session.rows.iter().find(|row| is_fitted(row, stretch));
     match (session.rows.first(), first) {
-        (Some(origin), Some(first)) => analysed_session::time_between(session, origin, first),
+        (Some(origin), Some(first)) => {
+            analysed_session::time_between(&session.manifest, origin, first)
+        }
         _ => Seconds(0.0),
     }
 }

@@ -41,7 +41,7 @@ pub(super) fn of_session(
     let length = at(&session.rows[last]);
     let around = AROUND_SECS.max(AROUND_LENGTHS * length);
     let is_left_out = |row: &SampleRow| {
-        let since = analysed_session::time_between(session, &session.rows[0], row).0;
+        let since = analysed_session::time_between(&session.manifest, &session.rows[0], row).0;
         left_out_s.iter().any(|[from, to]| (*from..=*to).contains(&since))
     };
     let unloaded = session.rows[span.rows.clone()].iter();
@@ -103,7 +103,7 @@ impl ZeroSpan {
 
     fn search_secs(&self, session: &Session) -> f64 {
         let [from, to] = [self.search.start, self.search.end].map(|row| &session.rows[row]);
-        analysed_session::time_between(session, from, to).0
+        analysed_session::time_between(&session.manifest, from, to).0
     }
 
     fn is_unloaded(&self, row: &SampleRow) -> bool {

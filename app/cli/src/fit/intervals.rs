@@ -3,16 +3,13 @@
 use super::super::Failure;
 use super::super::output::{Bar, Output};
 use super::FitArgs;
-use palpate_analysis::fit::IntervalRequest;
+use palpate_analysis::fit::{BOOTSTRAP_REPEATS_MIN, IntervalRequest};
 use palpate_rheology::fit::Bootstrap;
-
-/// Fewer repeats do not determine the ends of a 95 % interval.
-const REPEATS_MIN: usize = 40;
 
 pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     match args.bootstrap {
-        Some(repeats) if repeats < REPEATS_MIN => Err(Failure::usage(format!(
-            "--bootstrap {repeats} is too few for a 95 % interval; give at least {REPEATS_MIN} repeats"
+        Some(repeats) if repeats < BOOTSTRAP_REPEATS_MIN => Err(Failure::usage(format!(
+            "--bootstrap {repeats} is too few for a 95 % interval; give at least {BOOTSTRAP_REPEATS_MIN} repeats"
         ))),
         None if args.seed.is_some() => {
             Err(Failure::usage("--seed needs --bootstrap; add --bootstrap, or leave out --seed"))

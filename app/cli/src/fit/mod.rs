@@ -13,7 +13,7 @@ use super::recalibrate::AuthorArgs;
 use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
 use palpate_analysis::compliance::ComplianceCorrections;
-use palpate_analysis::fit::{FitRecipe, remember};
+use palpate_analysis::fit::{FitChoice, FitRecipe, remember};
 use palpate_analysis::recordings::{self, is_collection};
 use palpate_analysis::report::fit_json::{FitObject, FitOverlay};
 use palpate_analysis::report::{picture, text};
@@ -210,35 +210,22 @@ fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Re
 
 /// The family, and which of its parameters are free.
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
-    let mut options = match &args.family {
-        Some(key) => FitOptions::by_key(key).map_err(Failure::usage)?,
-        None => FitOptions::default(),
-    };
-    let names = args.free.iter().map(|name| name.trim());
-    let held = args.fixed.iter().filter_map(|pair| pair.split('=').next().map(str::trim));
-    let mut names: Vec<&str> = names.chain(held).collect();
-    names.sort_unstable();
-    if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Failure::usage(format!("{} is given twice; give it once", pair[0])));
-    }
-    for name in &args.free {
-        options.free(name).map_err(Failure::usage)?;
-    }
-    for pair in &args.fixed {
-        let parsed = pair.split_once('=').and_then(|(name, value)| {
-            value
-                .trim()
-                .parse::<f64>()
-                .ok()
-                .filter(|value| value.is_finite())
-                .map(|value| (name.trim(), value))
-        });
-        let Some((name, value)) = parsed else {
-            return Err(Failure::usage(format!(
+    let fixed = args.fixed.iter().map(|pair| {
+        let (name, value) = pair.split_once('=')?;
+        let value = value.trim().parse::<f64>().ok().filter(|value| value.is_finite())?;
+        Some((name.trim().to_owned(), value))
+    });
+    let fixed = fixed.zip(&args.fixed).map(|(read, pair)| {
+        read.ok_or_else(|| {
+            Failure::usage(format!(
                 "--fixed {pair} is not NAME=VALUE; give for example --fixed f_offset=0"
-            )));
-        };
-        options.fix(name, value).map_err(Failure::usage)?;
-    }
-    Ok(options)
+            ))
+        })
+    });
+    let choice = FitChoice {
+        family: args.family.clone(),
+        fixed: fixed.collect::<Result<_, _>>()?,
+        free: args.free.clone(),
+    };
+    choice.options().map_err(Failure::usage)
 }

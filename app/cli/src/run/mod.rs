@@ -1,6 +1,9 @@
 //! `palpate run`: a protocol without a window, on the same runner.
 
+mod hosted;
 mod report;
+
+pub use hosted::{HostedReport, HostedRun};
 
 use super::Failure;
 use super::arguments::parse_number;
@@ -17,7 +20,7 @@ use palpate_model::metadata::SessionLabels;
 use palpate_model::metadata::SessionMetadata;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::plans::Plan;
-use palpate_protocols::preview::preview;
+use palpate_protocols::preview::{Preview, preview};
 use palpate_runner::{
     AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot,
     SharedLeadSource, StartError, TimeScale, wall_now,
@@ -33,6 +36,10 @@ use std::time::Duration;
 
 /// The indenter where none is given.
 pub(super) const USUAL_INDENTER: &str = "blunt 12 mm probe";
+
+const NO_PROTOCOL: &str = "give the name of a protocol; 'palpate protocol list' lists the names";
+const ENDED_UNEXPECTEDLY: &str =
+    "the thread that runs protocols ended unexpectedly; the session is incomplete";
 
 /// Run a protocol without a window
 #[derive(Debug, Args)]
@@ -128,19 +135,28 @@ pub(super) struct SessionArgs {
 
 pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
-        return Err(Failure::usage(
-            "give the name of a protocol; 'palpate protocol list' lists the names",
-        ));
+        return Err(Failure::usage(NO_PROTOCOL));
     };
     let (options, values) = (&args.session, args.values()?);
     if programme::is_programme(name) {
         return programme::run(Path::new(name), options, &values, output);
     }
+    let (plan, bench, labels) = read(name, &values, options, output)?;
+    run_plan(plan, bench, options, labels, None, output)
+}
+
+/// The plan of a protocol, the rig that it was checked for, and the labels of its session.
+fn read(
+    name: &str,
+    values: &BTreeMap<String, String>,
+    options: &SessionArgs,
+    output: &Output,
+) -> Result<(Plan, OpenRig, SessionLabels), Failure> {
     if let Ok(library) = library_folder() {
         super::recover::recover_unfinished(&library, output);
     }
     let bench = super::rig::open(&options.rig)?;
-    let (protocol, written, _) = super::protocol::load_checked(name, &values, &bench, output)?;
+    let (protocol, written, _) = super::protocol::load_checked(name, values, &bench, output)?;
     let labels = labels(options)?;
     if written.plan.name == DAILY_CHECK {
         output.note(&format!(
@@ -154,7 +170,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
             ))
         })?;
     }
-    run_plan(written.plan, bench, options, labels, None, output)
+    Ok((written.plan, bench, labels))
 }
 
 pub(super) struct RunLeader {
@@ -175,26 +191,8 @@ pub(super) fn run_plan(
     leader: Option<RunLeader>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let gate = gate(&plan, &bench)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
-    let (answers, after_stop) = match bench.rig.is_virtual() {
-        true => (PromptResponder::Confirm, AfterStop::Close),
-        false => (PromptResponder::Operator, AfterStop::Ask),
-    };
-    let request = RunRequest {
-        plan,
-        calibration: bench.calibration,
-        limits: bench.limits,
-        out: options.out.clone(),
-        labels,
-        is_acknowledged: options.acknowledge,
-        to_acknowledge: gate.to_acknowledge(),
-        after_stop,
-        answers,
-        leader: leader.as_ref().map(|leader| leader.leader.clone()),
-    };
-    let curve = request.calibration.curve().map_err(Failure::usage)?;
-    let preview = preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
+    let (request, preview, gate) = request(plan, &bench, options, labels, output)?;
+    let request = RunRequest { leader: leader.as_ref().map(|one| one.leader.clone()), ..request };
     if options.preview {
         output.result(&preview, || preview_text(&preview));
         return match preview.refusals.first() {
@@ -202,13 +200,61 @@ pub(super) fn run_plan(
             None => Ok(()),
         };
     }
-    if let Err(reason) = preview.check_start(options.acknowledge) {
+    check_start(&preview, &gate, options.acknowledge, output)?;
+    let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
+    let Some(view) = &snapshot.run else {
+        return Err(Failure::failed(
+            "the thread that runs protocols ended without a run; start the run again",
+        ));
+    };
+    report(view, leader.as_ref(), output)
+}
+
+/// The request of a plan, its preview, and what the daily check says of it.
+fn request(
+    plan: Plan,
+    bench: &OpenRig,
+    options: &SessionArgs,
+    labels: SessionLabels,
+    output: &Output,
+) -> Result<(RunRequest, Preview, DailyCheckGate), Failure> {
+    let gate = gate(&plan, bench)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let (answers, after_stop) = match bench.rig.is_virtual() {
+        true => (PromptResponder::Confirm, AfterStop::Close),
+        false => (PromptResponder::Operator, AfterStop::Ask),
+    };
+    let request = RunRequest {
+        plan,
+        calibration: bench.calibration.clone(),
+        limits: bench.limits,
+        out: options.out.clone(),
+        labels,
+        is_acknowledged: options.acknowledge,
+        to_acknowledge: gate.to_acknowledge(),
+        after_stop,
+        answers,
+        leader: None,
+    };
+    let curve = request.calibration.curve().map_err(Failure::usage)?;
+    let preview = preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
+    Ok((request, preview, gate))
+}
+
+/// Refuses a run that the preview or the daily check does not allow.
+fn check_start(
+    preview: &Preview,
+    gate: &DailyCheckGate,
+    is_acknowledged: bool,
+    output: &Output,
+) -> Result<(), Failure> {
+    if let Err(reason) = preview.check_start(is_acknowledged) {
         let hint =
             if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
-    match &gate {
-        DailyCheckGate::Acknowledge(reason) if !options.acknowledge => {
+    match gate {
+        DailyCheckGate::Acknowledge(reason) if !is_acknowledged => {
             return Err(Failure::usage(format!(
                 "{reason}, or add --acknowledge to run anyway; the session records the acknowledgement"
             )));
@@ -217,13 +263,7 @@ pub(super) fn run_plan(
         _ => {}
     }
     preview.notes.iter().for_each(|note| output.note(note));
-    let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
-    let Some(view) = &snapshot.run else {
-        return Err(Failure::failed(
-            "the thread that runs protocols ended before the run began; start the run again",
-        ));
-    };
-    report(view, leader.as_ref(), output)
+    Ok(())
 }
 
 /// Whether the daily check of the rig allows a plan.
@@ -247,27 +287,44 @@ pub(super) fn execute(
     output: &Output,
 ) -> Result<Arc<RunnerSnapshot>, Failure> {
     let has_operator = request.answers == PromptResponder::Operator;
-    let (wake, woken) = sync_channel(1);
-    let (reply, answer) = sync_channel(1);
-    let first = RunnerRequest::Run(Box::new(request), reply);
-    let runner = Runner::start(rig, scale, Some(first), move || {
-        // A full channel holds a wake-up already.
-        let _ = wake.try_send(());
-    })
-    .map_err(Failure::failed)?;
-    let is_question_open = stop_on_signals(&runner)?;
-    match answer.recv() {
-        Ok(Ok(())) => {}
-        Ok(Err(StartError::Refused(reason))) => return Err(Failure::Usage(reason)),
-        Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
-        Err(_) => {
-            return Err(Failure::failed(
-                "the thread that runs protocols ended before the run began; start the run again",
-            ));
-        }
-    }
+    let begun = BegunRun::start(rig, scale, request)?;
+    let is_question_open = stop_on_signals(&begun.runner)?;
+    begun.wait_for_start()?;
+    let BegunRun { runner, woken, .. } = begun;
     let prompts = has_operator.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
     watch(&runner, &woken, prompts.transpose()?, output)
+}
+
+/// A runner that was asked for a run.
+struct BegunRun {
+    runner: Runner,
+    /// Gets a word after each snapshot.
+    woken: Receiver<()>,
+    answer: Receiver<Result<(), StartError>>,
+}
+
+impl BegunRun {
+    fn start(rig: Box<dyn Rig>, scale: TimeScale, request: RunRequest) -> Result<Self, Failure> {
+        let (wake, woken) = sync_channel(1);
+        let (reply, answer) = sync_channel(1);
+        let first = RunnerRequest::Run(Box::new(request), reply);
+        let runner = Runner::start(rig, scale, Some(first), move || {
+            // A full channel holds a wake-up already.
+            let _ = wake.try_send(());
+        });
+        Ok(Self { runner: runner.map_err(Failure::failed)?, woken, answer })
+    }
+
+    fn wait_for_start(&self) -> Result<(), Failure> {
+        match self.answer.recv() {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(StartError::Refused(reason))) => Err(Failure::Usage(reason)),
+            Ok(Err(StartError::Failed(reason))) => Err(Failure::Failed(reason)),
+            Err(_) => Err(Failure::failed(
+                "the thread that runs protocols ended before the run began; start the run again",
+            )),
+        }
+    }
 }
 
 pub(super) fn labels(args: &SessionArgs) -> Result<SessionLabels, Failure> {
@@ -321,9 +378,7 @@ fn watch(
             return Ok(snapshot);
         }
         if !is_alive && !runner.is_alive() {
-            return Err(Failure::failed(
-                "the thread that runs protocols ended unexpectedly; the session is incomplete",
-            ));
+            return Err(Failure::failed(ENDED_UNEXPECTEDLY));
         }
     }
 }

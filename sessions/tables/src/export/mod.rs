@@ -5,6 +5,7 @@ mod columns;
 mod dictionary;
 mod encode;
 mod formula;
+mod memory;
 mod messages;
 mod parquet;
 mod row_group;
@@ -16,6 +17,7 @@ pub use dictionary::dictionary_path;
 pub(crate) use encode::Encoder;
 pub use encode::TableFormat;
 pub use formula::escape_formula;
+pub use memory::{ArrowArrayStream, SampleTable};
 pub use select::SampleSelection;
 
 use columns::{Cells, Layout, Samples, time_of};
@@ -24,7 +26,7 @@ use palpate_sessions::log::ReadError;
 use palpate_sessions::manifest::Manifest;
 use palpate_sessions::record::SampleRow;
 use palpate_sessions::text::sha256;
-use polars_core::prelude::{PolarsError, PolarsResult};
+use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -57,6 +59,8 @@ pub enum ExportError {
     Io { path: PathBuf, source: io::Error },
     #[error("cannot write {} ({source}); check the disk's free space", path.display())]
     Table { path: PathBuf, source: PolarsError },
+    #[error("the samples cannot be made a table ({0}); select fewer columns or samples")]
+    Memory(PolarsError),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -128,9 +132,15 @@ impl TableExport<'_> {
         feed: RowFeed,
     ) -> Result<u64, ExportError> {
         let failed = |source| ExportError::Table { path: path.to_owned(), source };
-        let mut writer = TableWriter::new(self, layout, format, file).map_err(failed)?;
-        feed(&mut |rows| writer.take(rows))?;
-        writer.finish().map_err(failed)
+        let empty = layout.frame(layout.empty_cells(0), 0).map_err(failed)?;
+        let metadata = self.metadata(layout);
+        let mut encoder = Encoder::new(format, file, &empty, metadata).map_err(failed)?;
+        let mut put = |frame| encoder.write(frame);
+        let mut frames = FrameMaker::new(self, layout, &mut put);
+        feed(&mut |rows| frames.take(rows))?;
+        let rows = frames.finish().map_err(failed)?;
+        encoder.finish().map_err(failed)?;
+        Ok(rows)
     }
 
     fn metadata(&self, layout: &Layout) -> Metadata {
@@ -157,10 +167,11 @@ impl TableExport<'_> {
     }
 }
 
-struct TableWriter<'a, W: Write> {
+/// Makes frames of samples that pass by, and hands out each when it is full.
+struct FrameMaker<'a> {
     table: &'a TableExport<'a>,
     layout: &'a Layout<'a>,
-    encoder: Encoder<W>,
+    put: &'a mut dyn FnMut(DataFrame) -> PolarsResult<()>,
     /// The selected ones of the present samples.
     numbers: Vec<u64>,
     rows: Vec<SampleRow>,
@@ -175,18 +186,16 @@ struct TableWriter<'a, W: Write> {
     failure: Option<PolarsError>,
 }
 
-impl<'a, W: Write> TableWriter<'a, W> {
+impl<'a> FrameMaker<'a> {
     fn new(
         table: &'a TableExport<'a>,
         layout: &'a Layout<'a>,
-        format: TableFormat,
-        file: W,
-    ) -> PolarsResult<Self> {
-        let empty = layout.frame(layout.empty_cells(0), 0)?;
-        Ok(Self {
+        put: &'a mut dyn FnMut(DataFrame) -> PolarsResult<()>,
+    ) -> Self {
+        Self {
             table,
             layout,
-            encoder: Encoder::new(format, file, &empty, table.metadata(layout))?,
+            put,
             numbers: Vec::new(),
             rows: Vec::new(),
             // Grows on demand, because most sessions are shorter than a frame.
@@ -197,7 +206,7 @@ impl<'a, W: Write> TableWriter<'a, W> {
             written: 0,
             first_tick: None,
             failure: None,
-        })
+        }
     }
 
     fn take(&mut self, mut rows: &[SampleRow]) {
@@ -249,7 +258,7 @@ impl<'a, W: Write> TableWriter<'a, W> {
         let next = self.layout.empty_cells(rows);
         let full = std::mem::replace(&mut self.frame, next);
         self.written += rows as u64;
-        self.encoder.write(self.layout.frame(full, rows)?)
+        (self.put)(self.layout.frame(full, rows)?)
     }
 
     fn finish(mut self) -> PolarsResult<u64> {
@@ -260,7 +269,6 @@ impl<'a, W: Write> TableWriter<'a, W> {
         if self.frame_rows > 0 || self.written == 0 {
             self.flush()?;
         }
-        self.encoder.finish()?;
         Ok(self.written)
     }
 }

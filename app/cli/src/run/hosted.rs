@@ -1,0 +1,96 @@
+//! A run for another front end in the same process, such as the Python package: started with the options of
+//! `palpate run`, watched and ended there.
+
+use super::super::output::{KeptOutput, Output};
+use super::super::{Command, Failure, log, parse_options, programme};
+use super::report::report;
+use super::{BegunRun, check_start, read, request};
+use palpate_protocols::engine::Operator;
+use palpate_runner::{AfterStop, RunRequest, RunView, RunnerRequest, RunnerSnapshot};
+use palpate_sessions::folder::HolderLock;
+use serde_json::Value;
+use std::sync::{Arc, Once};
+use std::time::Duration;
+
+/// A run in progress. Dropped, it stops the rig and closes the session.
+pub struct HostedRun {
+    begun: BegunRun,
+    /// Remarks made before the start.
+    pub notes: Vec<String>,
+    /// Lock a named rig against other programs.
+    _locks: Vec<HolderLock>,
+}
+
+/// The report of an ended run.
+#[derive(Debug)]
+pub struct HostedReport {
+    /// What `palpate run --json` prints.
+    pub object: Value,
+    pub notes: Vec<String>,
+    /// Why the command would have failed.
+    pub failure: Option<Failure>,
+}
+
+/// The program's log, and rigs that stop where any thread panics: what the command line begins with.
+fn prepare_process() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| log::stop_rigs_on_panic(log::begin(false)));
+}
+
+impl HostedRun {
+    /// Starts what `palpate run` with these arguments would start. Nobody is asked whether to retract after a stop: the
+    /// probe stays where it is.
+    pub fn start(arguments: &[String]) -> Result<Self, Failure> {
+        let Command::Run(args) = parse_options("run", arguments)? else {
+            return Err(Failure::usage("these are not options of 'palpate run'"));
+        };
+        let (options, values) = (&args.session, args.values()?);
+        let name = args.protocol.as_deref().ok_or_else(|| Failure::usage(super::NO_PROTOCOL))?;
+        if programme::is_programme(name) {
+            return Err(Failure::usage(format!(
+                "{name} is a programme, not a protocol; run it with 'palpate run {name}'"
+            )));
+        }
+        if options.preview {
+            return Err(Failure::usage(format!(
+                "a preview is not a run; 'palpate protocol preview {name}' shows it"
+            )));
+        }
+        prepare_process();
+        let output = Output::kept();
+        let (plan, bench, labels) = read(name, &values, options, &output)?;
+        let (request, preview, gate) = request(plan, &bench, options, labels, &output)?;
+        check_start(&preview, &gate, options.acknowledge, &output)?;
+        let request = RunRequest { after_stop: AfterStop::Close, ..request };
+        let begun = BegunRun::start(bench.rig, options.rig.time_scale, request)?;
+        begun.wait_for_start()?;
+        Ok(Self { begun, notes: output.take().notes, _locks: bench._locks })
+    }
+
+    /// The next snapshot, or `None` if there is none within `patience`.
+    pub fn next(&self, patience: Duration) -> Result<Option<Arc<RunnerSnapshot>>, Failure> {
+        let runner = &self.begun.runner;
+        let is_woken = self.begun.woken.recv_timeout(patience).is_ok();
+        if is_woken {
+            return Ok(Some(runner.snapshot()));
+        }
+        match runner.is_alive() {
+            true => Ok(None),
+            false => Err(Failure::failed(super::ENDED_UNEXPECTEDLY)),
+        }
+    }
+
+    /// Passes on the operator's choice.
+    pub fn choose(&self, choice: Operator) -> Result<(), Failure> {
+        self.begun.runner.request(RunnerRequest::Operator(choice)).map_err(Failure::Failed)
+    }
+
+    /// The report of the run, once its view has an outcome.
+    #[must_use]
+    pub fn report(&self, view: &RunView) -> HostedReport {
+        let output = Output::kept();
+        let failure = report(view, None, &output).err();
+        let KeptOutput { mut objects, notes } = output.take();
+        HostedReport { object: objects.pop().unwrap_or_default(), notes, failure }
+    }
+}
