@@ -180,6 +180,7 @@ mod tests {
         // Permissions are those of any file of this user.
         let plain = folder.path().join("plain");
         fs::write(&plain, "").unwrap();
+        use std::os::unix::fs::PermissionsExt;
         let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
         assert_eq!(mode(&at), mode(&plain));
         let long = "ä".repeat(120);
