@@ -7,6 +7,7 @@ use palpate_sessions::atomic::{Draft, ExistingFile};
 use palpate_sessions::program_log::{log_files, log_folder};
 use palpate_sessions::{RECORD_VERSION, SessionSummary};
 use serde::Serialize;
+use std::fmt;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -70,7 +71,11 @@ fn fill(request: &BundleRequest, draft: &Draft) -> Result<Vec<BundledFile>, Bund
         files: Vec::new(),
         to: request.to.display().to_string(),
     };
-    bundle.text("versions.txt", "versions and parts of the program", &versions(request))?;
+    bundle.text(
+        "versions.txt",
+        "versions and parts of the program",
+        &format!("{}\n", BuildDescription::of(request.features.clone())),
+    )?;
     bundle.text(
         "findings.txt",
         "results of 'palpate doctor' on the sessions",
@@ -176,18 +181,49 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn versions(request: &BundleRequest) -> String {
-    let features = match request.features.is_empty() {
-        true => "none".to_owned(),
-        false => request.features.join(", "),
-    };
-    format!(
-        "palpate {}\nengine {ENGINE_VERSION}\nrecord {RECORD_VERSION}\ntarget {} {}\nfeatures {features}\nbuilt {}\n",
-        env!("CARGO_PKG_VERSION"),
-        std::env::consts::ARCH,
-        std::env::consts::OS,
-        if cfg!(debug_assertions) { "for debugging" } else { "for release" },
-    )
+/// What a program was built from and for.
+#[derive(Clone, Debug, Serialize)]
+pub struct BuildDescription {
+    pub version: &'static str,
+    /// Which state of the source it is, if the build was told.
+    pub commit: Option<&'static str>,
+    pub engine_version: u32,
+    pub record_version: u32,
+    pub target: String,
+    /// Optional parts of this build.
+    pub features: Vec<&'static str>,
+    pub is_release: bool,
+}
+
+impl BuildDescription {
+    #[must_use]
+    pub fn of(features: Vec<&'static str>) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            commit: option_env!("PALPATE_COMMIT"),
+            engine_version: ENGINE_VERSION,
+            record_version: RECORD_VERSION,
+            target: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
+            features,
+            is_release: !cfg!(debug_assertions),
+        }
+    }
+}
+
+impl fmt::Display for BuildDescription {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let features = match self.features.is_empty() {
+            true => "none".to_owned(),
+            false => self.features.join(", "),
+        };
+        writeln!(f, "palpate {}", self.version)?;
+        writeln!(f, "commit {}", self.commit.unwrap_or("not stated"))?;
+        writeln!(f, "engine {}", self.engine_version)?;
+        writeln!(f, "record {}", self.record_version)?;
+        writeln!(f, "target {}", self.target)?;
+        writeln!(f, "features {features}")?;
+        write!(f, "built for {}", if self.is_release { "release" } else { "debugging" })
+    }
 }
 
 /// A text of lines without what a line calls a secret, and without names and passwords before a host.

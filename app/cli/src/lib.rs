@@ -68,6 +68,7 @@ use palpate_analysis::compliance::ComplianceCorrectionError;
 use palpate_analysis::fit::KnownFitError;
 use palpate_analysis::recordings::RecordingsError;
 use palpate_analysis::source::SourceError;
+use palpate_analysis::support_bundle::BuildDescription;
 use palpate_analysis::window_requests::WindowOpener;
 use palpate_model::metadata::SessionLabels;
 use palpate_sessions::log::ReadError;
@@ -195,6 +196,13 @@ fn asks_for_json(arguments: &[OsString]) -> bool {
     named.any(|argument| argument == "--json")
 }
 
+/// Whether `--version --verbose` asks what the program was built from.
+fn asks_for_build(arguments: &[OsString]) -> bool {
+    let has =
+        |name: &str| arguments.iter().skip(1).take_while(|one| *one != "--").any(|one| one == name);
+    (has("--version") || has("-V")) && has("--verbose")
+}
+
 /// Parses the arguments; a mistake gets one sentence, and one object with `--json`.
 fn parse(arguments: &[OsString]) -> Result<Cli, u8> {
     Cli::try_parse_from(arguments).map_err(|err| {
@@ -245,6 +253,11 @@ pub fn main(windows: Option<&dyn WindowOpener>) -> ExitCode {
 pub fn run_command(arguments: &[OsString], windows: Option<&dyn WindowOpener>) -> u8 {
     #[cfg(unix)]
     outlive_file_limits();
+    if asks_for_build(arguments) {
+        let build = BuildDescription::of(support_bundle::features(windows.is_some()));
+        Output::new(asks_for_json(arguments)).answer("version", &build, || build.to_string());
+        return 0;
+    }
     let cli = match parse(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,

@@ -27,7 +27,7 @@ pub struct SupportBundleArgs {
 }
 
 /// The features of this build.
-fn features(has_window: bool) -> Vec<&'static str> {
+pub(super) fn features(has_window: bool) -> Vec<&'static str> {
     let parts = [
         ("window", has_window),
         ("emulators", cfg!(feature = "emulators")),

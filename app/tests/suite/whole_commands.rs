@@ -332,3 +332,17 @@ fn a_killed_run_leaves_a_session_that_opens() {
     // More of the run is in a log that was longer.
     assert!(samples.is_sorted() && samples[3] > 1_000, "{samples:?}");
 }
+
+#[test]
+fn version_with_verbose_tells_what_the_program_was_built_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = stdout(&palpate(folder.path(), &["--version"]));
+    assert_eq!(short.lines().count(), 1, "{short}");
+    let long = palpate(folder.path(), &["--version", "--verbose"]);
+    succeeded(&long);
+    for fact in ["palpate 0", "commit ", "target ", "features window, emulators"] {
+        assert_prints(&long, fact);
+    }
+    let object = json(&palpate(folder.path(), &["-V", "--verbose", "--json"]));
+    assert_eq!(object["is_release"], !cfg!(debug_assertions));
+}
