@@ -21,7 +21,7 @@ pub enum ExportFailure {
     #[error(transparent)]
     Export(#[from] ExportError),
     #[error(
-        "{} is being recorded, and a lake holds only complete sessions; add the session when the run has ended", .0.display()
+        "{} is still being recorded, and a lake (a folder of exported sessions) takes only complete ones; add the session when the run has ended", .0.display()
     )]
     BeingRecorded(PathBuf),
 }

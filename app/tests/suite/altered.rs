@@ -22,7 +22,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     until(has_grown, || "a log that grows".into());
     // An export of it into a lake is refused until it ends.
     let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
-    assert_refused(&export, 1, "is being recorded");
+    assert_refused(&export, 1, "being recorded");
     assert!(lake::list_sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
     fs::write(&log, "").unwrap();
     let done = child.wait_with_output().unwrap();

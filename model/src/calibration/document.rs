@@ -241,8 +241,8 @@ impl Calibration {
     /// Numbers other than the readings must be finite, and uncertainties not negative.
     fn check_facts(&self) -> Result<(), CalibrationError> {
         let signed = [
-            ("zero signal before the weights", self.zero_before),
-            ("zero signal after the weights", self.zero_after),
+            ("signal of the empty load cell before the weights", self.zero_before),
+            ("signal of the empty load cell after the weights", self.zero_after),
             ("excitation", self.excitation),
         ];
         let signed = signed.map(|(what, volts)| (what, volts.map(Volts::get), f64::NEG_INFINITY));

@@ -141,7 +141,10 @@ fn facts_that_cannot_be_are_refused() {
     let nan = Some(Volts(f64::NAN));
     for (wrong, fact) in [
         (Calibration { excitation: nan, ..thesis() }, "excitation"),
-        (Calibration { zero_after: nan, ..thesis() }, "zero signal after the weights"),
+        (
+            Calibration { zero_after: nan, ..thesis() },
+            "signal of the empty load cell after the weights",
+        ),
         (Calibration { resolution: Some(Volts(-0.1)), ..thesis() }, "resolution"),
     ] {
         let refusal = wrong.curve().unwrap_err();

@@ -32,7 +32,11 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
         QuantityKind::Text,
         "name of the checkpoint after each pass; the run may pause at a checkpoint",
     ),
-    Key::optional("only_if", QuantityKind::Flag, "`false` or `\"none\"` skips the loop"),
+    Key::optional(
+        "only_if",
+        QuantityKind::Flag,
+        "with `false` or `\"none\"` the repeated steps are skipped",
+    ),
 ];
 
 pub(super) struct PlacedStep {

@@ -42,7 +42,7 @@ impl Walk<'_> {
         step.pass(&mut self.known);
         if matches!(planned.on_failure, OnFailure::Retry(_)) && step.facts().is_measuring {
             self.refusals.push(
-                "a measurement cannot be retried, because tissue behaves differently once it was indented; set 'on_failure' to abort or skip"
+                "a measurement cannot be retried, because tissue behaves differently once it has been indented; set 'on_failure' to abort or skip"
                     .into(),
             );
         }

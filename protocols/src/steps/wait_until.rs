@@ -47,12 +47,12 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "bath_from",
             QuantityKind::Temperature,
-            "lowest temperature of the bath that ends the wait; required with `bath_to`",
+            "the wait ends only while the bath is at or above this temperature; required with `bath_to`",
         ),
         Key::optional(
             "bath_to",
             QuantityKind::Temperature,
-            "temperature of the bath above which the wait does not end",
+            "the wait ends only while the bath is at or below this temperature",
         ),
         Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait"),
         Key::usual(

@@ -156,9 +156,9 @@ fn damaged_files_are_refused_with_the_line() {
         (lines[8..].join("\n"), "line 1: the numbers have no column names"),
         (with(7, ""), "line 8: the numbers have no column names"),
         (with(7, "(s),(mm),(N)"), "line 7 has 3 units for the 4 columns of line 6"),
-        (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' stands among or after the numbers"),
+        (with(9, "torn,1,2,0"), "line 9: 'torn,1,2,0' is no row of numbers"),
         (with(11, "\"0.3"), "line 11: a quote is not closed"),
-        (with(11, "End of test,1"), "line 11: 'End of test,1' stands among or after the numbers"),
+        (with(11, "End of test,1"), "line 11: 'End of test,1' is no row of numbers"),
         (with(10, "\"0.2\",\"x\",\"1\",\"0\""), "line 10: the depth 'x' is not a number"),
         (with(10, "\"0.2\",\"\",\"1\",\"0\""), "line 10: the depth is missing"),
         (

@@ -230,7 +230,7 @@ fn name(parts: &mut [TextPart<'_>]) {
 fn strange_line(lines: &[Line<'_>], number: usize) -> String {
     let text = lines.iter().find(|(one, _)| *one == number);
     format!(
-        "line {number}: '{}' stands among or after the numbers and is not followed by column names; correct or remove the line, or restore the end of the file",
+        "line {number}: '{}' is no row of numbers, and no column names of another table follow it; correct or remove the line, or copy the file again if its end is missing",
         short(text.map_or("", |(_, text)| text))
     )
 }
