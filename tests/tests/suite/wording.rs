@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 23] = [
+const PROPER_NAMES: [&str; 24] = [
     // Programs, libraries, repositories and formats.
     "CarbonFiberData",
     "DuckDB",
@@ -18,6 +18,7 @@ const PROPER_NAMES: [&str; 23] = [
     "NaN",
     "OpenAPI",
     "PlotJuggler",
+    "PyO3",
     "PyPI",
     "RenatoC322",
     "RheoJAX",
