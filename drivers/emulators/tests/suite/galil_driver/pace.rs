@@ -7,11 +7,12 @@ use super::bench::{thesis, to};
 use super::wires::{Runner, Served, start};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::DeviceAddress;
-use palpate_drivers::{Rig, RigEventBody};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_emulators::serve::EmulatorAddress as At;
 use palpate_model::Nanos;
-use palpate_model::rig::{Reading, RigCommand};
+use palpate_model::rig::{Fault, Reading, RigCommand};
 use palpate_test_support::skip;
+use palpate_test_support::wait::in_time;
 
 fn asked(variable: &str, usual: usize) -> usize {
     let given = std::env::var(variable).ok();
@@ -51,16 +52,25 @@ fn ms(span: Nanos) -> f64 {
     span.0 as f64 * 1e-6
 }
 
-/// Takes samples for so many seconds; tells what came and gives the ticks that came and that there were.
-fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: &str) {
+/// Takes samples for so many seconds and tells what came.
+fn count(settings: &GalilSettings, line: (Nanos, Option<u32>), what: &str) {
+    let _ = in_time(|| count_once(settings, line, what));
+}
+
+/// An error where the link was lost, because the computer has too much else to do.
+fn count_once(
+    settings: &GalilSettings,
+    (latency, baud): (Nanos, Option<u32>),
+    what: &str,
+) -> Result<(), String> {
     let Some((_served, place)) = on_pty(latency, baud) else {
-        return;
+        return Ok(());
     };
     let seconds = asked("PALPATE_GALIL_SECONDS", 2) as f64;
     let mut runner = Runner::open(&place, settings);
     let description = runner.rig.description().clone();
-    runner.until("a sample", |runner| runner.newest.is_some());
-    runner.tell(RigCommand::EnableMotor);
+    runner.until_late("a sample", |runner| runner.newest.is_some())?;
+    enable_motor(&mut runner)?;
     runner.pass();
     let first = runner.newest.expect("a sample").tick;
     runner.events.clear();
@@ -77,6 +87,7 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
         for event in std::mem::take(&mut runner.events) {
             let (tick, age) = match event.body {
                 RigEventBody::Reading(Reading { tick, age, .. }) => (tick, age),
+                RigEventBody::Fault(Fault::LinkLost { detail }) => return Err(detail),
                 RigEventBody::Fault(fault) => panic!("{what}: {fault:?}"),
                 _ => continue,
             };
@@ -132,6 +143,13 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
             _ => {}
         }
     }
+    Ok(())
+}
+
+fn enable_motor(runner: &mut Runner) -> Result<(), String> {
+    runner.rig.send(RigCommand::EnableMotor);
+    let is_acknowledged = |event: &RigEvent| matches!(event.body, RigEventBody::Ack(_));
+    runner.until_late("enabled", |runner| runner.events.iter().any(is_acknowledged))
 }
 
 fn with(sampling: Sampling, sample_us: Option<u16>) -> GalilSettings {
@@ -176,45 +194,53 @@ fn stops_under_full_acquisition() {
         (Sampling::Poll, true),
     ];
     for (sampling, is_tcp) in ways {
-        let opened = if is_tcp { Some(on_tcp()) } else { on_pty(Nanos::ZERO, None) };
-        let Some((_served, place)) = opened else {
-            continue;
-        };
-        let over = if is_tcp { "TCP" } else { "a serial port" };
-        let mut runner = Runner::open(&place, &with(sampling, None));
-        runner.until("a sample", |runner| runner.newest.is_some());
-        runner.tell(RigCommand::EnableMotor);
-        runner.tell(to(9000, 0.75));
-        let mut late: Vec<u64> = Vec::with_capacity(stops);
-        for at in 0..stops {
-            // At any time of the acquisition's turn.
-            std::thread::sleep(std::time::Duration::from_micros(300 + (at as u64 * 7919) % 3000));
-            runner.events.clear();
-            drop(runner.rig.take_raw());
-            let before = runner.rig.now();
-            runner.rig.send(RigCommand::Stop);
-            runner.until("acknowledged", |runner| {
-                runner.events.iter().any(|event| matches!(event.body, RigEventBody::Ack(_)))
-            });
-            let written = runner
-                .rig
-                .take_raw()
-                .into_iter()
-                .find(|piece| piece.is_sent && piece.bytes.starts_with(b"STA;"))
-                .expect("the stop was written");
-            late.push(written.at.since(before).0);
-        }
-        late.sort_unstable();
-        let at = |share: f64| ms(Nanos(late[((late.len() - 1) as f64 * share) as usize]));
-        println!(
-            "{sampling:?} over {over}: {stops} stops, from the command to the wire {:.3} ms p50, {:.3} p99, {:.3} p99.9, {:.3} max",
-            at(0.5),
-            at(0.99),
-            at(0.999),
-            at(1.0)
-        );
-        if is_soak("PALPATE_STOPS") {
-            assert!(at(0.999) <= STOP_MAX_MS, "{sampling:?} over {over}: {:.3} ms", at(0.999));
-        }
+        let _ = in_time(|| stops_once(sampling, is_tcp, stops));
     }
+}
+
+fn stops_once(sampling: Sampling, is_tcp: bool, stops: usize) -> Result<(), String> {
+    let opened = if is_tcp { Some(on_tcp()) } else { on_pty(Nanos::ZERO, None) };
+    let Some((_served, place)) = opened else {
+        return Ok(());
+    };
+    let over = if is_tcp { "TCP" } else { "a serial port" };
+    let mut runner = Runner::open(&place, &with(sampling, None));
+    runner.until_late("a sample", |runner| runner.newest.is_some())?;
+    enable_motor(&mut runner)?;
+    runner.events.clear();
+    runner.rig.send(to(9000, 0.75));
+    let has_begun = |event: &RigEvent| matches!(event.body, RigEventBody::Ack(_));
+    runner.until_late("begun", |runner| runner.events.iter().any(has_begun))?;
+    let mut late: Vec<u64> = Vec::with_capacity(stops);
+    for at in 0..stops {
+        // At any time of the acquisition's turn.
+        std::thread::sleep(std::time::Duration::from_micros(300 + (at as u64 * 7919) % 3000));
+        runner.events.clear();
+        drop(runner.rig.take_raw());
+        let before = runner.rig.now();
+        runner.rig.send(RigCommand::Stop);
+        runner.until_late("acknowledged", |runner| {
+            runner.events.iter().any(|event| matches!(event.body, RigEventBody::Ack(_)))
+        })?;
+        let written = runner
+            .rig
+            .take_raw()
+            .into_iter()
+            .find(|piece| piece.is_sent && piece.bytes.starts_with(b"STA;"))
+            .expect("the stop was written");
+        late.push(written.at.since(before).0);
+    }
+    late.sort_unstable();
+    let at = |share: f64| ms(Nanos(late[((late.len() - 1) as f64 * share) as usize]));
+    println!(
+        "{sampling:?} over {over}: {stops} stops, from the command to the wire {:.3} ms p50, {:.3} p99, {:.3} p99.9, {:.3} max",
+        at(0.5),
+        at(0.99),
+        at(0.999),
+        at(1.0)
+    );
+    if is_soak("PALPATE_STOPS") {
+        assert!(at(0.999) <= STOP_MAX_MS, "{sampling:?} over {over}: {:.3} ms", at(0.999));
+    }
+    Ok(())
 }

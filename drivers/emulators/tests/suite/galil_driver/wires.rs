@@ -107,6 +107,15 @@ impl Runner {
         }
     }
 
+    /// The same, but the link may be lost: on a computer with much else to do the controller answers too late.
+    pub fn until_late(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), String> {
+        let is_lost = |runner: &Self| {
+            runner.faults().iter().any(|fault| matches!(fault, Fault::LinkLost { .. }))
+        };
+        self.until(what, |runner| is_so(runner) || is_lost(runner));
+        if is_so(self) { Ok(()) } else { Err(format!("{what}: {:?}", self.faults())) }
+    }
+
     pub fn faults(&self) -> Vec<&Fault> {
         self.events
             .iter()
