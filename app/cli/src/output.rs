@@ -106,6 +106,7 @@ impl Output {
     }
 
     /// Runs work with a bar over its share.
+    #[cfg(feature = "haptics")]
     pub fn with_share_bar<T>(&self, work: impl FnOnce(&Bar) -> T) -> T {
         work(&self.share_bar())
     }
