@@ -152,7 +152,7 @@ pub(super) struct HostTimes {
 /// Reads the computer's clocks.
 pub(super) type HostClock = Arc<dyn Fn() -> HostTimes + Send + Sync>;
 
-/// Without two clocks of which one counts suspended time, suspension is not noticed by them, but by the wall clock.
+/// One clock, which counts suspended time on Windows: a suspension is only noticed by a loop that is late.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn host_times() -> HostTimes {
     static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
