@@ -170,7 +170,7 @@ class Fit(_Mapping):  # type: ignore[type-arg]
         return "\n".join([*lines, *self.sentences])
 
 
-def wish(
+def request(
     family: Optional[str],
     fixed: Optional[Mapping[str, float]],
     free: Union[None, str, Sequence[str]],
@@ -291,4 +291,4 @@ def fit(
     if share is not None and len(records) < 2:
         raise PalpateError("share needs at least two records; give lists of arrays, one for each record")
     shared = names_of(share) if share is not None else [_BODY]
-    return answer(fit_arrays(records, shared, wish(family, fixed, free, profile, bootstrap, seed)))
+    return answer(fit_arrays(records, shared, request(family, fixed, free, profile, bootstrap, seed)))

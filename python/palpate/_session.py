@@ -175,8 +175,8 @@ class Session:
             "by": by,
             "reason": reason,
         }
-        wished = _fit.wish(family, fixed, free, profile, bootstrap, seed)
-        made = _fit.answer(fit_session(os.fspath(self.path), wished, session), save)
+        requested = _fit.request(family, fixed, free, profile, bootstrap, seed)
+        made = _fit.answer(fit_session(os.fspath(self.path), requested, session), save)
         if save is not None:
             # The stored analyses have one more.
             self._native = NativeSession(os.fspath(self.path), self.analysis)

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// What every fit can be asked for.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct FitWish {
+pub struct FitRequest {
     family: Option<String>,
     fixed: Vec<(String, f64)>,
     free: Vec<String>,
@@ -31,7 +31,7 @@ pub struct FitWish {
     seed: u64,
 }
 
-impl FitWish {
+impl FitRequest {
     fn options(&self) -> PyResult<FitOptions> {
         let choice = FitChoice {
             family: self.family.clone(),
@@ -163,9 +163,9 @@ pub fn fit_arrays<'py>(
     py: Python<'py>,
     records: Vec<(Numbers<'py>, Numbers<'py>, Numbers<'py>, Option<Numbers<'py>>)>,
     shared: Vec<String>,
-    wish: FitWish,
+    request: FitRequest,
 ) -> PyResult<FitTuple<'py>> {
-    let (options, intervals) = (wish.options()?, wish.intervals()?);
+    let (options, intervals) = (request.options()?, request.intervals()?);
     let mut records = records.iter().map(samples).collect::<PyResult<Vec<_>>>()?;
     let answer = py.detach(|| match (records.pop(), records.is_empty()) {
         (None, _) => Err(refused("there is no record to fit; give arrays of t, depth and force")),
@@ -186,7 +186,7 @@ pub fn fit_arrays<'py>(
 /// What a fit of a session can be asked for.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct SessionWish {
+pub struct SessionFitRequest {
     analysis: Option<String>,
     unload: bool,
     systematic: bool,
@@ -197,7 +197,7 @@ pub struct SessionWish {
     reason: String,
 }
 
-impl SessionWish {
+impl SessionFitRequest {
     fn recipe(&self, options: FitOptions) -> PyResult<FitRecipe> {
         let library = library_folder();
         let corrections = match &self.compliance {
@@ -220,17 +220,17 @@ impl SessionWish {
     }
 
     /// Saves a report as an analysis of the session, if it has a name.
-    fn save(&self, session: &Path, wish: &FitWish, results: Value) -> PyResult<()> {
+    fn save(&self, session: &Path, request: &FitRequest, results: Value) -> PyResult<()> {
         let Some(name) = &self.save else { return Ok(()) };
         let settings = FitSettings {
-            family: wish.family.clone(),
+            family: request.family.clone(),
             unload: self.unload,
-            fixed: wish.fixed.iter().map(|(name, value)| format!("{name}={value}")).collect(),
-            free: wish.free.clone(),
+            fixed: request.fixed.iter().map(|(name, value)| format!("{name}={value}")).collect(),
+            free: request.free.clone(),
             systematic: self.systematic,
-            profile: wish.profile,
-            bootstrap: wish.bootstrap,
-            seed: wish.bootstrap.map(|_| wish.seed),
+            profile: request.profile,
+            bootstrap: request.bootstrap,
+            seed: request.bootstrap.map(|_| request.seed),
             compliance: self.compliance.clone(),
             include_rejected: self.include_rejected,
         };
@@ -250,18 +250,20 @@ impl SessionWish {
 pub fn fit_session(
     py: Python<'_>,
     path: PathBuf,
-    wish: FitWish,
-    session: SessionWish,
+    request: FitRequest,
+    session: SessionFitRequest,
 ) -> PyResult<FitTuple<'_>> {
-    if session.unload && wish.family.is_none() {
+    if session.unload && request.family.is_none() {
         return Err(refused(
             "the default model has no unloading; give a family that has, such as unloading-3",
         ));
     }
-    let (recipe, intervals) = (session.recipe(wish.options()?)?, wish.intervals()?);
+    let (recipe, intervals) = (session.recipe(request.options()?)?, request.intervals()?);
     let answer = py.detach(|| {
         let fitted = recipe.fit(&path).map_err(refused)?;
-        one_answer(fitted, &recipe.options, intervals, |report| session.save(&path, &wish, report))
+        one_answer(fitted, &recipe.options, intervals, |report| {
+            session.save(&path, &request, report)
+        })
     });
     Ok(answer?.into_tuple(py))
 }

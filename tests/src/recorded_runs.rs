@@ -6,13 +6,11 @@ use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::{Plan, RampHold};
 use palpate_runner::{
-    AfterStop, PromptResponder, RunRequest, Runner, RunnerRequest, SharedLeadSource, StartError,
-    TimeScale,
+    AfterStop, PromptResponder, RunRequest, SharedLeadSource, StartError, StartedRun, TimeScale,
 };
 use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, sync_channel};
 
 /// Runs as fast as the computer can until the run has ended, however it ended.
 ///
@@ -55,7 +53,7 @@ pub fn try_record_plan(
 ///
 /// # Panics
 /// If the run says nothing for minutes.
-pub fn wait_for_end((runner, woken): (Runner, Receiver<()>)) {
+pub fn wait_for_end(StartedRun { runner, woken, .. }: StartedRun) {
     let has_ended = || {
         let snapshot = runner.snapshot();
         let run = snapshot.run.as_ref();
@@ -77,7 +75,7 @@ pub fn start(
     plan: Plan,
     scale: TimeScale,
     out: &Path,
-) -> (Runner, Receiver<()>) {
+) -> StartedRun {
     ask(rig, calibration, plan, scale, out, None).expect("a start")
 }
 
@@ -107,7 +105,7 @@ fn ask(
     scale: TimeScale,
     out: &Path,
     leader: Option<SharedLeadSource>,
-) -> Result<(Runner, Receiver<()>), StartError> {
+) -> Result<StartedRun, StartError> {
     let request = RunRequest {
         plan,
         calibration,
@@ -120,13 +118,7 @@ fn ask(
         answers: PromptResponder::Confirm,
         leader,
     };
-    let (reply, answer) = sync_channel(1);
-    let (wake, woken) = sync_channel(1);
-    let first = RunnerRequest::Run(Box::new(request), reply);
-    let runner = Runner::start(rig, scale, Some(first), move || {
-        let _ = wake.try_send(());
-    })
-    .expect("a runner");
-    answer.recv().expect("an answer")?;
-    Ok((runner, woken))
+    let started = StartedRun::start(rig, scale, request)?;
+    started.wait_for_start()?;
+    Ok(started)
 }

@@ -7,6 +7,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod analysed_session;
+pub mod build_description;
 pub mod calibrations;
 pub mod catalog_search;
 pub mod compliance;

@@ -1,13 +1,12 @@
 //! What remote support needs, in one zip file: the program's log, versions, settings, rig files
 //! without secrets and what the doctor says. Nothing that was measured, unless a session is named.
 
+use crate::build_description::BuildDescription;
 use crate::window_requests::SETTINGS_FILE;
-use palpate_protocols::engine::ENGINE_VERSION;
+use palpate_sessions::SessionSummary;
 use palpate_sessions::atomic::{Draft, ExistingFile};
 use palpate_sessions::program_log::{log_files, log_folder};
-use palpate_sessions::{RECORD_VERSION, SessionSummary};
 use serde::Serialize;
-use std::fmt;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -179,51 +178,6 @@ fn read(path: &Path) -> Result<String, BundleError> {
 
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// What a program was built from and for.
-#[derive(Clone, Debug, Serialize)]
-pub struct BuildDescription {
-    pub version: &'static str,
-    /// Which state of the source it is, if the build was told.
-    pub commit: Option<&'static str>,
-    pub engine_version: u32,
-    pub record_version: u32,
-    pub target: String,
-    /// Optional parts of this build.
-    pub features: Vec<&'static str>,
-    pub is_release: bool,
-}
-
-impl BuildDescription {
-    #[must_use]
-    pub fn of(features: Vec<&'static str>) -> Self {
-        Self {
-            version: env!("CARGO_PKG_VERSION"),
-            commit: option_env!("PALPATE_COMMIT"),
-            engine_version: ENGINE_VERSION,
-            record_version: RECORD_VERSION,
-            target: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
-            features,
-            is_release: !cfg!(debug_assertions),
-        }
-    }
-}
-
-impl fmt::Display for BuildDescription {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let features = match self.features.is_empty() {
-            true => "none".to_owned(),
-            false => self.features.join(", "),
-        };
-        writeln!(f, "palpate {}", self.version)?;
-        writeln!(f, "commit {}", self.commit.unwrap_or("not stated"))?;
-        writeln!(f, "engine {}", self.engine_version)?;
-        writeln!(f, "record {}", self.record_version)?;
-        writeln!(f, "target {}", self.target)?;
-        writeln!(f, "features {features}")?;
-        write!(f, "built for {}", if self.is_release { "release" } else { "debugging" })
-    }
 }
 
 /// A text of lines without what a line calls a secret, and without names and passwords before a host.

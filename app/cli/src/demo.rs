@@ -20,7 +20,7 @@ pub struct DemoArgs {
 }
 
 #[derive(Serialize)]
-struct Recorded {
+struct RecordedSession {
     session: PathBuf,
     protocol: &'static str,
     specimen: &'static str,
@@ -45,15 +45,22 @@ pub(super) fn run(args: &DemoArgs, output: &Output) -> Result<(), Failure> {
     drop(bar);
     let mut sessions = Vec::new();
     for (run, outcome) in DEMONSTRATION_RUNS.iter().zip(outcomes) {
-        let session = outcome.map_err(|_| Failure::failed("the recording was interrupted"))?;
+        let session = outcome.map_err(|_| incomplete(&library))?;
         let session = session.map_err(Failure::failed)?;
-        sessions.push(Recorded { session, protocol: run.protocol, specimen: run.specimen });
+        sessions.push(RecordedSession { session, protocol: run.protocol, specimen: run.specimen });
     }
     use_updated_catalog(&library, output, |_| Ok(()))?;
     let shown = library.display().to_string();
     let object = serde_json::json!({ "library": shown, "sessions": sessions });
     output.answer("demo", &object, || text(&sessions, &shown));
     Ok(())
+}
+
+fn incomplete(library: &Path) -> Failure {
+    Failure::failed(format!(
+        "the recording was interrupted, so {} lacks sessions; give another folder and record them again",
+        library.display()
+    ))
 }
 
 /// Simulated sessions are not mixed into a library that is in use.
@@ -69,8 +76,8 @@ fn check_empty(library: &Path) -> Result<(), Failure> {
     )))
 }
 
-fn text(sessions: &[Recorded], library: &str) -> String {
-    let line = |one: &Recorded| format!("{:<22} {}", one.protocol, one.specimen);
+fn text(sessions: &[RecordedSession], library: &str) -> String {
+    let line = |one: &RecordedSession| format!("{:<22} {}", one.protocol, one.specimen);
     let lines: Vec<String> = sessions.iter().map(line).collect();
     format!(
         "{}\n{} sessions recorded in {library}; set PALPATE_HOME to this folder to find them in the window and with 'palpate find'",

@@ -1,8 +1,6 @@
 //! A library to try palpate with: varied sessions of the simulated rig, recorded as fast as the computer can.
 
-use crate::{
-    AfterStop, PromptResponder, RunRequest, Runner, RunnerRequest, StartError, TimeScale, wall_now,
-};
+use crate::{AfterStop, PromptResponder, RunRequest, StartedRun, TimeScale, wall_now};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettingError, SimSettings, calibration};
 use palpate_model::metadata::{MetadataError, SessionLabels};
@@ -11,12 +9,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_protocols::file::{BUILT_IN, check};
 use palpate_sessions::{new_session_folder, new_session_id};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::sync_channel;
-use std::time::Duration;
 use thiserror::Error;
-
-/// How long the runner may be silent before it is looked at.
-const LOOK: Duration = Duration::from_millis(500);
 
 /// The sample library cannot be recorded.
 #[derive(Debug, Error)]
@@ -24,7 +17,7 @@ pub enum DemonstrationError {
     #[error("the session of {specimen} cannot be recorded ({reason}); choose another folder")]
     Start { specimen: &'static str, reason: String },
     #[error(
-        "the session of {specimen} ended early ({reason}); run 'palpate doctor' on {}", folder.display()
+        "the session of {specimen} ended early ({reason}); look at what it holds in {}", folder.display()
     )]
     Ended { specimen: &'static str, reason: String, folder: PathBuf },
 }
@@ -129,44 +122,18 @@ impl DemonstrationRun {
         let folder = new_session_folder(library, &new_session_id(wall_now().into()));
         let settings = self.settings().map_err(|err| failed(err.to_string()))?;
         let request = self.request(&settings, folder.clone()).map_err(failed)?;
-        let (wake, woken) = sync_channel(1);
-        let (reply, answer) = sync_channel(1);
-        let first = RunnerRequest::Run(Box::new(request), reply);
-        let runner = Runner::start(
-            Box::new(SimRig::new(settings)),
-            TimeScale::Max,
-            Some(first),
-            move || {
-                // A full channel holds a wake-up already.
-                let _ = wake.try_send(());
+        let rig = Box::new(SimRig::new(settings));
+        let started = StartedRun::start(rig, TimeScale::Max, request);
+        let started = started.map_err(|err| failed(err.to_string()))?;
+        started.wait_for_start().map_err(|err| failed(err.to_string()))?;
+        let reason = match started.wait_for_end(|_| ()) {
+            Ok(snapshot) => match snapshot.run.as_ref().and_then(|run| run.outcome.clone()) {
+                Some(outcome) if outcome.ending == EndingKind::Finish => return Ok(folder),
+                outcome => outcome.map_or(String::new(), |outcome| outcome.reason),
             },
-        )
-        .map_err(|err| failed(err.to_string()))?;
-        let ended = |reason: String, folder| DemonstrationError::Ended {
-            specimen: self.specimen,
-            reason,
-            folder,
+            Err(err) => err.to_string(),
         };
-        match answer.recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
-                return Err(failed(reason));
-            }
-            Err(_) => return Err(failed("the runner ended".to_owned())),
-        }
-        loop {
-            let is_awake = woken.recv_timeout(LOOK).is_ok();
-            let snapshot = runner.snapshot();
-            if let Some(outcome) = snapshot.run.as_ref().and_then(|run| run.outcome.as_ref()) {
-                return match outcome.ending == EndingKind::Finish {
-                    true => Ok(folder),
-                    false => Err(ended(outcome.reason.clone(), folder)),
-                };
-            }
-            if !is_awake && !runner.is_alive() {
-                return Err(ended("the runner ended".to_owned(), folder));
-            }
-        }
+        Err(DemonstrationError::Ended { specimen: self.specimen, reason, folder })
     }
 
     fn settings(&self) -> Result<SimSettings, SimSettingError> {

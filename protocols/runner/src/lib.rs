@@ -22,6 +22,7 @@ pub mod replay;
 mod run_log;
 mod snapshot;
 mod start;
+mod started_run;
 #[cfg(test)]
 mod tests;
 mod watch;
@@ -36,3 +37,4 @@ pub use snapshot::{
     ContactTrigger, Lateness, LogLine, PlannedWeight, PromptView, RigView, RunView, RunnerSnapshot,
 };
 pub use start::{AfterStop, PromptResponder, RunRequest, StartError};
+pub use started_run::{RunnerEnded, StartedRun};

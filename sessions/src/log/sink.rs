@@ -174,6 +174,10 @@ pub struct WrittenFile {
 impl WrittenFile {
     /// Quick check of name and length.
     pub fn check(&self) -> Result<(), Alteration> {
+        // A pipe would keep whoever opens it waiting.
+        if !std::fs::metadata(&self.path).map_err(unreadable)?.is_file() {
+            return Err(Alteration::Replaced);
+        }
         let there = Handle::from_path(&self.path).map_err(unreadable)?;
         if there != *self.id {
             return Err(Alteration::Replaced);

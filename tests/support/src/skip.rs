@@ -22,7 +22,7 @@ pub enum TestNeed<'a> {
     File(&'a Path),
     /// A command of the shell that succeeds.
     Command(&'a str),
-    /// A computer that is in time once in so many runs.
+    /// A computer that is in time in one of so many runs.
     RealTime(usize),
 }
 
@@ -34,7 +34,7 @@ impl TestNeed<'_> {
             Self::Python(name) => ("python", (*name).into()),
             Self::File(path) => ("file", path.display().to_string()),
             Self::Command(line) => ("command", (*line).into()),
-            Self::RealTime(runs) => ("computer", format!("in time once in {runs} runs")),
+            Self::RealTime(runs) => ("computer", format!("that is in time in one of {runs} runs")),
         }
     }
 }

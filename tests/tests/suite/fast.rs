@@ -7,8 +7,8 @@ use palpate_protocols::engine::{EndingKind, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::preview;
 use palpate_rheology::fit::{FitOptions, fit};
-use palpate_runner::TimeScale;
 use palpate_runner::replay::replay;
+use palpate_runner::{StartedRun, TimeScale};
 use palpate_sessions::{EntryKind, Session};
 use palpate_test_support::wait::PATIENCE;
 use palpate_tests::built_in_plan;
@@ -157,7 +157,7 @@ fn a_fast_rig_loses_nothing_at_real_pace_with_the_live_fit() {
     let rig = SimRig::new(settings(SimProfile::Lab, "20000", 6));
     let calibration = rig.calibration();
     // Twenty times as fast as the wall, for a run of two minutes would be a long test.
-    let (runner, woken) = recorded_runs::start(
+    let StartedRun { runner, woken, .. } = recorded_runs::start(
         Box::new(rig),
         calibration,
         short().plan(),

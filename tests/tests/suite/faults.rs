@@ -7,7 +7,7 @@ use palpate_model::rig::{AxisStatus, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds, Volts};
 use palpate_protocols::plans::RampHold;
 use palpate_runner::replay::replay;
-use palpate_runner::{Runner, TimeScale};
+use palpate_runner::{Runner, StartedRun, TimeScale};
 use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;
 use palpate_tests::recorded_runs;
@@ -82,7 +82,7 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
             let plan = RampHold { hold: Seconds(3600.0), ..params() }.plan();
             let calibration = rig.calibration();
             let scale = TimeScale::Factor(50.0);
-            let (runner, woken) =
+            let StartedRun { runner, woken, .. } =
                 recorded_runs::start(Box::new(rig), calibration, plan, scale, &place);
             let is_pressing = |runner: &Runner| {
                 let snapshot = runner.snapshot();

@@ -18,7 +18,7 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::{FindContact, Follow, Plan, Step};
 use palpate_runner::haptics::slave::{SlaveLeader, SlaveReport, SlaveSettings};
 use palpate_runner::replay::replay;
-use palpate_runner::{Runner, RunnerRequest, TimeScale, driver_clock};
+use palpate_runner::{Runner, RunnerRequest, StartedRun, TimeScale, driver_clock};
 use palpate_sessions::Session;
 use palpate_test_support::skip::lacks_terminals;
 use palpate_test_support::wait::{Deadline, PATIENCE, in_time, until};
@@ -207,7 +207,7 @@ fn protocol_once() -> Result<(), String> {
     let (rig, calibration) = bench(folder.path(), &port).unwrap();
     let plan = built_in_plan("check-home", &[]);
     let out = folder.path().join("session");
-    let (runner, woken) =
+    let StartedRun { runner, woken, .. } =
         recorded_runs::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
     let has_ended = || {
         let snapshot = runner.snapshot();

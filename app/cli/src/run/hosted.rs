@@ -4,9 +4,9 @@
 use super::super::output::{KeptOutput, Output};
 use super::super::{Command, Failure, log, parse_options, programme};
 use super::report::report;
-use super::{BegunRun, check_start, read, request};
+use super::{check_start, read, request, start_failure};
 use palpate_protocols::engine::Operator;
-use palpate_runner::{AfterStop, RunRequest, RunView, RunnerRequest, RunnerSnapshot};
+use palpate_runner::{AfterStop, RunRequest, RunView, RunnerRequest, RunnerSnapshot, StartedRun};
 use palpate_sessions::folder::HolderLock;
 use serde_json::Value;
 use std::sync::{Arc, Once};
@@ -14,7 +14,7 @@ use std::time::Duration;
 
 /// A run in progress. Dropped, it stops the rig and closes the session.
 pub struct HostedRun {
-    begun: BegunRun,
+    started: StartedRun,
     /// Remarks made before the start.
     pub notes: Vec<String>,
     /// Lock a named rig against other programs.
@@ -38,8 +38,8 @@ fn prepare_process() {
 }
 
 impl HostedRun {
-    /// Starts what `palpate run` with these arguments would start. Nobody is asked whether to retract after a stop: the
-    /// probe stays where it is.
+    /// Starts what `palpate run` with these arguments would start. After a stop the
+    /// probe stays where it is, without a question.
     pub fn start(arguments: &[String]) -> Result<Self, Failure> {
         let Command::Run(args) = parse_options("run", arguments)? else {
             return Err(Failure::usage("these are not options of 'palpate run'"));
@@ -62,27 +62,20 @@ impl HostedRun {
         let (request, preview, gate) = request(plan, &bench, options, labels, &output)?;
         check_start(&preview, &gate, options.acknowledge, &output)?;
         let request = RunRequest { after_stop: AfterStop::Close, ..request };
-        let begun = BegunRun::start(bench.rig, options.rig.time_scale, request)?;
-        begun.wait_for_start()?;
-        Ok(Self { begun, notes: output.take().notes, _locks: bench._locks })
+        let started = StartedRun::start(bench.rig, options.rig.time_scale, request);
+        let started = started.map_err(start_failure)?;
+        started.wait_for_start().map_err(start_failure)?;
+        Ok(Self { started, notes: output.take().notes, _locks: bench._locks })
     }
 
     /// The next snapshot, or `None` if there is none within `patience`.
     pub fn next(&self, patience: Duration) -> Result<Option<Arc<RunnerSnapshot>>, Failure> {
-        let runner = &self.begun.runner;
-        let is_woken = self.begun.woken.recv_timeout(patience).is_ok();
-        if is_woken {
-            return Ok(Some(runner.snapshot()));
-        }
-        match runner.is_alive() {
-            true => Ok(None),
-            false => Err(Failure::failed(super::ENDED_UNEXPECTEDLY)),
-        }
+        self.started.next(patience).map_err(Failure::failed)
     }
 
     /// Passes on the operator's choice.
     pub fn choose(&self, choice: Operator) -> Result<(), Failure> {
-        self.begun.runner.request(RunnerRequest::Operator(choice)).map_err(Failure::Failed)
+        self.started.runner.request(RunnerRequest::Operator(choice)).map_err(Failure::Failed)
     }
 
     /// The report of the run, once its view has an outcome.

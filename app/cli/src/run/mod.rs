@@ -23,7 +23,7 @@ use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_runner::{
     AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot,
-    SharedLeadSource, StartError, TimeScale, wall_now,
+    SharedLeadSource, StartError, StartedRun, TimeScale, wall_now,
 };
 use palpate_sessions::library_folder;
 use report::{preview_text, report};
@@ -31,15 +31,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
-use std::time::Duration;
 
 /// The indenter where none is given.
 pub(super) const USUAL_INDENTER: &str = "blunt 12 mm probe";
 
 const NO_PROTOCOL: &str = "give the name of a protocol; 'palpate protocol list' lists the names";
-const ENDED_UNEXPECTEDLY: &str =
-    "the thread that runs protocols ended unexpectedly; the session is incomplete";
 
 /// Run a protocol without a window
 #[derive(Debug, Args)]
@@ -287,43 +283,28 @@ pub(super) fn execute(
     output: &Output,
 ) -> Result<Arc<RunnerSnapshot>, Failure> {
     let has_operator = request.answers == PromptResponder::Operator;
-    let begun = BegunRun::start(rig, scale, request)?;
-    let is_question_open = stop_on_signals(&begun.runner)?;
-    begun.wait_for_start()?;
-    let BegunRun { runner, woken, .. } = begun;
-    let prompts = has_operator.then(|| OperatorPrompts::start(runner.requests(), is_question_open));
-    watch(&runner, &woken, prompts.transpose()?, output)
-}
-
-/// A runner that was asked for a run.
-struct BegunRun {
-    runner: Runner,
-    /// Gets a word after each snapshot.
-    woken: Receiver<()>,
-    answer: Receiver<Result<(), StartError>>,
-}
-
-impl BegunRun {
-    fn start(rig: Box<dyn Rig>, scale: TimeScale, request: RunRequest) -> Result<Self, Failure> {
-        let (wake, woken) = sync_channel(1);
-        let (reply, answer) = sync_channel(1);
-        let first = RunnerRequest::Run(Box::new(request), reply);
-        let runner = Runner::start(rig, scale, Some(first), move || {
-            // A full channel holds a wake-up already.
-            let _ = wake.try_send(());
-        });
-        Ok(Self { runner: runner.map_err(Failure::failed)?, woken, answer })
-    }
-
-    fn wait_for_start(&self) -> Result<(), Failure> {
-        match self.answer.recv() {
-            Ok(Ok(())) => Ok(()),
-            Ok(Err(StartError::Refused(reason))) => Err(Failure::Usage(reason)),
-            Ok(Err(StartError::Failed(reason))) => Err(Failure::Failed(reason)),
-            Err(_) => Err(Failure::failed(
-                "the thread that runs protocols ended before the run began; start the run again",
-            )),
+    let started = StartedRun::start(rig, scale, request).map_err(start_failure)?;
+    let is_question_open = stop_on_signals(&started.runner)?;
+    started.wait_for_start().map_err(start_failure)?;
+    let requests = started.runner.requests();
+    let prompts = has_operator.then(|| OperatorPrompts::start(requests, is_question_open));
+    let mut prompts = prompts.transpose()?;
+    let bar = output.bar(1000);
+    let ended = started.wait_for_end(|view| {
+        bar.set_position((view.fraction * 1000.0) as u64);
+        bar.set_message(progress_text(view));
+        if let Some(prompts) = &mut prompts {
+            bar.suspend(|| prompts.update(view, output));
         }
+    });
+    ended.map_err(Failure::failed)
+}
+
+/// A request that is not possible is wrong use; one that could not be begun has failed.
+fn start_failure(err: StartError) -> Failure {
+    match err {
+        StartError::Refused(reason) => Failure::Usage(reason),
+        StartError::Failed(reason) => Failure::Failed(reason),
     }
 }
 
@@ -354,33 +335,6 @@ pub(super) fn stop_on_signals(runner: &Runner) -> Result<Arc<AtomicBool>, Failur
         let _ = requests.try_send(RunnerRequest::Operator(choice));
     })?;
     Ok(is_question_open)
-}
-
-/// Draws progress until the run is over.
-fn watch(
-    runner: &Runner,
-    woken: &Receiver<()>,
-    mut prompts: Option<OperatorPrompts>,
-    output: &Output,
-) -> Result<Arc<RunnerSnapshot>, Failure> {
-    let bar = output.bar(1000);
-    loop {
-        let is_alive = woken.recv_timeout(Duration::from_millis(500)).is_ok();
-        let snapshot = runner.snapshot();
-        let Some(view) = &snapshot.run else { continue };
-        bar.set_position((view.fraction * 1000.0) as u64);
-        bar.set_message(progress_text(view));
-        if let Some(prompts) = &mut prompts {
-            bar.suspend(|| prompts.update(view, output));
-        }
-        if view.outcome.is_some() {
-            drop(bar);
-            return Ok(snapshot);
-        }
-        if !is_alive && !runner.is_alive() {
-            return Err(Failure::failed(ENDED_UNEXPECTEDLY));
-        }
-    }
 }
 
 fn progress_text(view: &RunView) -> String {
