@@ -204,3 +204,23 @@ fn unreadable(err: io::Error) -> Alteration {
         _ => Alteration::Unreadable(err.to_string()),
     }
 }
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    /// Opening a pipe waits for whoever writes into it, and a run must not wait for that.
+    #[test]
+    fn log_replaced_by_a_pipe_is_noticed_without_waiting() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("000.mcap");
+        let mut sink = FileSink::create(&path).unwrap();
+        sink.append(b"samples").unwrap();
+        sink.sync().unwrap();
+        assert_eq!(sink.written().unwrap().check(), Ok(()));
+        std::fs::remove_file(&path).unwrap();
+        let mode = rustix::fs::Mode::from_raw_mode(0o600);
+        rustix::fs::mknodat(rustix::fs::CWD, &path, rustix::fs::FileType::Fifo, mode, 0).unwrap();
+        assert_eq!(sink.written().unwrap().check(), Err(Alteration::Replaced));
+    }
+}
