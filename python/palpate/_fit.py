@@ -142,8 +142,8 @@ class Fit(_Mapping):  # type: ignore[type-arg]
     @property
     def sentences(self) -> List[str]:
         """Warnings, then findings: what window and command line say about this fit."""
-        said = [one for record in self.records for key in ("warnings", "findings") for one in record.get(key, ())]
-        return list(dict.fromkeys(said))
+        found = [one for record in self.records for key in ("warnings", "findings") for one in record.get(key, ())]
+        return list(dict.fromkeys(found))
 
     def to_dict(self) -> Dict[str, Any]:
         """The report as a plain dictionary, as in JSON."""

@@ -186,7 +186,7 @@ pub fn fit_arrays<'py>(
 /// What a fit of a session can be asked for.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct SessionFitRequest {
+pub struct SessionFitOptions {
     analysis: Option<String>,
     unload: bool,
     systematic: bool,
@@ -197,7 +197,7 @@ pub struct SessionFitRequest {
     reason: String,
 }
 
-impl SessionFitRequest {
+impl SessionFitOptions {
     fn recipe(&self, options: FitOptions) -> PyResult<FitRecipe> {
         let library = library_folder();
         let corrections = match &self.compliance {
@@ -251,7 +251,7 @@ pub fn fit_session(
     py: Python<'_>,
     path: PathBuf,
     request: FitRequest,
-    session: SessionFitRequest,
+    session: SessionFitOptions,
 ) -> PyResult<FitTuple<'_>> {
     if session.unload && request.family.is_none() {
         return Err(refused(

@@ -34,12 +34,12 @@ pub struct DemonstrationRun {
     /// Further labels of the session.
     pub about: &'static [(&'static str, &'static str)],
     pub seed: u64,
-    pub tissue: Tissue,
+    pub tissue: DemonstrationTissue,
 }
 
 /// What the simulated rig presses on; percent and mm as [`SimSettings`] has them.
 #[derive(Clone, Copy, Debug)]
-pub struct Tissue {
+pub struct DemonstrationTissue {
     pub stiffness: &'static str,
     pub softening: &'static str,
     pub preconditioning: &'static str,
@@ -48,11 +48,16 @@ pub struct Tissue {
 
 type Pairs = &'static [(&'static str, &'static str)];
 
-const USUAL: Tissue =
-    Tissue { stiffness: "100", softening: "0", preconditioning: "0", thickness: "100" };
-const STIFFER: Tissue = Tissue { stiffness: "112", ..USUAL };
-const SOFT: Tissue = Tissue { stiffness: "40", thickness: "60", ..USUAL };
-const SOFTENING: Tissue = Tissue { softening: "20", preconditioning: "3", ..SOFT };
+const USUAL: DemonstrationTissue = DemonstrationTissue {
+    stiffness: "100",
+    softening: "0",
+    preconditioning: "0",
+    thickness: "100",
+};
+const STIFFER: DemonstrationTissue = DemonstrationTissue { stiffness: "112", ..USUAL };
+const SOFT: DemonstrationTissue = DemonstrationTissue { stiffness: "40", thickness: "60", ..USUAL };
+const SOFTENING: DemonstrationTissue =
+    DemonstrationTissue { softening: "20", preconditioning: "3", ..SOFT };
 
 const STOMACH: Pairs = &[("specimen.source", "pig stomach, fundus")];
 const LIVER: Pairs = &[("specimen.source", "pig liver"), ("specimen.thickness_mm", "60")];
@@ -137,7 +142,7 @@ impl DemonstrationRun {
     }
 
     fn settings(&self) -> Result<SimSettings, SimSettingError> {
-        let Tissue { stiffness, softening, preconditioning, thickness } = self.tissue;
+        let DemonstrationTissue { stiffness, softening, preconditioning, thickness } = self.tissue;
         Ok(SimSettings {
             seed: self.seed,
             stiffness: stiffness.parse()?,

@@ -18,7 +18,7 @@ use palpate_model::calibration::{ForceUncertainty, UncertaintyTerm};
 use palpate_model::units::Newtons;
 
 /// Standard uncertainty of the width of a loop, relative to its width in the calibration: over a part of the range a loop
-/// is narrower, by nobody knows how much. That of a rectangular distribution from nothing to the whole: 1 / sqrt(12).
+/// is narrower, by an unknown amount. That of a rectangular distribution from nothing to the whole: 1 / sqrt(12).
 const LOOP_SHARE: f64 = 0.29;
 
 /// One independent error that records share.
