@@ -4,12 +4,13 @@ use palpate_analysis::compliance::{
     ComplianceCorrections, LATEST_COMPLIANCE, compliance_from_session,
 };
 use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
+use palpate_analysis::plan::PlanAssumptions;
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
 use palpate_drivers::sim::{RigWithTruth, SimCell, SimProfile, SimRig, SimSettings};
 use palpate_model::calibration::Calibration;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_model::{Depth, MmPerS, Seconds};
+use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{
@@ -48,6 +49,8 @@ pub struct CoverageCase {
     pub settings: SimSettings,
     /// Weights that the calibration of a cell of its own leaves out.
     pub is_short_of_weights: bool,
+    /// Speed and hold of the run; those of the thesis otherwise.
+    pub press: Option<(MmPerS, Seconds)>,
     /// A second run at this speed in mm/s on the same specimen, the body shared.
     pub second_speed: Option<f64>,
     /// Whether the rig gives way, and how much is measured on a stiff surface before.
@@ -162,6 +165,9 @@ fn recorded(
         }),
     ));
     let mut params = RampHold::default();
+    if let Some((speed, hold)) = case.press {
+        (params.speed, params.hold) = (speed, hold);
+    }
     if let Some(speed) = speed {
         params.speed = MmPerS(speed);
     }
@@ -177,6 +183,32 @@ fn recorded(
     let [mu1, mu2, mu3] = body.mu;
     let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig, contact_error];
     (Recording::of(format!("{speed:?}"), source, compliance), values)
+}
+
+/// What `palpate plan --like` takes from one run of a case.
+///
+/// # Panics
+/// If the run or the fit fails.
+#[must_use]
+pub fn plan_assumptions(case: &CoverageCase) -> PlanAssumptions {
+    let (recording, _) = recorded(case, &SimRig::new(case.settings).calibration(), None);
+    let records = Recordings { all: vec![recording], notes: Vec::new() };
+    let fitted = FitSolution::fit_signals(&records.signals(), &FitOptions::default(), &[]);
+    let fitted = fitted.expect("a fit");
+    let report = fitted.report();
+    let value = |name| report.value(name).expect("a parameter");
+    PlanAssumptions {
+        body: ModifiedKelvin {
+            tau_eps: value("tau_eps"),
+            mu: ["mu1", "mu2", "mu3"].map(value),
+            tau_sig: value("tau_sig"),
+        },
+        noise: Newtons(report.rmse_n),
+        signal: fitted.expected_signal(),
+        source: "one run".into(),
+        is_hardly_known: false,
+        notes: Vec::new(),
+    }
 }
 
 /// Records what the case asks for and fits it as `palpate fit` does.

@@ -8,10 +8,11 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_rheology::expected::{
-    CorrelatedNoise, DesignLimits, ExpectedError, FreeOffsets, MeasurementNoise, PrecisionCurves,
-    PrecisionTarget, ProtocolFamily, ProtocolProposal, compute_precision_curves,
+    CorrelatedNoise, DesignLimits, ExpectedError, FreeOffsets, Measurement, MeasurementNoise,
+    PrecisionCurves, PrecisionTarget, ProtocolFamily, ProtocolProposal, compute_precision_curves,
     find_shortest_protocols,
 };
+use palpate_rheology::fit::ExpectedSignal;
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
@@ -64,7 +65,9 @@ pub enum PlanFailure {
 pub struct PlanAssumptions {
     pub body: ModifiedKelvin,
     pub noise: Newtons,
-    /// Origin of both, in words.
+    /// What the load cell of the run with that fit reported; `None` where it was no session.
+    pub signal: Option<ExpectedSignal>,
+    /// Origin of body and noise, in words.
     pub source: String,
     /// Whether the relaxation time is too uncertain for a plan.
     pub is_hardly_known: bool,
@@ -77,6 +80,7 @@ pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFit
         let (known, notes) = KnownFit::of(like, None)?;
         (known, like.display().to_string(), notes)
     } else if let Some(known) = KnownFit::last()? {
+        let known = known.with_signal();
         let of = known.source.as_deref().unwrap_or("an unnamed record");
         let source = format!("the last fit, of {of}");
         (known, source, Vec::new())
@@ -84,6 +88,7 @@ pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFit
         return Ok(PlanAssumptions {
             body: ModifiedKelvin::THESIS,
             noise: NOISE_ASSUMED,
+            signal: None,
             source: "the pig stomach of the source thesis, because no fit is remembered yet".into(),
             is_hardly_known: false,
             notes: Vec::new(),
@@ -92,6 +97,7 @@ pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFit
     Ok(PlanAssumptions {
         body: known.body()?,
         noise: Newtons(known.rmse_n),
+        signal: known.signal.clone(),
         is_hardly_known: is_poorly_identified(&known.parameters),
         source,
         notes,
@@ -103,6 +109,8 @@ pub fn plan_assumptions(like: Option<&Path>) -> Result<PlanAssumptions, KnownFit
 pub struct PlanReport {
     pub body: ModifiedKelvin,
     pub body_source: String,
+    /// What the load cell reports, where that is known; noise of the force and unknowns then do not count.
+    pub signal: Option<PlannedSignal>,
     pub noise: MeasurementNoise,
     pub unknowns: FreeOffsets,
     pub rig: DesignLimits,
@@ -110,6 +118,17 @@ pub struct PlanReport {
     pub proposals: Vec<PlanOffer>,
     /// Intervals against hold, cycles and sampling rate.
     pub curves: PrecisionCurves,
+}
+
+/// What the load cell is expected to report.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct PlannedSignal {
+    /// Noise of one sample in V.
+    pub noise_v: f64,
+    /// Random walk of the zero in V over one second.
+    pub walk_v: f64,
+    /// Standard uncertainty of the contact position.
+    pub contact_error_mm: f64,
 }
 
 /// A proposal with the commands that run it.
@@ -133,13 +152,27 @@ pub fn plan(
     let noise =
         MeasurementNoise { white: request.white.unwrap_or(assumed.noise), memory: request.memory };
     let (body, unknowns) = (assumed.body, request.unknowns);
-    let proposals = find_shortest_protocols(&body, &noise, unknowns, &request.targets, &rig)?;
-    let curves = compute_precision_curves(&body, &noise, unknowns, &rig, drawn(&proposals))?;
+    // Whoever states a noise or what is known plans with that.
+    let is_stated = request.white.is_some()
+        || request.memory.is_some()
+        || unknowns != FreeOffsets::default();
+    let signal = assumed.signal.as_ref().filter(|_| !is_stated);
+    let measurement = match signal {
+        Some(signal) => Measurement::Signal(signal),
+        None => Measurement::Forces { noise, unknowns },
+    };
+    let proposals = find_shortest_protocols(&body, measurement, &request.targets, &rig)?;
+    let curves = compute_precision_curves(&body, measurement, &rig, drawn(&proposals))?;
     let offers = proposals.into_iter();
     let offers = offers.map(|proposal| offer(proposal, bench, rig.depth, request.command));
     Ok(PlanReport {
         proposals: offers.collect(),
         body,
+        signal: signal.map(|signal| PlannedSignal {
+            noise_v: signal.noise().0,
+            walk_v: signal.walk(),
+            contact_error_mm: signal.contact_error_mm(),
+        }),
         body_source: assumed.source,
         noise,
         unknowns,

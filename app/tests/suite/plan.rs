@@ -58,6 +58,39 @@ fn a_proposed_run_reaches_what_was_promised() {
     assert!((0.7..1.3).contains(&reached), "{reached} %");
 }
 
+/// A run tells how its load cell behaves, and the next one reaches what was planned with that.
+#[test]
+fn a_plan_like_a_session_knows_its_load_cell() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = |words: &str| {
+        let words = format!("{words} --time-scale max --seed 3");
+        succeeded(&palpate(at, &words.split(' ').collect::<Vec<_>>()));
+    };
+    run("run ramp-hold --depth 20 --hold 10 --out demo");
+    let ask = "plan --within tau=0.5% --depth 20 --json --like demo";
+    let planned = answer(&palpate(at, &ask.split(' ').collect::<Vec<_>>()));
+    let signal = &planned["signal"];
+    // The lab rig's cell has 0.6 mV of noise in a sample; its zero and its contact position are never exact.
+    let number = |key: &str| signal[key].as_f64().unwrap();
+    assert!((2e-4..2e-3).contains(&number("noise_v")), "{signal}");
+    assert!(number("walk_v") > 0.0 && number("contact_error_mm") > 0.0, "{signal}");
+    let proposal = &planned["proposals"][0];
+    let command = proposal["commands"][0].as_str().unwrap();
+    run(&format!("{} --out planned", command.strip_prefix("palpate ").unwrap()));
+    let fit = json(&palpate(at, &["fit", "planned", "--json"]));
+    // The size of a drift is known from one run to a third or so.
+    let (promised, reached) =
+        (percent(&proposal["parameters"], "tau_eps"), percent(&fit["parameters"], "tau_eps"));
+    assert!((0.6..1.6).contains(&(reached / promised)), "{reached} % instead of {promised} %");
+
+    // Whoever states a noise plans with it, and forces then have an offset.
+    let ask = format!("{ask} --noise-mn 20");
+    let stated = answer(&palpate(at, &ask.split(' ').collect::<Vec<_>>()));
+    assert!(stated["signal"].is_null());
+    assert_eq!(stated["noise"]["white"], 0.02);
+}
+
 #[test]
 fn the_last_fit_is_assumed_and_any_other_can_be() {
     let folder = tempfile::tempdir().unwrap();

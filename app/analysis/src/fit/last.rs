@@ -6,7 +6,10 @@
 use super::SourceFit;
 use crate::source::{self, RecordStretch, SourceError};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_rheology::fit::{FitError, FitOptions, FitReport, FittedParameter};
+use palpate_rheology::fit::{
+    ExpectedSignal, FitError, FitOptions, FitReport, FitSample, FitSolution, FittedParameter,
+    Signal, SignalRecord,
+};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
 use palpate_tables::import::ColumnNames;
@@ -43,6 +46,9 @@ pub struct KnownFit {
     /// Root mean square of the residuals in N.
     pub rmse_n: f64,
     pub parameters: Vec<FittedParameter>,
+    /// What the load cell is expected to report in the next run, where the source is a session whose signal was fitted.
+    #[serde(skip)]
+    pub signal: Option<ExpectedSignal>,
 }
 
 impl KnownFit {
@@ -94,8 +100,20 @@ impl KnownFit {
             source: Some(path.display().to_string()),
             rmse_n: report.rmse_n,
             parameters: report.parameters,
+            signal: expected_signal(&fitted.samples, fitted.signal.as_ref()),
         };
         Ok((known, fitted.notes))
+    }
+
+    /// The same with the signal of its source, if that is a session which is still where it was.
+    #[must_use]
+    pub fn with_signal(mut self) -> Self {
+        let source = self.source.as_deref().map(Path::new).filter(|path| path.is_dir());
+        let read = source.map(|path| source::read_stretch(path, None, RecordStretch::RampHold));
+        if let Some(Ok(source)) = read {
+            self.signal = expected_signal(&source.samples, source.signal.as_ref());
+        }
+        self
     }
 
     /// The modified Kelvin body; an error names a missing parameter.
@@ -112,6 +130,13 @@ impl KnownFit {
             tau_sig: value("tau_sig")?,
         })
     }
+}
+
+fn expected_signal(samples: &[FitSample], signal: Option<&Signal>) -> Option<ExpectedSignal> {
+    signal?;
+    let record = SignalRecord { name: "the known run", samples, signal };
+    let fitted = FitSolution::fit_signals(&[record], &FitOptions::default(), &[]);
+    fitted.ok()?.expected_signal()
 }
 
 /// Whether a fit is a poor ground for a plan, because it hardly knows how fast the tissue relaxes.

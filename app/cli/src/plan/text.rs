@@ -32,6 +32,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
         })
         .collect();
     let noise = &report.noise;
+    let rate = plain(report.rig.sample_rate_hz);
     let slow = noise.memory.map_or(String::new(), |memory| {
         format!(", and {} mN that lasts {} s", plain(memory.sd.0 * 1e3), plain(memory.time.0))
     });
@@ -40,14 +41,22 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
         .iter()
         .map(|target| format!("{} within {} %", target.parameter, plain(target.percent)))
         .collect();
+    let noise = match &report.signal {
+        Some(signal) => format!(
+            "signal  noise {} mV in every sample, drift {} uV in one second, contact position ± {} um; {rate} samples per second",
+            digits(signal.noise_v * 1e3, 3),
+            digits(signal.walk_v * 1e6, 3),
+            digits(signal.contact_error_mm * 1e3, 3)
+        ),
+        None => format!(
+            "noise   {} mN in every sample{slow}; {rate} samples per second",
+            digits(noise.white.0 * 1e3, 3)
+        ),
+    };
     vec![
         format!("model   {}", report.body_source),
         format!("        {}", body.join(", ")),
-        format!(
-            "noise   {} mN in every sample{slow}; {} samples per second",
-            digits(noise.white.0 * 1e3, 3),
-            plain(report.rig.sample_rate_hz)
-        ),
+        noise,
         format!(
             "limits  depth {} mm, force {} N, speed {} mm/s",
             plain(report.rig.depth.0),

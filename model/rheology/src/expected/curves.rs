@@ -1,7 +1,7 @@
 //! Expected intervals against what can be chosen: hold, number of cycles, sampling rate.
 
-use super::information::{ExpectedError, intervals};
-use super::noise::{FreeOffsets, MeasurementNoise};
+use super::information::ExpectedError;
+use super::measurement::Measurement;
 use super::protocol::ProtocolPath;
 use super::rig::{DesignLimits, allowed_speeds, shallowest_turn};
 use palpate_model::units::{Depth, MmPerS, Seconds};
@@ -52,16 +52,15 @@ pub struct PrecisionCurves {
 /// hold.
 pub fn compute_precision_curves(
     body: &ModifiedKelvin,
-    noise: &MeasurementNoise,
-    unknowns: FreeOffsets,
+    measurement: Measurement<'_>,
     rig: &DesignLimits,
     (speed, hold): (MmPerS, Seconds),
 ) -> Result<PrecisionCurves, ExpectedError> {
-    noise.check()?;
+    measurement.check()?;
     let tau = body.checked()?.tau_eps;
     let speeds = allowed_speeds(body, rig)?;
     let drawn = || speeds.iter().copied().step_by(SPEED_RATIO).take(SPEEDS);
-    let at = |protocol: ProtocolPath| match intervals(body, &protocol, noise, unknowns) {
+    let at = |protocol: ProtocolPath| match measurement.precision(body, &protocol) {
         Ok(expected) => expected.parameters.map(|parameter| parameter.percent),
         Err(_) => [None; 5],
     };

@@ -115,27 +115,38 @@ pub fn intervals(
     }
     let inverse = triangle::inverse(&shared, &lengths.map(f64::sqrt))
         .map_err(|names| ExpectedError::Inseparable { names })?;
-    let variances = variances(&inverse, &slow, noise);
-    let values = [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig];
-    let parameters = std::array::from_fn(|k| {
-        // The first column is the derivative by log tau.
-        let scale = if k == 0 { body.tau_eps } else { 1.0 };
-        let std_error = scale * variances[k].sqrt();
-        let share = Z975 * std_error / values[k].abs();
-        ExpectedParameter {
-            name: PARAMETER_NAMES[k],
-            value: values[k],
-            unit: PARAMETER_UNITS[k],
-            std_error,
-            percent: share.is_finite().then_some(100.0 * share),
+    let mut errors = variances(&inverse, &slow, noise).map(f64::sqrt);
+    // The first column is the derivative by log tau.
+    errors[0] *= body.tau_eps;
+    Ok(ExpectedPrecision::of(body, errors, forces, protocol))
+}
+
+impl ExpectedPrecision {
+    /// From standard errors in the order of [`PARAMETER_NAMES`], and the lowest and highest force in N.
+    pub(super) fn of(
+        body: &ModifiedKelvin,
+        errors: [f64; BODY],
+        forces: [f64; 2],
+        protocol: &ProtocolPath,
+    ) -> Self {
+        let values = [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig];
+        let parameters = std::array::from_fn(|k| {
+            let share = Z975 * errors[k] / values[k].abs();
+            ExpectedParameter {
+                name: PARAMETER_NAMES[k],
+                value: values[k],
+                unit: PARAMETER_UNITS[k],
+                std_error: errors[k],
+                percent: share.is_finite().then_some(100.0 * share),
+            }
+        });
+        Self {
+            parameters,
+            force_min: Newtons(forces[0]),
+            force_max: Newtons(forces[1]),
+            duration: protocol.duration(),
         }
-    });
-    Ok(ExpectedPrecision {
-        parameters,
-        force_min: Newtons(forces[0]),
-        force_max: Newtons(forces[1]),
-        duration: protocol.duration(),
-    })
+    }
 }
 
 /// Whether sums over a press of this length can be had.

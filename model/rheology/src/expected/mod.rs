@@ -7,6 +7,9 @@
 //! 2.1 and 6.2). `J` needs a path and a body but no measurement, so intervals can be known, and the
 //! shortest protocol that reaches a wanted one found, before any tissue is touched.
 //!
+//! Where a run on the same rig was fitted in what its load cell reported, its noise, the drift of its zero and its contact
+//! position are expected of the next run too ([`Measurement::Signal`]).
+//!
 //! Start at [`intervals`] for one protocol and at [`find_shortest_protocols`] for the search.
 //!
 //! ```
@@ -26,6 +29,7 @@
 
 mod curves;
 mod information;
+mod measurement;
 mod noise;
 mod protocol;
 mod response;
@@ -38,6 +42,7 @@ pub use information::{
     ExpectedError, ExpectedParameter, ExpectedPrecision, PARAMETER_NAMES, PARAMETER_UNITS,
     intervals,
 };
+pub use measurement::Measurement;
 pub use noise::{CorrelatedNoise, FreeOffsets, MeasurementNoise};
 pub use protocol::{PathPiece, ProtocolPath};
 pub use rig::DesignLimits;

@@ -4,10 +4,8 @@
 //! to what the rig makes. For each speed the shortest hold (or the smallest number of cycles) that
 //! reaches every target is found by bisection. No randomness: the same question, the same answer.
 
-use super::information::{
-    ExpectedError, ExpectedPrecision, PARAMETER_NAMES, check_resolved, intervals,
-};
-use super::noise::{FreeOffsets, MeasurementNoise};
+use super::information::{ExpectedError, ExpectedPrecision, PARAMETER_NAMES, check_resolved};
+use super::measurement::Measurement;
 use super::protocol::ProtocolPath;
 use super::rig::{DesignLimits, TURNS, allowed_speeds, has_tension};
 use palpate_model::units::{Depth, MmPerS, Seconds};
@@ -97,15 +95,14 @@ pub struct ProtocolProposal {
 /// each family that reaches every target; a family that cannot is left out.
 pub fn find_shortest_protocols(
     body: &ModifiedKelvin,
-    noise: &MeasurementNoise,
-    unknowns: FreeOffsets,
+    measurement: Measurement<'_>,
     targets: &[PrecisionTarget],
     rig: &DesignLimits,
 ) -> Result<Vec<ProtocolProposal>, ExpectedError> {
-    noise.check()?;
+    measurement.check()?;
     let speeds = allowed_speeds(&body.checked()?, rig)?;
     check_resolved(body.tau_eps, rig.sample_rate_hz, rig.duration_max.0)?;
-    let mut search = Search { body, noise, unknowns, targets, rig, closest: None };
+    let mut search = Search { body, measurement, targets, rig, closest: None };
     for target in targets {
         let value = value_of(body, target.parameter);
         if value.abs() <= 0.0 {
@@ -137,8 +134,7 @@ fn value_of(body: &ModifiedKelvin, name: &str) -> f64 {
 
 struct Search<'a> {
     body: &'a ModifiedKelvin,
-    noise: &'a MeasurementNoise,
-    unknowns: FreeOffsets,
+    measurement: Measurement<'a>,
     targets: &'a [PrecisionTarget],
     rig: &'a DesignLimits,
     /// The smallest worst excess met, as interval over target, with the target and its interval.
@@ -275,7 +271,7 @@ impl Search<'_> {
     /// The expected precision, if the force is allowed and every target is reached.
     fn evaluate(&mut self, family: ProtocolFamily) -> Option<ExpectedPrecision> {
         let protocol = family.protocol(self.rig);
-        let expected = intervals(self.body, &protocol, self.noise, self.unknowns).ok()?;
+        let expected = self.measurement.precision(self.body, &protocol).ok()?;
         // The rig's own limit is in force; what rounding adds is not.
         if expected.force_max.0 > self.rig.force_max.0 * (1.0 + 1e-9) {
             return None;

@@ -42,7 +42,7 @@ pub use report::{
     BudgetEntry, FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate,
 };
 pub use sample::{FitError, FitSample};
-pub use signal::{Signal, SignalRecord, UnloadedMean};
+pub use signal::{ExpectedSignal, Signal, SignalRecord, UnloadedMean};
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
     SystematicError, SystematicUncertainty, TermError, TracedRecord, estimate_systematic,

@@ -250,14 +250,25 @@ impl<'a> System<'a> {
     /// The same records with their signals: the measured zero takes the place of an offset, and contact is where its
     /// touch found it, to within the uncertainty of the touch. A contact position that was fixed stays, and with a fixed
     /// offset the forces are fitted: both are the caller's choice.
-    pub fn with_signals(mut self, records: &[SignalRecord<'a>]) -> Self {
+    pub fn with_signals(self, records: &[SignalRecord<'a>]) -> Self {
         let layout = self.layout();
         if self.options.fixed[layout.offset()].is_some() {
             return self;
         }
-        for (record, own) in records.iter().enumerate() {
+        let terms = records.iter().enumerate().map(|(record, own)| {
             let known = self.fixed[record][layout.contact()];
-            let Some(term) = SignalTerm::new(*own, known) else { continue };
+            SignalTerm::new(*own, known)
+        });
+        let terms = terms.collect();
+        self.with_terms(terms)
+    }
+
+    /// The same records with these signals.
+    pub fn with_terms(mut self, terms: Vec<Option<SignalTerm<'a>>>) -> Self {
+        let layout = self.layout();
+        for (record, term) in terms.into_iter().enumerate() {
+            let Some(term) = term else { continue };
+            let known = self.fixed[record][layout.contact()];
             self.fixed[record][layout.offset()] = Some(0.0);
             let assumed = known.filter(|_| self.options.is_contact_assumed);
             if let Some((contact, error)) = assumed.zip(term.contact_error_mm) {

@@ -3,8 +3,8 @@
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 use palpate_rheology::expected::{
-    CorrelatedNoise, DesignLimits, ExpectedError, ExpectedPrecision, FreeOffsets, MeasurementNoise,
-    PrecisionTarget, ProtocolFamily, ProtocolPath, find_shortest_protocols, intervals,
+    CorrelatedNoise, DesignLimits, ExpectedError, ExpectedPrecision, FreeOffsets, Measurement,
+    MeasurementNoise,     PrecisionTarget, ProtocolFamily, ProtocolPath, find_shortest_protocols, intervals,
 };
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_test_support::record;
@@ -282,6 +282,10 @@ fn real_fits_scatter_as_expected() {
     }
 }
 
+fn forces(noise: MeasurementNoise) -> Measurement<'static> {
+    Measurement::Forces { noise, unknowns: FreeOffsets::default() }
+}
+
 fn rig() -> DesignLimits {
     DesignLimits {
         speed_quantum: MmPerS(0.03),
@@ -300,7 +304,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
         let target = PrecisionTarget::new(name, percent).unwrap();
         let unknowns = FreeOffsets::default();
         let proposals =
-            find_shortest_protocols(&BODY, &noise, unknowns, &[target], &rig()).unwrap();
+            find_shortest_protocols(&BODY, forces(noise), &[target], &rig()).unwrap();
         assert!(matches!(proposals[0].family, ProtocolFamily::RampHold { .. }));
         let reached = |protocol: &ProtocolPath| {
             let expected = intervals(&BODY, protocol, &noise, unknowns).ok()?;
@@ -336,7 +340,7 @@ fn impossible_targets_are_refused_in_words() {
     let noise = MeasurementNoise::white(Newtons(0.02));
     let ask = |name: &str, percent: f64, rig: DesignLimits| {
         let targets = [PrecisionTarget::new(name, percent).unwrap()];
-        let found = find_shortest_protocols(&BODY, &noise, FreeOffsets::default(), &targets, &rig);
+        let found = find_shortest_protocols(&BODY, forces(noise), &targets, &rig);
         found.unwrap_err().to_string()
     };
     let text = ask("tau", 0.001, rig());

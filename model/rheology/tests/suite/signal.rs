@@ -1,7 +1,8 @@
 //! Fits of what the load cell reported: a zero that wanders is measured, and what the caller fixed stays fixed.
 use palpate_model::calibration::{Calibration, ForceUncertainty, HysteresisLoop, WeightStep};
-use palpate_model::units::{Newtons, Seconds, Volts};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::expected::{Measurement, ProtocolPath};
 use palpate_rheology::fit::{
     FitOptions, FitReport, FitSample, FitSolution, Signal, SignalRecord, TracedRecord,
     UnloadedMean, fit,
@@ -84,6 +85,38 @@ fn steady_drift_bends_the_fit_of_forces_and_not_that_of_volts() {
         assert!(z.abs() < 4.2, "seed {seed}: {z}");
     }
     assert!(by_volts < 0.5 * by_forces, "{by_volts} {by_forces}");
+}
+
+/// What a plan expects of a run like one that was fitted is what the fit of that run states, and how fits of other runs
+/// scatter.
+#[test]
+fn expected_precision_is_what_a_fit_states_and_how_fits_scatter() {
+    let options = FitOptions::default();
+    let (samples, signal) = record(0);
+    let run = SignalRecord { name: "known", samples: &samples, signal: Some(&signal) };
+    let known = FitSolution::fit_signals(&[run], &options, &[]).unwrap();
+    let expected_signal = known.expected_signal().unwrap();
+    // The ramp and hold of `record`: 30 mm and 20 s.
+    let path = ProtocolPath::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(20.0), 100.0);
+    let expected = Measurement::Signal(&expected_signal).precision(&THESIS, &path).unwrap();
+    let report = known.report();
+    let mut squares = [0.0; 5];
+    const RUNS: u64 = 40;
+    for seed in 1..=RUNS {
+        let (samples, signal) = record(seed);
+        let found = fitted(&samples, &signal, &options);
+        for (square, one) in squares.iter_mut().zip(&expected.parameters) {
+            let error = found.value(one.name).unwrap() - one.value;
+            *square += (error / one.std_error).powi(2);
+        }
+    }
+    for (square, one) in squares.into_iter().zip(&expected.parameters) {
+        // The noise of 6000 samples is known to 1 %, and samples are thinned.
+        let stated = report.parameter(one.name).unwrap().std_error.unwrap();
+        assert!((one.std_error / stated - 1.0).abs() < 0.03, "{}: {stated} {one:?}", one.name);
+        // Chi-square of 40 degrees of freedom, once in 2000 by chance on each side.
+        assert!((16.0..76.1).contains(&square), "{}: {square}", one.name);
+    }
 }
 
 #[test]

@@ -35,6 +35,11 @@ pub(in super::super) struct Drift {
 }
 
 impl Drift {
+    /// Time between nodes of the zero over a time in s.
+    pub fn spacing_over(secs: f64) -> f64 {
+        secs / NODES
+    }
+
     /// The nodes for rows that weigh by one over their noise, times `scale`.
     pub fn nodes(&self, scale: f64) -> ZeroNodes {
         ZeroNodes {
@@ -67,7 +72,7 @@ pub(in super::super) struct DriftSizes {
 impl DriftSizes {
     /// Of the means out of contact, for nodes from `start` to `end` in s; `None` where there are too few.
     pub fn of(unloaded: &[UnloadedMean], start: f64, end: f64) -> Option<Self> {
-        let spacing = (end - start) / NODES;
+        let spacing = Drift::spacing_over(end - start);
         if unloaded.len() < 4 || spacing <= 0.0 {
             return None;
         }
@@ -89,6 +94,16 @@ impl DriftSizes {
         let sizes: Vec<DriftSize> = all.sizes.iter().filter(is_possible).copied().collect();
         let is_noisy = sizes.iter().all(|one| one.variance > 0.0);
         (!sizes.is_empty() && is_noisy).then_some(Self { sizes, ..all })
+    }
+
+    /// The one size that is known.
+    pub fn given(drift: &Drift) -> Self {
+        let size = DriftSize {
+            ratio: drift.walk / drift.noise,
+            deviance: 0.0,
+            variance: drift.noise.powi(2),
+        };
+        Self { start: drift.start, spacing: drift.spacing, sizes: vec![size] }
     }
 
     /// The same sizes judged by more rows: `solve` gives the problem without the zero, the sum of squares left, the sum of

@@ -8,11 +8,13 @@
 //! record, and search, steps, sharing and profiles are the same.
 
 mod drift;
+mod expected;
 mod lag;
 mod pass;
 mod zero;
 
 pub(super) use drift::{Drift, DriftSizes};
+pub use expected::ExpectedSignal;
 use palpate_model::calibration::{CalibrationCurve, HysteresisLoop};
 use palpate_model::units::{Newtons, Seconds, Volts};
 
@@ -111,6 +113,17 @@ impl<'a> SignalTerm<'a> {
         };
         whole.take(drift, record.samples);
         (signal.volts.len() == record.samples.len()).then_some(whole)
+    }
+
+    /// Of a signal whose noise, wandering and contact position, at depth 0, are known to be so large.
+    fn given(signal: &'a Signal, drift: Drift, contact_error_mm: f64) -> Self {
+        Self {
+            signal,
+            sizes: DriftSizes::given(&drift),
+            drift,
+            contact_mm: 0.0,
+            contact_error_mm: Some(contact_error_mm),
+        }
     }
 
     /// Takes noise and wandering of these sizes, with what they make of the contact position.
