@@ -16,7 +16,8 @@ fn main() {
     let case = CoverageCase::named("lab");
     let rig = SimRig::new(case.settings);
     let curve = rig.calibration().curve().expect("a curve");
-    let (description, limits) = (rig.description().clone(), Limits::default());
+    let (description, limits) =
+        (rig.description().clone(), Limits::for_travel(rig.description().travel));
     let request = |percent| PlanRequest {
         targets: vec![PrecisionTarget::new("tau", percent).expect("a target")],
         unknowns: FreeOffsets::default(),

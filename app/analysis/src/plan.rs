@@ -153,9 +153,8 @@ pub fn plan(
         MeasurementNoise { white: request.white.unwrap_or(assumed.noise), memory: request.memory };
     let (body, unknowns) = (assumed.body, request.unknowns);
     // Whoever states a noise or what is known plans with that.
-    let is_stated = request.white.is_some()
-        || request.memory.is_some()
-        || unknowns != FreeOffsets::default();
+    let is_stated =
+        request.white.is_some() || request.memory.is_some() || unknowns != FreeOffsets::default();
     let signal = assumed.signal.as_ref().filter(|_| !is_stated);
     let measurement = match signal {
         Some(signal) => Measurement::Signal(signal),

@@ -55,10 +55,12 @@ fn of_signal(
     let wanted = SAMPLES.max(SAMPLES_PER_TAU * longest / body.tau_eps) / longest;
     let taken_rate = rate.min(wanted);
     let mut forces = [f64::INFINITY, f64::NEG_INFINITY];
-    let presses = protocol.presses.iter().map(|press| samples(body, press, taken_rate, &mut forces));
+    let presses =
+        protocol.presses.iter().map(|press| samples(body, press, taken_rate, &mut forces));
     let presses: Vec<Vec<FitSample>> = presses.collect();
     let errors = signal.std_errors(body, &presses, rate, taken_rate);
-    let errors = errors.ok_or_else(|| ExpectedError::Inseparable { names: "the parameters".into() })?;
+    let errors =
+        errors.ok_or_else(|| ExpectedError::Inseparable { names: "the parameters".into() })?;
     Ok(ExpectedPrecision::of(body, errors, forces, protocol))
 }
 
@@ -74,12 +76,13 @@ fn samples(
     let mut piece = pieces.next();
     let (mut state, mut now, mut depth) = (KelvinState::at_rest(), 0.0, 0.0);
     let mut piece_end = piece.map_or(0.0, |piece| piece.duration.0);
-    let mut step_to = |state: &mut KelvinState, to: f64, at: f64, depth: &mut f64, now: &mut f64| {
-        let force = state.step(body, Depth(to), Seconds(at - *now));
-        (*depth, *now) = (to, at);
-        *forces = [forces[0].min(force.0), forces[1].max(force.0)];
-        force
-    };
+    let mut step_to =
+        |state: &mut KelvinState, to: f64, at: f64, depth: &mut f64, now: &mut f64| {
+            let force = state.step(body, Depth(to), Seconds(at - *now));
+            (*depth, *now) = (to, at);
+            *forces = [forces[0].min(force.0), forces[1].max(force.0)];
+            force
+        };
     let mut found = Vec::with_capacity(count + 1);
     for k in 0..=count {
         let t = k as f64 / rate;

@@ -4,7 +4,8 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 use palpate_rheology::expected::{
     CorrelatedNoise, DesignLimits, ExpectedError, ExpectedPrecision, FreeOffsets, Measurement,
-    MeasurementNoise,     PrecisionTarget, ProtocolFamily, ProtocolPath, find_shortest_protocols, intervals,
+    MeasurementNoise, PrecisionTarget, ProtocolFamily, ProtocolPath, find_shortest_protocols,
+    intervals,
 };
 use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use palpate_test_support::record;
@@ -303,8 +304,7 @@ fn the_proposals_reach_the_target_and_nothing_shorter_does() {
     for (name, percent) in [("tau", 1.0), ("tau", 0.3), ("mu1", 0.5), ("mu3", 0.05)] {
         let target = PrecisionTarget::new(name, percent).unwrap();
         let unknowns = FreeOffsets::default();
-        let proposals =
-            find_shortest_protocols(&BODY, forces(noise), &[target], &rig()).unwrap();
+        let proposals = find_shortest_protocols(&BODY, forces(noise), &[target], &rig()).unwrap();
         assert!(matches!(proposals[0].family, ProtocolFamily::RampHold { .. }));
         let reached = |protocol: &ProtocolPath| {
             let expected = intervals(&BODY, protocol, &noise, unknowns).ok()?;
