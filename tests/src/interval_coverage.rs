@@ -4,13 +4,12 @@ use palpate_analysis::compliance::{
     ComplianceCorrections, LATEST_COMPLIANCE, compliance_from_session,
 };
 use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
-use palpate_analysis::plan::PlanAssumptions;
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
 use palpate_drivers::sim::{RigWithTruth, SimCell, SimProfile, SimRig, SimSettings};
 use palpate_model::calibration::Calibration;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_model::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{
@@ -33,6 +32,8 @@ pub const NAMES: [&str; 6] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "x_cont
 pub struct CoverageDraw {
     pub error: f64,
     pub std_error: f64,
+    /// Half of the width of the statistical interval.
+    pub half: f64,
     pub is_covered: bool,
     /// Error of the middle of the total interval, and half of its width.
     pub total_error: f64,
@@ -150,7 +151,7 @@ fn measured_compliance(settings: SimSettings) -> ComplianceCorrections {
 }
 
 /// One ramp and hold as a recording, and what was true.
-fn recorded(
+pub(crate) fn recorded(
     case: &CoverageCase,
     calibration: &Calibration,
     speed: Option<f64>,
@@ -183,32 +184,6 @@ fn recorded(
     let [mu1, mu2, mu3] = body.mu;
     let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig, contact_error];
     (Recording::of(format!("{speed:?}"), source, compliance), values)
-}
-
-/// What `palpate plan --like` takes from one run of a case.
-///
-/// # Panics
-/// If the run or the fit fails.
-#[must_use]
-pub fn plan_assumptions(case: &CoverageCase) -> PlanAssumptions {
-    let (recording, _) = recorded(case, &SimRig::new(case.settings).calibration(), None);
-    let records = Recordings { all: vec![recording], notes: Vec::new() };
-    let fitted = FitSolution::fit_signals(&records.signals(), &FitOptions::default(), &[]);
-    let fitted = fitted.expect("a fit");
-    let report = fitted.report();
-    let value = |name| report.value(name).expect("a parameter");
-    PlanAssumptions {
-        body: ModifiedKelvin {
-            tau_eps: value("tau_eps"),
-            mu: ["mu1", "mu2", "mu3"].map(value),
-            tau_sig: value("tau_sig"),
-        },
-        noise: Newtons(report.rmse_n),
-        signal: fitted.expected_signal(),
-        source: "one run".into(),
-        is_hardly_known: false,
-        notes: Vec::new(),
-    }
 }
 
 /// Records what the case asks for and fits it as `palpate fit` does.
@@ -298,6 +273,7 @@ fn draws_of(parameters: &[FittedParameter], truth: &[f64; 6]) -> CoverageDraws {
         CoverageDraw {
             error: (one.value - truth[k]) / scale,
             std_error: std_error / scale,
+            half: one.ci95.map_or(0.0, |[low, high]| 0.5 * (high - low) / scale),
             is_covered: holds(one.ci95),
             total_error: (0.5 * (low + high) - truth[k]) / scale,
             total_half: 0.5 * (high - low) / scale,

@@ -4,6 +4,7 @@ pub mod contact_search;
 pub mod flow;
 pub mod interval_coverage;
 pub mod lab;
+pub mod planned_runs;
 pub mod recorded_runs;
 pub mod sample_library;
 pub mod simulated;

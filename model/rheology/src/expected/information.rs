@@ -118,25 +118,27 @@ pub fn intervals(
     let mut errors = variances(&inverse, &slow, noise).map(f64::sqrt);
     // The first column is the derivative by log tau.
     errors[0] *= body.tau_eps;
-    Ok(ExpectedPrecision::of(body, errors, forces, protocol))
+    Ok(ExpectedPrecision::of(body, errors.map(|error| (error, Z975)), forces, protocol))
 }
 
 impl ExpectedPrecision {
-    /// From standard errors in the order of [`PARAMETER_NAMES`], and the lowest and highest force in N.
+    /// From standard errors in the order of [`PARAMETER_NAMES`], each with how many of them an interval reaches, and the lowest and
+    /// highest force in N.
     pub(super) fn of(
         body: &ModifiedKelvin,
-        errors: [f64; BODY],
+        errors: [(f64, f64); BODY],
         forces: [f64; 2],
         protocol: &ProtocolPath,
     ) -> Self {
         let values = [body.tau_eps, body.mu[0], body.mu[1], body.mu[2], body.tau_sig];
         let parameters = std::array::from_fn(|k| {
-            let share = Z975 * errors[k] / values[k].abs();
+            let (std_error, reach) = errors[k];
+            let share = reach * std_error / values[k].abs();
             ExpectedParameter {
                 name: PARAMETER_NAMES[k],
                 value: values[k],
                 unit: PARAMETER_UNITS[k],
-                std_error: errors[k],
+                std_error,
                 percent: share.is_finite().then_some(100.0 * share),
             }
         });

@@ -3,7 +3,7 @@
 use super::information::{ExpectedError, ExpectedPrecision, check_resolved, intervals};
 use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::{PathPiece, ProtocolPath, duration_of};
-use crate::fit::{ExpectedSignal, FitSample};
+use crate::fit::{ExpectedSignal, FitSample, student_t975};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 
@@ -61,6 +61,7 @@ fn of_signal(
     let errors = signal.std_errors(body, &presses, rate, taken_rate);
     let errors =
         errors.ok_or_else(|| ExpectedError::Inseparable { names: "the parameters".into() })?;
+    let errors = errors.map(|(error, freedom)| (error, student_t975(freedom)));
     Ok(ExpectedPrecision::of(body, errors, forces, protocol))
 }
 

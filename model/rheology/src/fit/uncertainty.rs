@@ -35,14 +35,27 @@ pub(super) struct Uncertainty {
 /// Factor on the variance of drift from whose effect its share is taken.
 const DRIFT_STEP: f64 = 1.1;
 
-fn more_drift(system: &System<'_>, refined: &RefinedFit) -> Option<(Factor, f64)> {
-    let mut other = system.clone();
-    let mut known = 0.0f64;
-    for term in other.signals.iter_mut().flatten() {
-        term.drift.walk *= DRIFT_STEP.sqrt();
-        known = known.max(term.drift.spread);
+/// The drift's share of a variance, from the standard error with the drift as it is and with more of it.
+pub(super) fn drift_share(error: f64, with_more: f64) -> f64 {
+    let more = (with_more / error).powi(2) - 1.0;
+    (more / (DRIFT_STEP - 1.0)).clamp(0.0, 1.0)
+}
+
+impl System<'_> {
+    /// The same with drift of a larger variance.
+    pub(super) fn with_more_drift(&self) -> Self {
+        let mut other = self.clone();
+        for term in other.signals.iter_mut().flatten() {
+            term.drift.walk *= DRIFT_STEP.sqrt();
+        }
+        other
     }
-    Some((other.pass(&refined.points, Rows::All)?.joint, known))
+}
+
+fn more_drift(system: &System<'_>, refined: &RefinedFit) -> Option<(Factor, f64)> {
+    let terms = system.signals.iter().flatten();
+    let known = terms.fold(0.0f64, |known, term| known.max(term.drift.spread));
+    Some((system.with_more_drift().pass(&refined.points, Rows::All)?.joint, known))
 }
 
 /// One parameter's uncertainty.
@@ -139,11 +152,11 @@ impl Uncertainty {
         // The drift's share of the variance is no better known than the drift (Welch and Satterthwaite, JCGM 100:2008,
         // G.4).
         let shares = self.drift.as_ref().map(|(factor, _)| {
-            let more = (scatter * factor.deviation(combination) / independent).powi(2) - 1.0;
+            let drift = drift_share(independent, scatter * factor.deviation(combination));
             let influence = refined.pass.joint.influence(combination);
             let prior = self.contacts.iter().map(|(k, weight)| (weight * influence[*k]).powi(2));
             let contact = prior.sum::<f64>() * (scatter / independent).powi(2);
-            [(more / (DRIFT_STEP - 1.0)).clamp(0.0, 1.0), contact.clamp(0.0, 1.0)]
+            [drift, contact.clamp(0.0, 1.0)]
         });
         let known = self.drift.as_ref().map_or(0.0, |(_, known)| *known);
         let uncertainty = uncertainty + shares.map_or(0.0, |[drift, _]| known * drift * drift);

@@ -4,10 +4,12 @@
 //! parameters of a body and without noise, so that an expected standard error is what such a fit states.
 
 use super::super::columns::{OuterPoint, ParameterPoint};
+use super::super::identify::{self, JudgedParameters};
 use super::super::options::FitOptions;
 use super::super::sample::{FitSample, NamedSamples};
 use super::super::solve::FitSolution;
 use super::super::system::{Rows, System};
+use super::super::uncertainty::drift_share;
 use super::{Drift, Signal, SignalTerm, UnloadedMean};
 use crate::families::PowerSeries;
 use palpate_model::units::{Newtons, Seconds, Volts};
@@ -65,7 +67,7 @@ impl ExpectedSignal {
         self.contact_error_mm
     }
 
-    /// Standard errors of `tau_eps`, `mu1`, `mu2`, `mu3` and `tau_sig` in a fit of presses into one body, each beginning
+    /// Standard errors and degrees of freedom of `tau_eps`, `mu1`, `mu2`, `mu3` and `tau_sig` in a fit of presses into one body, each beginning
     /// at time 0 in tissue at rest. `presses` are their samples without noise at `taken_rate_hz`, where the load cell would be
     /// read at `rate_hz`, each sample as noisy as in the run. `None` where the presses do not separate the parameters.
     pub(crate) fn std_errors(
@@ -74,7 +76,7 @@ impl ExpectedSignal {
         presses: &[Vec<FitSample>],
         rate_hz: f64,
         taken_rate_hz: f64,
-    ) -> Option<[f64; BODY]> {
+    ) -> Option<[(f64, f64); BODY]> {
         // A sample taken stands for so many of the load cell.
         let thinning = rate_hz / taken_rate_hz;
         let share = taken_rate_hz / self.sample_rate_hz;
@@ -109,12 +111,24 @@ impl ExpectedSignal {
         for (k, value) in [mu1, mu2, mu3, body.tau_sig].into_iter().enumerate() {
             system.pin(&mut points, 0, system.layout().outers + k, value);
         }
-        let joint = system.pass(&points, Rows::All)?.joint;
-        let errors: [f64; BODY] = std::array::from_fn(|parameter| {
-            let combination = system.combination(0, parameter, &points[0]);
-            system.sigma_scale * joint.deviation(&combination)
-        });
-        errors.iter().all(|error| error.is_finite() && *error > 0.0).then_some(errors)
+        // What a fit would refuse is no plan.
+        identify::check(&system, &points, JudgedParameters::Linear).ok()?;
+        identify::check(&system, &points, JudgedParameters::WithOuter).ok()?;
+        let deviations = |system: &System<'_>| -> Option<[f64; BODY]> {
+            let joint = system.pass(&points, Rows::All)?.joint;
+            let found: [f64; BODY] = std::array::from_fn(|parameter| {
+                let combination = system.combination(0, parameter, &points[0]);
+                system.sigma_scale * joint.deviation(&combination)
+            });
+            found.iter().all(|one| one.is_finite() && *one > 0.0).then_some(found)
+        };
+        let errors = deviations(&system)?;
+        // The run knows the size of the drift no better than it says, and a plan knows it from that run alone.
+        let more = deviations(&system.with_more_drift())?;
+        Some(std::array::from_fn(|k| {
+            let share = drift_share(errors[k], more[k]);
+            (errors[k], (2.0 / (self.drift.spread * share * share)).max(1.0))
+        }))
     }
 
     /// The signal of one press, its zero seen before and after as in the run, in this share of the samples.
