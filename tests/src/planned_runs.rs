@@ -69,7 +69,8 @@ pub fn planned_press(assumed: PlanAssumptions, percent: f64) -> PlannedPress {
         memory: None,
         sample_rate_hz: 1000.0,
         depth: RampHold::default().depth,
-        force_max: None,
+        // Below what the load cell is calibrated for, for a specimen half as stiff again as well.
+        force_max: Some(Newtons(6.0)),
         speed_max: None,
         duration_max: Seconds(3600.0),
         command: &|_| String::new(),

@@ -21,6 +21,7 @@ mod profile;
 mod record;
 mod refine;
 mod report;
+mod richer;
 mod sample;
 mod search;
 mod sentences;

@@ -92,6 +92,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
                  describe the record to within its noise, and intervals based on about {} are rough",
                 independent_words(noise.effective_samples)
             ));
+            warnings.extend(fitted.richer_words(record, noise.effective_samples));
         }
     }
     warnings

@@ -247,7 +247,7 @@ impl<'a> FitSolution<'a> {
     }
 }
 
-fn joint_system<'a>(
+pub(super) fn joint_system<'a>(
     records: &[NamedSamples<'a>],
     options: &FitOptions,
     shared: &[&str],
@@ -270,7 +270,7 @@ fn joint_system<'a>(
 }
 
 /// The end of the search on the thinned records.
-fn search_start(system: &System<'_>) -> Result<Vec<ParameterPoint>, FitError> {
+pub(super) fn search_start(system: &System<'_>) -> Result<Vec<ParameterPoint>, FitError> {
     let found = best_outers(system).and_then(|outers| system.solved(&outers, Rows::Thin));
     let Some((points, _)) = found else {
         identify::check(system, &system.middle_points(), JudgedParameters::Linear)?;

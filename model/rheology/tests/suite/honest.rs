@@ -1,7 +1,8 @@
 //! Records that once fooled the fit: it must say so, or not be fooled.
 
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_model::{Depth, Newtons};
+use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families::Model;
 use palpate_rheology::fit::{
     Bootstrap, FitError, FitOptions, FitSample, FitSolution, LiveFit, fit, fit_joint,
 };
@@ -147,4 +148,48 @@ fn few_samples_are_not_called_a_wrong_model() {
     let sentences: Vec<&str> = report.sentences().collect();
     assert!(!sentences.iter().any(|text| text.contains("lack of fit")), "{sentences:?}");
     assert!(sentences.iter().any(|text| text.contains("only 41 samples")), "{sentences:?}");
+}
+
+/// Where the family is wrong, the fit says by how much a richer one moves each parameter: what a fit of that one finds.
+#[test]
+fn lack_of_fit_says_how_far_a_richer_family_moves_the_parameters() {
+    let body = Model {
+        family: "series-4".into(),
+        outer: vec![1.0],
+        linear: vec![0.05, -0.008, 4e-4, 1e-5, 0.06],
+    };
+    let path: Vec<(Seconds, Depth)> = (0..6000)
+        .map(|i| 0.01 * f64::from(i))
+        .map(|t| (Seconds(t), Depth((0.75 * t).min(20.0))))
+        .collect();
+    let forces = body.along(path.iter().copied()).unwrap();
+    let mut noise = Noise::seeded(3);
+    let samples: Vec<FitSample> = path
+        .iter()
+        .zip(forces)
+        .map(|(&(t, depth), force)| FitSample {
+            t,
+            depth,
+            force: Newtons(force + 0.01 * noise.normal()),
+            sigma: Newtons(0.01),
+        })
+        .collect();
+    let own = fit(&samples, &FitOptions::default()).unwrap();
+    let richer = fit(&samples, &FitOptions::by_key("series-4").unwrap()).unwrap();
+    let found = own.warnings.iter().find(|text| text.contains("series-4"));
+    let found = found.unwrap_or_else(|| panic!("{:?}", own.warnings));
+    for name in ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"] {
+        let stated = found.split(&format!("{name} by ")).nth(1).unwrap();
+        let stated: f64 = stated.split(' ').next().unwrap().parse().unwrap();
+        let [before, after] = [&own, &richer].map(|report| report.value(name).unwrap());
+        let expected = 100.0 * (after - before) / before.abs();
+        // Thinned records are a share of a standard error away.
+        let error = 100.0 * richer.parameter(name).unwrap().std_error.unwrap() / before.abs();
+        assert!(
+            (stated - expected).abs() < 0.5 * error + 0.01,
+            "{name}: {stated} {expected} {error}"
+        );
+    }
+    // Where the family is right, nothing is said.
+    assert!(!richer.warnings.iter().any(|text| text.contains("richer")), "{:?}", richer.warnings);
 }
