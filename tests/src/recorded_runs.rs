@@ -12,13 +12,15 @@ use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;
 use std::path::Path;
 
-/// Runs as fast as the computer can until the run has ended, however it ended.
+/// Runs as fast as the computer can until the run has ended, however it ended; what the preview asks to acknowledge is
+/// acknowledged.
 ///
 /// # Panics
 /// If the run is not started or says nothing for minutes.
 #[must_use]
 pub fn record_ramp_hold(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
-    record_plan(rig, calibration, params.plan())
+    let asked = Asked { is_acknowledged: true, ..Asked::of(params.plan()) };
+    record(rig, calibration, asked).expect("a start")
 }
 
 /// Runs any plan.
@@ -42,10 +44,31 @@ pub fn try_record_plan(
     calibration: Calibration,
     plan: Plan,
 ) -> Result<Session, StartError> {
+    record(rig, calibration, Asked::of(plan))
+}
+
+/// What is asked of the runner.
+struct Asked {
+    plan: Plan,
+    scale: TimeScale,
+    leader: Option<SharedLeadSource>,
+    is_acknowledged: bool,
+}
+
+impl Asked {
+    fn of(plan: Plan) -> Self {
+        Self { plan, scale: TimeScale::Max, leader: None, is_acknowledged: false }
+    }
+}
+
+fn record(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    asked: Asked,
+) -> Result<Session, StartError> {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    let started = ask(rig, calibration, plan, TimeScale::Max, &out, None)?;
-    wait_for_end(started);
+    wait_for_end(ask(rig, calibration, asked, &out)?);
     Ok(Session::open(&out).expect("the session"))
 }
 
@@ -76,7 +99,7 @@ pub fn start(
     scale: TimeScale,
     out: &Path,
 ) -> StartedRun {
-    ask(rig, calibration, plan, scale, out, None).expect("a start")
+    ask(rig, calibration, Asked { scale, ..Asked::of(plan) }, out).expect("a start")
 }
 
 /// A plan with a step that follows, at full pace or in real time, as a session read back from disk.
@@ -91,28 +114,24 @@ pub fn record_led_plan(
     scale: TimeScale,
     leader: SharedLeadSource,
 ) -> Session {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("session");
-    let started = ask(rig, calibration, plan, scale, &out, Some(leader)).expect("a start");
-    wait_for_end(started);
-    Session::open(&out).expect("the session")
+    let asked = Asked { scale, leader: Some(leader), ..Asked::of(plan) };
+    record(rig, calibration, asked).expect("a start")
 }
 
 fn ask(
     rig: Box<dyn Rig>,
     calibration: Calibration,
-    plan: Plan,
-    scale: TimeScale,
+    asked: Asked,
     out: &Path,
-    leader: Option<SharedLeadSource>,
 ) -> Result<StartedRun, StartError> {
+    let Asked { plan, scale, leader, is_acknowledged } = asked;
     let request = RunRequest {
         plan,
         calibration,
         limits: Limits::for_travel(rig.description().travel),
         out: Some(out.to_owned()),
         labels: SessionLabels::default(),
-        is_acknowledged: false,
+        is_acknowledged,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: PromptResponder::Confirm,

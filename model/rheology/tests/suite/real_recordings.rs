@@ -2,7 +2,7 @@
 //! so and passes when its file is absent.
 
 use palpate_model::{Depth, Newtons, Seconds};
-use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_rheology::fit::{FitOptions, FitSample, FitSolution, fit};
 use palpate_rheology::select::{SelectOptions, SelectionOutcome, select};
 use palpate_test_support::skip;
 use std::ops::ControlFlow;
@@ -71,4 +71,41 @@ fn no_family_wins_on_tissue_and_a_tolerance_decides() {
     assert_eq!(tight.outcome, SelectionOutcome::NoneWithin, "{tight:?}");
     let wide = tolerated(Some("10%")).verdict;
     assert!(wide.family.is_some(), "{wide:?}");
+}
+
+/// Two presses of one person's tissue: the band of the force that a fit of one predicts, on the other one until it unloads.
+/// No interval of a wrong model is right, and this says by how much.
+#[test]
+fn bands_of_one_press_are_compared_with_the_other() {
+    let (Some(one), Some(other)) =
+        (recording("perineal_P002_laser9.csv"), recording("perineal_P002_load_hold_unload.csv"))
+    else {
+        return;
+    };
+    let loaded = |samples: Vec<FitSample>| -> Vec<FitSample> {
+        let deepest = samples.iter().map(|one| one.depth.0).fold(0.0, f64::max);
+        let last = samples.iter().rposition(|one| one.depth.0 > 0.999 * deepest).unwrap();
+        samples[..=last].to_vec()
+    };
+    let presses = [loaded(one), loaded(other)];
+    for (fitted, held, documented) in [(0, 1, 0.13), (1, 0, 0.01)] {
+        let known = FitSolution::of(&presses[fitted], &FitOptions::default()).unwrap();
+        let path: Vec<_> = presses[held].iter().map(|one| (one.t, one.depth)).collect();
+        let band = known.predict_band(0, &path).unwrap();
+        // The other record's own offset is none of the body's: the first force, at depth 0.
+        let offset = presses[held][0].force.0;
+        let holds = band.iter().zip(&presses[held]).filter(|(band, sample)| {
+            let [low, high] = band.ci95;
+            (low.0..=high.0).contains(&(sample.force.0 - offset))
+        });
+        let count = holds.count();
+        let widest = band.iter().map(|one| one.ci95[1].0 - one.ci95[0].0).fold(0.0, f64::max);
+        println!(
+            "fit of press {fitted}: the band holds {count} of {} forces of press {held}",
+            path.len()
+        );
+        // As in docs/explanation/accuracy.md; a few samples near an end of the band may change sides with the rounding.
+        let share = count as f64 / path.len() as f64;
+        assert!((share - documented).abs() < 0.02, "{share}");
+    }
 }
