@@ -23,10 +23,14 @@ def test_notebook_runs(path, tmp_path, monkeypatch):
     client = nbclient.NotebookClient(
         notebook, timeout=600, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     )
+    failure = None
     try:
         client.execute()
-    except nbclient.exceptions.CellExecutionError as failure:
-        pytest.fail(COLOUR.sub("", str(failure)), pytrace=False)
+    except nbclient.exceptions.CellExecutionError as error:
+        failure = COLOUR.sub("", str(error))
+    if failure is not None:
+        # The traceback of the cell, without that of the test around it.
+        pytest.fail(failure, pytrace=False)
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
     assert any("image/png" in output.get("data", {}) for output in outputs)
     said = [output.text for output in outputs if output.get("name") == "stderr"]
