@@ -23,9 +23,10 @@ class Library:
     def find(self, query: str = "", frame: Optional[str] = None, **options: "_frames.Option") -> Any:
         """Sessions as a data frame, the latest first, with the fields of ``palpate find --json``.
 
-        ``query`` is a line as in the window's library: words, each the beginning of a word of the session, and
-        conditions on values of the protocol, of the session's details or of stored fits, such as ``depth>=20mm``,
-        ``specimen.thickness_mm<12`` or ``fit.tau_eps>1.5``. Options are those of ``palpate find``: ``specimen``,
+        ``query`` is a line as in the window's library: words, each the beginning of a word of the session; words of one
+        field, such as ``specimen:pig``, ``operator:ada`` or ``tag:pilot``; and conditions on values of the protocol, of
+        the session's details or of stored fits, such as ``depth>=20mm``, ``specimen.thickness_mm<12`` or
+        ``fit.tau_eps>1.5``. Options are those of ``palpate find``: ``specimen``,
         ``operator``, ``protocol``, ``rig``, ``cell``, ``since``, ``until``, ``tag``, ``verdict``, ``review``, ``sort``,
         ``reverse``, and ``limit`` and ``page``, without which all sessions are listed. ``frame`` is as in
         :meth:`Session.samples`.

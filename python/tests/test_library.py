@@ -24,6 +24,7 @@ def listed(command, home, *words):
     ("", {}, []),
     ("depth>=10mm", {}, ["--where", "depth>=10mm"]),
     ("ramp fit.tau_eps>0.5", {}, ["ramp", "--where", "fit.tau_eps>0.5"]),
+    ("protocol:ramp depth>=10mm", {"protocol": "ramp-hold"}, ["protocol:ramp", "--where", "depth>=10mm", "--protocol", "ramp-hold"]),
     ("", {"tag": ["pilot"], "sort": "specimen", "reverse": True}, ["--tag", "pilot", "--sort", "specimen", "--reverse"]),
     ("", {"protocol": "ramp-hold", "limit": 1, "page": 2}, ["--protocol", "ramp-hold", "--page", "2"]),
 ])
@@ -48,6 +49,13 @@ def test_other_frames_hold_the_same_sessions(command, home):
     with pytest.warns(palpate.PalpateWarning, match="no session has a value named nonsense"):
         empty = library.find("nonsense>1")
     assert len(empty) == 0 and set(empty.columns) == set(expected[0])
+
+
+def test_words_of_one_field_are_not_found_in_another(home):
+    library = palpate.library(home)
+    assert len(library.find("tag:pilot")) == 1 and len(library.find("specimen:pilot")) == 0
+    with pytest.raises(palpate.PalpateError, match="'specimn' in 'specimn:pig' is not a field"):
+        library.find("specimn:pig")
 
 
 def test_a_found_session_opens(home):

@@ -18,7 +18,8 @@ use std::num::NonZeroUsize;
 /// Find sessions of the library
 #[derive(Debug, Args)]
 pub struct FindArgs {
-    /// Words to search for; each matches the beginning of a word in the session
+    /// Words to search for, each the beginning of a word in the session; specimen:WORD, operator:, protocol:, rig:, cell:
+    /// and tag: look in one field, and depth>=2mm is a condition
     #[arg(value_name = "WORD")]
     words: Vec<String>,
     /// The specimen, exactly
@@ -80,10 +81,15 @@ const SORTS: [Choice<CatalogOrder>; 7] = [
 ];
 
 impl FindArgs {
-    fn query(&self) -> CatalogQuery {
+    /// The query of the options and of a typed line: the words of the command line, and `more`.
+    fn query(&self, more: &str) -> Result<CatalogQuery, Failure> {
         let limit = self.limit.get();
-        CatalogQuery {
-            words: self.words.join(" "),
+        let line = format!("{more} {}", self.words.join(" "));
+        let mut line = parse_query_line(&line).map_err(Failure::usage)?;
+        line.conditions.extend(self.conditions.iter().cloned());
+        Ok(CatalogQuery {
+            words: line.words,
+            fields: line.fields,
             specimen: self.specimen.clone(),
             operator: self.operator.clone(),
             protocol: self.protocol.clone(),
@@ -91,7 +97,7 @@ impl FindArgs {
             cell: self.cell.clone(),
             since: self.since,
             before: self.until,
-            conditions: self.conditions.clone(),
+            conditions: line.conditions,
             verdict: self.verdict,
             review: self.review,
             tags: self.tags.clone(),
@@ -99,20 +105,14 @@ impl FindArgs {
             is_reversed: self.reverse,
             skip: limit.saturating_mul(self.page.get() - 1),
             limit: Some(limit),
-        }
+        })
     }
 }
 
-/// The query of a line of words and conditions and of options of `palpate find`, for a front end in the same process.
+/// The query of a typed line and of options of `palpate find`, for a front end in the same process.
 pub fn find_query(line: &str, options: &[String]) -> Result<CatalogQuery, Failure> {
-    let (words, conditions) = parse_query_line(line).map_err(Failure::usage)?;
     match super::parse_options("find", options)? {
-        Command::Find(args) => {
-            let mut query = args.query();
-            query.words = format!("{words} {}", query.words);
-            query.conditions.extend(conditions);
-            Ok(query)
-        }
+        Command::Find(args) => args.query(line),
         _ => Err(Failure::usage("these are not options of 'palpate find'")),
     }
 }
@@ -120,7 +120,7 @@ pub fn find_query(line: &str, options: &[String]) -> Result<CatalogQuery, Failur
 pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     let (limit, page) = (args.limit.get(), args.page.get());
-    let query = args.query();
+    let query = args.query("")?;
     let (found, doubts) = use_updated_catalog(&library, output, |catalog| find(catalog, &query))?;
     doubts.iter().for_each(|doubt| output.note(doubt));
     let pages = found.count.div_ceil(limit);

@@ -46,6 +46,8 @@ fn a_library_is_searched_tagged_reviewed_and_reported_over_time() {
     assert_eq!(found(at, &["--operator", "Ada"]), ["sessions/one"]);
     assert_eq!(found(at, &["LIV", "3"]), ["sessions/one"]);
     assert_eq!(found(at, &["--specimen", "liver \"3\" *"]), ["sessions/one"]);
+    assert_eq!(found(at, &["specimen:liv", "ramp.depth>=6mm", "ada"]), ["sessions/one"]);
+    assert_eq!(found(at, &["specimen:ada"]).len(), 0);
     assert_eq!(found(at, &["--where", "ramp.depth>=6mm"]).len(), 2);
     assert_eq!(found(at, &["--where", "ramp.depth_mm<6"]).len(), 0);
     assert_eq!(found(at, &["--verdict", "valid"]).len(), 2);
@@ -63,6 +65,7 @@ fn a_library_is_searched_tagged_reviewed_and_reported_over_time() {
     }
     let order = palpate(at, &["find", "--where", "depth~3"]);
     assert_refused(&order, 2, "depth>=2mm");
+    assert_refused(&palpate(at, &["find", "specimn:liv"]), 2, "specimen, operator, protocol");
 
     succeeded(&palpate(at, &["tag", &one, &two, "+pilot", "-none"]));
     // A missing tag gives a note and leaves no edit.

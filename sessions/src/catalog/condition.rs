@@ -82,6 +82,12 @@ pub enum ConditionError {
         "'{text}' has the unit {name} in its name and {value} in its value; give only one unit"
     )]
     Units { text: String, name: String, value: String },
+    #[error(
+        "'{name}' in '{text}' is not a field; the fields are {known}; write a space for the colon to search for words"
+    )]
+    Field { text: String, name: String, known: String },
+    #[error("'{text}' has no word after the colon; write one, as in specimen:pig")]
+    NoWords { text: String },
 }
 
 impl FromStr for Condition {

@@ -8,6 +8,7 @@
 
 mod condition;
 mod entry;
+mod field;
 mod heads;
 mod history;
 mod schema;
@@ -20,11 +21,12 @@ pub use condition::{Condition, ConditionError};
 pub use entry::{
     CatalogAnalysis, CatalogEntry, NamedValue, NamedValueSource, SessionHeads, SessionOrigin,
 };
+pub use field::{FieldWords, SearchField};
 pub use history::{HistoryEvent, HistorySubject};
 pub use search::{
     CatalogChoices, CatalogOrder, CatalogPage, CatalogQuery, QualityFilter, ReviewFilter,
 };
-pub use typed::{DayError, parse_end, parse_query_line, parse_start};
+pub use typed::{DayError, QueryLine, parse_end, parse_query_line, parse_start};
 pub use update::{CatalogChanges, CatalogMismatch};
 
 use crate::chain::with_ending;

@@ -7,10 +7,11 @@ use std::error::Error;
 /// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and their content. A catalog of another version is replaced; only the table `head` is kept.
-pub(super) const VERSION: i64 = 8;
+pub(super) const VERSION: i64 = 9;
 
 /// `entry` is the whole entry as JSON, with a checksum because SQLite has none; the other columns are for search. `head`
-/// has the recorded heads of JSON-lines files, each row with its checksum.
+/// has the recorded heads of JSON-lines files, each row with its checksum. `words` has all text of an entry in `text`, and
+/// again the text of each [`SearchField`](super::SearchField) in a column of its name.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -57,7 +58,7 @@ CREATE TABLE head (
     checksum TEXT NOT NULL,
     PRIMARY KEY (file, name)
 ) STRICT, WITHOUT ROWID;
-CREATE VIRTUAL TABLE words USING fts5 (text, tokenize = 'unicode61', prefix = '2 3');
+CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3');
 ";
 
 /// Creates the tables of a new file, all or none.

@@ -2,6 +2,7 @@
 
 use super::condition::Condition;
 use super::entry::CatalogEntry;
+use super::field::FieldWords;
 use super::schema::collect_rows;
 use super::update::entry_of;
 use super::{Catalog, CatalogError};
@@ -16,6 +17,8 @@ use std::str::FromStr;
 pub struct CatalogQuery {
     /// Every word must begin a word of the session.
     pub words: String,
+    /// Every word must begin a word of its field.
+    pub fields: Vec<FieldWords>,
     /// Compared exactly, as are the next four.
     pub specimen: Option<String>,
     pub operator: Option<String>,
@@ -168,6 +171,12 @@ pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty())
 }
 
+/// The query of the full-text index for words of which each begins a word of this column; `None` without words.
+fn fts(column: &str, text: &str) -> Option<String> {
+    let quoted: Vec<String> = words(text).map(|word| format!("\"{word}\"*")).collect();
+    (!quoted.is_empty()).then(|| format!("{column} : ({})", quoted.join(" ")))
+}
+
 impl CatalogQuery {
     /// Selects `column` of the sessions that meet the query, in its order; and the values of the statement.
     fn sql(&self, column: &str) -> (String, Vec<Sql>) {
@@ -208,10 +217,12 @@ impl CatalogQuery {
             let part = "id IN (SELECT session FROM tag WHERE tag = ?)";
             add(part.to_owned(), tag.clone().into());
         }
-        let quoted: Vec<String> = words(&self.words).map(|word| format!("\"{word}\"*")).collect();
-        if !quoted.is_empty() {
+        let of_field = self.fields.iter().map(|one| (one.field.name(), &one.words));
+        let matches = [("text", &self.words)].into_iter().chain(of_field);
+        let matches: Vec<String> = matches.filter_map(|(column, text)| fts(column, text)).collect();
+        if !matches.is_empty() {
             let part = "id IN (SELECT rowid FROM words WHERE words MATCH ?)";
-            add(part.to_owned(), quoted.join(" ").into());
+            add(part.to_owned(), matches.join(" AND ").into());
         }
         for condition in &self.conditions {
             parts.push(condition.sql(&mut values));

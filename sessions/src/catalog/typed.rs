@@ -1,6 +1,7 @@
-//! Parsing of a typed query: days, and a line of words and conditions.
+//! Parsing of a typed query: days, and a line of words, words of fields, and conditions.
 
 use super::condition::{Condition, ConditionError, is_sign};
+use super::field::{FieldWords, SearchField};
 use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
 use palpate_model::quantity::base_unit;
 use thiserror::Error;
@@ -35,11 +36,26 @@ pub fn parse_end(text: &str) -> Result<DateTime<Utc>, DayError> {
     next.ok_or(DayError::Late)
 }
 
-/// Parses a line of words and conditions in any order: `pig depth>=2cm "specimen.source=pig stomach"`.
+/// A typed line in its parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct QueryLine {
+    /// Words of any field.
+    pub words: String,
+    pub fields: Vec<FieldWords>,
+    pub conditions: Vec<Condition>,
+}
+
+/// Whether a piece is the name of a field with its colon, whose words follow.
+fn is_open_field(piece: &str) -> bool {
+    piece.strip_suffix(':').and_then(SearchField::of_name).is_some()
+}
+
+/// Parses a line of words, words of fields and conditions in any order: `specimen:pig depth>=2cm fund`.
 ///
-/// A piece with a sign of comparison is a condition. Spaces may surround the sign and precede the unit. Quotes keep
-/// spaces within a piece.
-pub fn parse_query_line(line: &str) -> Result<(String, Vec<Condition>), ConditionError> {
+/// A piece with a sign of comparison is a condition, and one with a colon has words of a field. Spaces may surround the
+/// sign, precede the unit and follow the colon. Quotes keep spaces within a piece: `specimen:"pig 7"`,
+/// `"specimen.source=pig stomach"`.
+pub fn parse_query_line(line: &str) -> Result<QueryLine, ConditionError> {
     let mut pieces: Vec<String> = Vec::new();
     for piece in split_unquoted(line) {
         let is_unit = base_unit(&piece).is_some();
@@ -50,6 +66,7 @@ pub fn parse_query_line(line: &str) -> Result<(String, Vec<Condition>), Conditio
                 .next()
                 .is_some_and(|value| before.contains(is_sign) && value.parse::<f64>().is_ok());
             has_open_end
+                || (is_open_field(before) && !piece.contains(is_sign))
                 || piece.starts_with(is_sign)
                 || piece.starts_with("!=")
                 || (is_unit && has_bare_number)
@@ -59,10 +76,18 @@ pub fn parse_query_line(line: &str) -> Result<(String, Vec<Condition>), Conditio
             None => pieces.push(piece),
         }
     }
-    let (conditions, words): (Vec<String>, Vec<String>) =
-        pieces.into_iter().partition(|piece| piece.contains(is_sign));
-    let conditions = conditions.iter().map(|piece| piece.parse());
-    Ok((words.join(" "), conditions.collect::<Result<_, _>>()?))
+    let (mut parts, mut words) = (QueryLine::default(), Vec::new());
+    for piece in pieces {
+        if piece.contains(is_sign) {
+            parts.conditions.push(piece.parse()?);
+        } else if let Some(field) = FieldWords::parse(&piece) {
+            parts.fields.push(field?);
+        } else {
+            words.push(piece);
+        }
+    }
+    parts.words = words.join(" ");
+    Ok(parts)
 }
 
 /// Splits a line at spaces outside quotes.
@@ -101,24 +126,31 @@ mod tests {
     }
 
     #[test]
-    fn words_and_conditions_stand_in_one_line() {
-        for (line, words, conditions) in [
-            ("", "", &[][..]),
-            ("  pig   fund ", "pig fund", &[]),
-            ("pig depth>=2cm fund", "pig fund", &["depth>=2cm"]),
-            ("depth >= 20 mm pig", "pig", &["depth>=20mm"]),
-            ("depth>= 20 depth <30", "", &["depth>=20", "depth<30"]),
-            ("depth=20 Ada", "Ada", &["depth=20"]),
-            ("mode != slow", "", &["mode!=slow"]),
-            ("\"stomach 7\" good!", "stomach 7 good!", &[]),
-            ("\"specimen.source=pig stomach\"", "", &["specimen.source=pig stomach"]),
+    fn words_fields_and_conditions_stand_in_one_line() {
+        for (line, words, fields, conditions) in [
+            ("", "", &[][..], &[][..]),
+            ("  pig   fund ", "pig fund", &[], &[]),
+            ("pig depth>=2cm fund", "pig fund", &[], &["depth>=2cm"]),
+            ("depth >= 20 mm pig", "pig", &[], &["depth>=20mm"]),
+            ("depth>= 20 depth <30", "", &[], &["depth>=20", "depth<30"]),
+            ("depth=20 Ada", "Ada", &[], &["depth=20"]),
+            ("mode != slow", "", &[], &["mode!=slow"]),
+            ("\"stomach 7\" good!", "stomach 7 good!", &[], &[]),
+            ("\"specimen.source=pig stomach\"", "", &[], &["specimen.source=pig stomach"]),
+            ("specimen:pig depth>=20mm", "", &["specimen:pig"], &["depth>=20mm"]),
+            ("tag: pilot ada specimen:\"pig 7\"", "ada", &["tag:pilot", "specimen:pig 7"], &[]),
+            ("at 14:30 :x", "at 14:30 :x", &[], &[]),
         ] {
             let wanted: Vec<Condition> =
                 conditions.iter().map(|one| one.parse().unwrap()).collect();
             let read = parse_query_line(line).unwrap();
-            assert_eq!(read, (words.to_owned(), wanted), "{line}");
+            assert_eq!((read.words.as_str(), read.conditions), (words, wanted), "{line}");
+            let read: Vec<String> = read.fields.iter().map(ToString::to_string).collect();
+            assert_eq!(read, fields, "{line}");
         }
-        for line in ["pig >=", "depth=", "= 3", "depth_mm>2cm"] {
+        for line in
+            ["pig >=", "depth=", "= 3", "depth_mm>2cm", "specimen: depth>2", "tag:-", "specimn:pig"]
+        {
             assert!(parse_query_line(line).is_err(), "{line}");
         }
     }

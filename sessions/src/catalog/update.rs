@@ -1,13 +1,15 @@
 //! Update of the catalog: changed sessions are read again, deleted ones are removed.
 
 use super::entry::CatalogEntry;
+use super::field::SearchField;
 use super::heads::{record_head, record_session_heads};
 use super::schema::{bad_text, collect_rows};
 use super::search::ReviewFilter;
 use super::walk::{LibrarySession, walk};
 use super::{Catalog, CatalogError};
 use crate::text::checksum;
-use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
+use rusqlite::types::Value as Sql;
+use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params, params_from_iter};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -229,8 +231,12 @@ fn put(db: &Connection, session: &LibrarySession, entry: &CatalogEntry) -> rusql
         tags.execute(params![id, tag])?;
     }
     record_session_heads(db, entry)?;
-    db.prepare_cached("INSERT INTO words (rowid, text) VALUES (?, ?)")?
-        .execute(params![id, entry.text()])?;
+    let columns = SearchField::ALL.map(SearchField::name).join(", ");
+    let marks = ["?"; SearchField::ALL.len()].join(", ");
+    let sql = format!("INSERT INTO words (rowid, text, {columns}) VALUES (?, ?, {marks})");
+    let texts = SearchField::ALL.map(|field| Sql::from(field.text_of(entry)));
+    let values = [Sql::from(id), entry.text().into()].into_iter().chain(texts);
+    db.prepare_cached(&sql)?.execute(params_from_iter(values))?;
     Ok(())
 }
 

@@ -6,8 +6,8 @@ use chrono::{Duration, TimeZone, Utc};
 use palpate_model::metadata::SessionLabels;
 use palpate_sessions::analyses::{Analysis, AnalysisContent, add_analysis};
 use palpate_sessions::catalog::{
-    CATALOG_FILE, Catalog, CatalogEntry, CatalogOrder, CatalogQuery, Condition, QualityFilter,
-    ReviewFilter,
+    CATALOG_FILE, Catalog, CatalogEntry, CatalogOrder, CatalogQuery, Condition, FieldWords,
+    QualityFilter, ReviewFilter, SearchField, parse_query_line,
 };
 use palpate_sessions::edits::{DataQuality, Edit, EditChange, ReviewDecision, add_edit};
 use palpate_sessions::{LOG_FILE, LogWriter, Manifest};
@@ -224,6 +224,10 @@ fn is_meant(query: &CatalogQuery, entry: &CatalogEntry) -> bool {
             QualityFilter::None => entry.verdict.is_none() && entry.trouble.is_none(),
         })
         && plain_words(&query.words).iter().all(has_word)
+        && query.fields.iter().all(|one| {
+            let own = plain_words(&one.field.text_of(entry));
+            plain_words(&one.words).iter().all(|word| own.iter().any(|own| own.starts_with(word)))
+        })
 }
 
 fn random_query(random: &mut Random) -> CatalogQuery {
@@ -270,8 +274,19 @@ fn random_query(random: &mut Random) -> CatalogQuery {
         "somer",
         "second",
     ];
+    let fields = [
+        "specimen:gel",
+        "specimen:\"liver 3\"",
+        "operator:ad",
+        "operator:liver",
+        "protocol:ramp",
+        "rig:sim",
+        "cell:s",
+        "tag:pilot",
+        "tag:go tag:all",
+    ];
     for _ in 0..1 + random.below(2) {
-        match random.below(7) {
+        match random.below(8) {
             0 => query.specimen = Some(SPECIMENS[random.below(SPECIMENS.len())].into()),
             1 => query.operator = Some(OPERATORS[random.below(OPERATORS.len())].into()),
             2 => query.protocol = Some(PROTOCOLS[random.below(2)].into()),
@@ -280,6 +295,10 @@ fn random_query(random: &mut Random) -> CatalogQuery {
             5 => {
                 let text = conditions[random.below(conditions.len())];
                 query.conditions.push(text.parse::<Condition>().unwrap());
+            }
+            6 => {
+                let line = parse_query_line(fields[random.below(fields.len())]).unwrap();
+                query.fields.extend(line.fields);
             }
             _ => query.words = words[random.below(words.len())].into(),
         }
@@ -531,6 +550,10 @@ fn what_is_typed_is_never_taken_for_syntax() {
             CatalogQuery { words: text.clone(), ..CatalogQuery::default() },
             CatalogQuery { specimen: Some(text.clone()), ..CatalogQuery::default() },
             CatalogQuery { operator: Some(text.clone()), ..CatalogQuery::default() },
+            CatalogQuery {
+                fields: vec![FieldWords { field: SearchField::Specimen, words: text.clone() }],
+                ..CatalogQuery::default()
+            },
         ] {
             let found = catalog.find(&query);
             assert!(found.is_ok(), "{text:?}: {found:?}");

@@ -52,6 +52,8 @@ fn folder_and_condition_errors_are_worded() {
     assert_messages! {
         ConditionError::Form { text: text() } => ["'depth=x'"],
         ConditionError::Words { text: text(), value: "slow".into() } => ["'depth=x'", "'slow'"],
+        ConditionError::Field { text: text(), name: "depht".into(), known: "tag, rig".into() } => ["'depth=x'", "'depht'", "tag, rig"],
+        ConditionError::NoWords { text: text() } => ["'depth=x'"],
         ConditionError::Units { text: text(), name: "mm".into(), value: "cm".into() } => ["'depth=x'", "mm", "cm"],
     }
 }

@@ -305,7 +305,12 @@ impl Cells {
                 Field::Cycle => cells.extend(rows.map(|row| row.cycle)),
                 _ => cells.extend(rows.map(|row| row.status)),
             },
-            Self::Words(cells) => cells.extend_values(rows.map(|row| row.phase.name())),
+            Self::Words(cells) => {
+                // A phase lasts for many samples, and its name is encoded once.
+                for same in samples.rows.chunk_by(|a, b| a.phase == b.phase) {
+                    cells.extend_constant(same.len(), Some(same[0].phase.name()));
+                }
+            }
             Self::MaybeNumbers(cells) => match field {
                 Field::Depth => cells.extend(rows.map(|row| row.depth)),
                 Field::Force => cells.extend(rows.map(|row| row.force)),

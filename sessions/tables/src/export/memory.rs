@@ -3,11 +3,20 @@
 
 pub use polars_arrow::ffi::ArrowArrayStream;
 
+use super::columns::Layout;
 use super::{ExportError, FrameMaker, RowFeed, TableExport};
+use palpate_sessions::record::SampleRow;
 use polars_arrow::array::{Array, StructArray};
 use polars_arrow::datatypes::{ArrowDataType, ArrowSchema, Field, Metadata};
 use polars_arrow::ffi::export_iterator;
 use polars_core::prelude::{CompatLevel, DataFrame, DataType, PolarsResult, SchemaExt};
+use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::{panic, thread};
+
+/// Samples that go to the thread that fills the columns in one piece, a megabyte, and the most pieces on their way: both
+/// threads stay busy, and the pieces stay in the processor's cache.
+const PIECE_ROWS: usize = 1 << 13;
+const PIECES: usize = 2;
 
 /// Samples as columns in memory.
 #[derive(Clone, Debug)]
@@ -18,20 +27,56 @@ pub struct SampleTable {
 }
 
 impl TableExport<'_> {
-    /// The table in memory, with the metadata of its files.
+    /// The table in memory, with the metadata of its files. Columns are filled on a thread of their own, while this one
+    /// reads on: each is about half of the work.
     pub fn collect(&self, feed: RowFeed) -> Result<SampleTable, ExportError> {
         let layout = self.layout()?;
+        let frames = thread::scope(|scope| {
+            let (to_fill, pieces) = sync_channel(PIECES);
+            let (to_reuse, reused) = channel();
+            let layout = &layout;
+            let filler = thread::Builder::new()
+                .name("columns".into())
+                .spawn_scoped(scope, move || self.fill(layout, &pieces, &to_reuse))
+                .map_err(|err| ExportError::Memory(err.into()))?;
+            feed(&mut |rows| {
+                for some in rows.chunks(PIECE_ROWS) {
+                    let mut piece: Vec<SampleRow> = reused.try_recv().unwrap_or_default();
+                    piece.clear();
+                    piece.extend_from_slice(some);
+                    // Its receiver goes only in a panic, which is resumed below.
+                    let _ = to_fill.send(piece);
+                }
+            })?;
+            drop(to_fill);
+            let frames = filler.join().unwrap_or_else(|payload| panic::resume_unwind(payload));
+            frames.map_err(ExportError::Memory)
+        })?;
+        let pairs = self.metadata(&layout).into_iter();
+        let metadata = pairs.map(|(key, text)| (key.into(), text.into())).collect();
+        Ok(SampleTable { frames, metadata })
+    }
+
+    /// Frames of all pieces that come; each piece goes back, so that its memory is used again.
+    fn fill(
+        &self,
+        layout: &Layout,
+        pieces: &Receiver<Vec<SampleRow>>,
+        to_reuse: &Sender<Vec<SampleRow>>,
+    ) -> PolarsResult<Vec<DataFrame>> {
         let mut frames = Vec::new();
         let mut put = |frame| {
             frames.push(frame);
             Ok(())
         };
-        let mut maker = FrameMaker::new(self, &layout, &mut put);
-        feed(&mut |rows| maker.take(rows))?;
-        maker.finish().map_err(ExportError::Memory)?;
-        let pairs = self.metadata(&layout).into_iter();
-        let metadata = pairs.map(|(key, text)| (key.into(), text.into())).collect();
-        Ok(SampleTable { frames, metadata })
+        let mut maker = FrameMaker::new(self, layout, &mut put);
+        for piece in pieces {
+            maker.take(&piece);
+            // After the last piece nobody waits for it.
+            let _ = to_reuse.send(piece);
+        }
+        maker.finish()?;
+        Ok(frames)
     }
 }
 

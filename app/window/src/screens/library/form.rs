@@ -51,12 +51,13 @@ fn day(
 
 impl SearchForm {
     pub fn query(&self) -> Result<CatalogQuery, String> {
-        let (words, conditions) = parse_query_line(&self.line).map_err(|err| err.to_string())?;
+        let line = parse_query_line(&self.line).map_err(|err| err.to_string())?;
         let verdict = self.verdict.chosen.as_deref().map(str::parse);
         let review = self.review.chosen.as_deref().map(str::parse);
         Ok(CatalogQuery {
-            words,
-            conditions,
+            words: line.words,
+            fields: line.fields,
+            conditions: line.conditions,
             specimen: self.specimen.chosen.clone(),
             operator: self.operator.chosen.clone(),
             protocol: self.protocol.chosen.clone(),
@@ -114,7 +115,7 @@ mod tests {
     #[test]
     fn the_form_asks_as_the_command_line_does() {
         let mut form = SearchForm {
-            line: "pig depth>=2cm".into(),
+            line: "pig operator:ada depth>=2cm".into(),
             since: "2026-03-05".into(),
             until: "2026-03-05".into(),
             ..SearchForm::default()
@@ -125,6 +126,7 @@ mod tests {
         form.sort(CatalogOrder::Started);
         let query = form.query().unwrap();
         assert_eq!(query.words, "pig");
+        assert_eq!(query.fields[0].to_string(), "operator:ada");
         assert_eq!(query.conditions, ["depth>=20mm".parse().unwrap()]);
         assert_eq!(query.verdict, Some(QualityFilter::Given(DataQuality::Suspect)));
         assert_eq!(query.review, Some(ReviewFilter::Given(ReviewDecision::Repeat)));
