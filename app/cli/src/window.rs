@@ -24,7 +24,7 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     let windows = windows.ok_or_else(|| Failure::usage(NO_WINDOW))?;
-    let to_open = args.paths.iter().map(|path| to_open(path)).collect::<Result<_, _>>()?;
+    let to_open = args.paths.iter().map(|path| existing(path)).collect::<Result<_, _>>()?;
     let bench = open(&args.rig)?;
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
     let OpenRig { rig, calibration, doubts, limits, _locks } = bench;
@@ -42,7 +42,7 @@ pub(super) fn run(
 }
 
 /// The absolute path of what is to be shown.
-fn to_open(path: &Path) -> Result<PathBuf, Failure> {
+fn existing(path: &Path) -> Result<PathBuf, Failure> {
     match path.exists() {
         true => absolute(path).map_err(Failure::usage),
         false => Err(Failure::usage(format!(

@@ -13,6 +13,9 @@ use palpate_runner::TimeScale;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
 
+/// The window's icon, painted from `icon.svg`.
+const ICON: &[u8] = include_bytes!("../icon.png");
+
 /// What a window opens with.
 pub struct WindowOptions {
     pub rig: Box<dyn Rig>,
@@ -69,8 +72,10 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
 pub(crate) fn open_window<A: eframe::App + 'static>(
     make: impl FnOnce(&Context) -> Result<A, String> + 'static,
 ) -> Result<(), String> {
+    let icon = eframe::icon_data::from_png_bytes(ICON).map_err(|err| err.to_string())?;
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
+            .with_icon(icon)
             .with_title("palpate")
             // The name of the desktop entry, by which a desktop finds the icon.
             .with_app_id("palpate")
