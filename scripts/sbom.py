@@ -23,8 +23,8 @@ class Crates:
     """The crates that a build of palpate with these features for this target is linked from, and who uses whom."""
 
     def __init__(self, target, features):
-        metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1", "--filter-platform", target))
-        self.facts = {(one["name"], one["version"]): one for one in metadata["packages"]}
+        self.metadata = json.loads(cargo("metadata", "--locked", "--format-version", "1", "--filter-platform", target))
+        self.facts = {(one["name"], one["version"]): one for one in self.metadata["packages"]}
         lock = tomllib.loads((ROOT / "Cargo.lock").read_text())
         self.sums = {(one["name"], one["version"]): one.get("checksum") for one in lock["package"]}
         tree = cargo("tree", "--locked", "--package", "palpate", *features, "--target", target,
@@ -40,6 +40,9 @@ class Crates:
 
     def foreign(self):
         return sorted(one for one in self.uses if self.facts[one]["source"])
+
+    def folder(self, crate):
+        return pathlib.Path(self.facts[crate]["manifest_path"]).parent
 
 
 def reference(crate):
@@ -57,7 +60,7 @@ def component(crates, crate):
         made["externalReferences"] = [{"type": "vcs", "url": facts["repository"]}]
     if crate[0] in BUNDLED:
         name, file, pattern = BUNDLED[crate[0]]
-        text = (pathlib.Path(facts["manifest_path"]).parent / file).read_text(encoding="utf-8", errors="replace")
+        text = (crates.folder(crate) / file).read_text(encoding="utf-8", errors="replace")
         version = re.search(pattern, text)[1]
         purl = f"pkg:generic/{name}@{version}"
         made["components"] = [{"type": "library", "bom-ref": purl, "name": name, "version": version, "purl": purl}]
@@ -82,8 +85,7 @@ def licences(crates):
     """The licence texts of all foreign crates, each once."""
     texts, without = {}, []
     for crate in crates.foreign():
-        folder = pathlib.Path(crates.facts[crate]["manifest_path"]).parent
-        files = [one for one in sorted(folder.rglob("*")) if LICENCE_FILE.match(one.name) and one.suffix in ("", ".md", ".txt")
+        files = [one for one in sorted(crates.folder(crate).rglob("*")) if LICENCE_FILE.match(one.name) and one.suffix in ("", ".md", ".txt")
                  and one.is_file()]
         for file in files:
             texts.setdefault(file.read_text(encoding="utf-8", errors="replace").strip(), []).append(crate)
