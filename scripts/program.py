@@ -14,3 +14,11 @@ def palpate():
     subprocess.run(["cargo", "build", "--quiet"], cwd=ROOT, check=True)
     listed = subprocess.run(["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True)
     return pathlib.Path(json.loads(listed.stdout)["target_directory"]) / "debug" / "palpate"
+
+
+def skip(kind, name, script, reason="it is not installed"):
+    """Says that a script does not try something for want of a program or file, to the gate too."""
+    print(f"skipped: there is no {kind} {name}; scripts/install-test-tools installs it")
+    if "PALPATE_SKIPPED" in os.environ:
+        with open(os.environ["PALPATE_SKIPPED"], "a") as skipped:
+            skipped.write(f"{kind}\t{name}\t{script}\t{reason}\n")

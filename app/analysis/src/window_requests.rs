@@ -6,6 +6,7 @@ use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
 use palpate_runner::TimeScale;
 use palpate_runner::replay::Player;
+use std::path::PathBuf;
 
 /// Name of the file in the library that holds what the window remembers of its user.
 pub const SETTINGS_FILE: &str = "window.json";
@@ -19,6 +20,8 @@ pub struct WorkbenchRequest {
     pub to_acknowledge: Vec<String>,
     /// Pace of a simulated rig.
     pub scale: TimeScale,
+    /// Absolute paths of sessions, protocols or tables to show at once, as if they were dropped on the window.
+    pub to_open: Vec<PathBuf>,
 }
 
 /// A recorded session to play back.

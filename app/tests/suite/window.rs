@@ -1,5 +1,6 @@
 //! The real window on a virtual display: opens, starts on F5, draws, stops on F12, closes.
 
+use crate::support::{palpate, stderr};
 use palpate_test_support::skip;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -33,4 +34,11 @@ fn the_window_runs_and_stops_on_a_virtual_display() {
     assert!(report["frames"].as_u64().unwrap() > 0, "{report}");
     // It is noted when a frame shows a run.
     assert!(report["late_worst_s"].is_number(), "{report}");
+}
+
+#[test]
+fn a_path_that_is_not_there_opens_no_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = palpate(folder.path(), &["window", "none"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
 }

@@ -57,6 +57,7 @@ impl WorkbenchApp {
             tour.start();
         }
         let pace = FramePace::default();
+        let to_open = std::mem::take(&mut options.to_open);
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
         workbench.refusal = refusal;
         let form = &mut workbench.form;
@@ -64,7 +65,7 @@ impl WorkbenchApp {
         if form.folder.is_empty() {
             form.folder.clone_from(&settings.now.sessions);
         }
-        Ok(Self {
+        let mut app = Self {
             screens: Screens::open(&workbench, &settings.now.screen),
             workbench,
             tour,
@@ -78,7 +79,11 @@ impl WorkbenchApp {
             pace,
             is_zoom_set: false,
             are_fonts_warm: false,
-        })
+        };
+        let mut commands = Commands::default();
+        push_dropped(to_open, run::SCREEN.name, &mut commands);
+        app.act(ctx, &mut commands);
+        Ok(app)
     }
 
     pub fn snapshot(&self) -> &Arc<RunnerSnapshot> {

@@ -13,6 +13,9 @@ use palpate_runner::TimeScale;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
 
+/// The window's icon, painted from `icon.svg`.
+const ICON: &[u8] = include_bytes!("../icon.png");
+
 /// What a window opens with.
 pub struct WindowOptions {
     pub rig: Box<dyn Rig>,
@@ -24,6 +27,8 @@ pub struct WindowOptions {
     pub scale: TimeScale,
     /// Folder for new sessions; the library if none.
     pub sessions: Option<PathBuf>,
+    /// What is shown at once, as if it were dropped on the window.
+    pub to_open: Vec<PathBuf>,
     pub list_ports: ListPorts,
     /// File of the window's settings; none are kept without one.
     pub settings: Option<PathBuf>,
@@ -36,14 +41,15 @@ impl WindowOptions {
         let limits = Limits::for_travel(rig.description().travel);
         let calibration = palpate_drivers::sim::calibration(settings.profile);
         let to_acknowledge = Vec::new();
-        let request = WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale };
+        let to_open = Vec::new();
+        let request = WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale, to_open };
         Ok(Self { settings: None, ..Self::from_request(request) })
     }
 
     /// Options for an open rig, with the settings file of the library.
     #[must_use]
     pub fn from_request(request: WorkbenchRequest) -> Self {
-        let WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale } = request;
+        let WorkbenchRequest { rig, calibration, limits, to_acknowledge, scale, to_open } = request;
         Self {
             rig,
             calibration,
@@ -51,6 +57,7 @@ impl WindowOptions {
             to_acknowledge,
             scale,
             sessions: None,
+            to_open,
             list_ports,
             settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
         }
@@ -65,9 +72,13 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
 pub(crate) fn open_window<A: eframe::App + 'static>(
     make: impl FnOnce(&Context) -> Result<A, String> + 'static,
 ) -> Result<(), String> {
+    let icon = eframe::icon_data::from_png_bytes(ICON).map_err(|err| err.to_string())?;
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
+            .with_icon(icon)
             .with_title("palpate")
+            // The name of the desktop entry, by which a desktop finds the icon.
+            .with_app_id("palpate")
             .with_inner_size(vec2(1360.0, 820.0))
             .with_min_inner_size(vec2(1180.0, 640.0)),
         ..eframe::NativeOptions::default()

@@ -146,3 +146,19 @@ fn a_stop_reaches_the_rig_before_the_loops_are_stopped_and_workers_are_asked() {
     drawn.textures_delta.clear();
     assert_eq!(*noted.lock().unwrap(), [("stop", true), ("poll", true)]);
 }
+
+#[test]
+fn a_log_that_the_window_opens_with_shows_its_session_for_review() {
+    let ctx = Context::default();
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("000.mcap");
+    std::fs::write(&log, "").unwrap();
+    let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
+    options.list_ports = || Ok(Vec::new());
+    options.sessions = Some(folder.path().join("none"));
+    options.to_open = vec![log];
+    let mut app = WorkbenchApp::new(options, &ctx).unwrap();
+    assert_eq!(app.screens.shown(), "Review");
+    app.screens.poll(&ctx, &mut app.workbench);
+    assert_eq!(app.workbench.front.review.as_deref(), Some(folder.path()));
+}

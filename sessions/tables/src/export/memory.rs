@@ -10,7 +10,7 @@ use polars_arrow::array::{Array, StructArray};
 use polars_arrow::datatypes::{ArrowDataType, ArrowSchema, Field, Metadata};
 use polars_arrow::ffi::export_iterator;
 use polars_core::prelude::{CompatLevel, DataFrame, DataType, PolarsResult, SchemaExt};
-use std::sync::mpsc::{Receiver, Sender, channel, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::{panic, thread};
 
 /// Samples that go to the thread that fills the columns in one piece, a megabyte, and the most pieces on their way: both
@@ -33,7 +33,7 @@ impl TableExport<'_> {
         let layout = self.layout()?;
         let frames = thread::scope(|scope| {
             let (to_fill, pieces) = sync_channel(PIECES);
-            let (to_reuse, reused) = channel();
+            let (to_reuse, reused) = sync_channel(PIECES + 2);
             let layout = &layout;
             let filler = thread::Builder::new()
                 .name("columns".into())
@@ -62,7 +62,7 @@ impl TableExport<'_> {
         &self,
         layout: &Layout,
         pieces: &Receiver<Vec<SampleRow>>,
-        to_reuse: &Sender<Vec<SampleRow>>,
+        to_reuse: &SyncSender<Vec<SampleRow>>,
     ) -> PolarsResult<Vec<DataFrame>> {
         let mut frames = Vec::new();
         let mut put = |frame| {
@@ -72,8 +72,8 @@ impl TableExport<'_> {
         let mut maker = FrameMaker::new(self, layout, &mut put);
         for piece in pieces {
             maker.take(&piece);
-            // After the last piece nobody waits for it.
-            let _ = to_reuse.send(piece);
+            // After the last piece nobody waits for it, and what finds no room is freed.
+            let _ = to_reuse.try_send(piece);
         }
         maker.finish()?;
         Ok(frames)
