@@ -99,7 +99,6 @@ fn bands_of_one_press_are_compared_with_the_other() {
             (low.0..=high.0).contains(&(sample.force.0 - offset))
         });
         let count = holds.count();
-        let widest = band.iter().map(|one| one.ci95[1].0 - one.ci95[0].0).fold(0.0, f64::max);
         println!(
             "fit of press {fitted}: the band holds {count} of {} forces of press {held}",
             path.len()
