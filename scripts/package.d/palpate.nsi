@@ -1,6 +1,7 @@
 ; The Windows installer: for the user who runs it, without administrator rights. /S installs silently, /D=FOLDER chooses.
 ; makensis -DVERSION=... -DPROGRAM=FOLDER -DICON=FILE -DOUT=FILE palpate.nsi
-Unicode true
+; Of 64 bits, as the program.
+Target amd64-unicode
 SetCompressor /SOLID lzma
 SetDateSave off
 Name "palpate"
