@@ -20,6 +20,7 @@ pub mod plain_numbers;
 pub mod priority;
 pub mod rig;
 pub mod rig_file;
+pub mod rig_search;
 pub mod serial;
 pub mod sim;
 pub mod split_rig;

@@ -39,6 +39,8 @@ pub enum ChainError {
     Shortened { path: PathBuf, found: u64, written: u64 },
     #[error("{} is damaged ({reason}); restore it from a backup, or move it elsewhere, but palpate then cannot detect that lines at the end of the record beside it are missing", path.display())]
     BadHead { path: PathBuf, reason: String },
+    #[error("a newer version of palpate wrote {} (version {version} of such files, this one knows {HEAD_VERSION}); update palpate to read it or to add to it", path.display())]
+    Newer { path: PathBuf, version: u64 },
     #[error("line {line} of {} is {what} of an unknown kind ({detail}); update palpate", path.display())]
     Unknown {
         /// What every line is, with its article.
@@ -50,6 +52,13 @@ pub enum ChainError {
     },
     #[error(transparent)]
     LockTimeout(#[from] LockTimeout),
+}
+
+impl ChainError {
+    /// Whether a newer version of palpate wrote the file.
+    pub const fn is_newer(&self) -> bool {
+        matches!(self, Self::Newer { .. } | Self::Unknown { .. })
+    }
 }
 
 fn missing(found: u64, written: u64) -> String {
@@ -77,7 +86,7 @@ pub struct ChainHead {
 }
 
 /// Version of the file of a head.
-const HEAD_VERSION: u32 = 1;
+pub const HEAD_VERSION: u32 = 1;
 /// Larger than any head.
 const HEAD_BYTES_MAX: u64 = 4096;
 
@@ -104,11 +113,16 @@ impl ChainHead {
             outcome => outcome.map_err(|source| read_error(&path, source))?,
         };
         let bad = |reason: String| ChainError::BadHead { path: path.clone(), reason };
-        let file: ChainHeadFile =
-            serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
-        match file.head_version {
-            HEAD_VERSION => Ok(file.head),
-            version => Err(bad(format!("its version {version} is unknown; update palpate"))),
+        // The version comes first, because the rest of a newer head may not parse.
+        let value: Value = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
+        match value["head_version"].as_u64() {
+            Some(version) if version > u64::from(HEAD_VERSION) => {
+                Err(ChainError::Newer { path: lines.into(), version })
+            }
+            _ => {
+                let file = ChainHeadFile::deserialize(value).map_err(|err| bad(err.to_string()))?;
+                Ok(file.head)
+            }
         }
     }
 

@@ -64,6 +64,8 @@ pub(crate) fn read_checks_since(
 }
 
 pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), ChainError> {
+    // Nothing is added to checks that this version does not understand.
+    read_checks(library, &check.rig)?;
     chain::append(&library.join(file_of(&check.rig)), &check.rig, check)
 }
 

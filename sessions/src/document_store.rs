@@ -139,9 +139,10 @@ impl<D: Document> DocumentStore<D> {
                 kind: D::KIND,
                 name: name.to_owned(),
                 folder: D::FOLDER,
-                known: match self.documents.len() {
-                    0 => ", nor any other".to_owned(),
-                    count => format!(" among its {count}"),
+                known: match (self.documents.len(), self.unreadable.first()) {
+                    (_, Some(err)) => format!(", but one cannot be read ({err})"),
+                    (0, None) => ", nor any other".to_owned(),
+                    (count, None) => format!(" among its {count}"),
                 },
             }),
             several => Err(LibraryError::Ambiguous {

@@ -241,6 +241,8 @@ pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), Edit
         return Err(EditError::NotAFolder { path: folder.into() });
     }
     let _lock = HolderLock::acquire_waiting(&folder.join(LOCK_FILE))?;
+    // Nothing is added to edits that this version does not understand.
+    Edits::read(folder, session_id)?;
     Ok(chain::append(&folder.join(EDITS_FILE), session_id, edit)?)
 }
 
@@ -359,5 +361,18 @@ mod tests {
             drop(held);
         });
         assert_eq!(Edits::read(at, "id").unwrap().all.len(), 1);
+    }
+
+    #[test]
+    fn nothing_is_added_to_edits_of_an_unknown_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let path = at.join(EDITS_FILE);
+        let of_tomorrow = serde_json::json!({"at": "2026-03-05T14:15:07Z", "by": "Ada", "reason": "", "edit": "hologram"});
+        chain::append(&path, "id", &of_tomorrow).unwrap();
+        let before = std::fs::read(&path).unwrap();
+        let refused = add_edit(at, "id", &edit("why", EditChange::Note)).unwrap_err();
+        assert!(matches!(&refused, EditError::Chain(err) if err.is_newer()), "{refused:?}");
+        assert_eq!(std::fs::read(&path).unwrap(), before);
     }
 }

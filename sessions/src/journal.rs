@@ -67,14 +67,16 @@ impl Journal {
         let first = bytes.split(|byte| *byte == b'\n').next();
         let first = first.and_then(|line| serde_json::from_slice::<Value>(line).ok());
         let is_plain = first.is_some_and(|line| line.get("checksum").is_none());
-        let bodies = match is_plain {
-            true => plain_lines(&path, &bytes)?,
-            false => chain::read(&path, JOURNAL_FILE).map_err(journal_error)?.bodies,
+        let entries = if is_plain {
+            let bodies = plain_lines(&path, &bytes)?.into_iter().enumerate();
+            let entry = |(index, body): (usize, Value)| {
+                T::deserialize(body).map_err(|err| line_error(&path, index, &err))
+            };
+            bodies.map(entry).collect::<Result<Vec<T>, _>>()?
+        } else {
+            let chain = chain::read(&path, JOURNAL_FILE).map_err(journal_error)?;
+            chain.records(&path, "an entry").map_err(journal_error)?
         };
-        let entries = bodies.into_iter().enumerate().map(|(index, body)| {
-            T::deserialize(body).map_err(|err| line_error(&path, index, &err))
-        });
-        let entries = entries.collect::<Result<Vec<T>, _>>()?;
         Ok((Self { path, is_plain }, entries))
     }
 

@@ -41,7 +41,7 @@ pub use analyses::{ANALYSES_FILE, Analyses, AnalysisError};
 pub use block::SampleBlock;
 pub use calibrations::{CalibrationStore, read_calibration};
 pub use catalog::Catalog;
-pub use chain::{ChainError, ChainHead};
+pub use chain::{ChainError, ChainHead, HEAD_VERSION as LINES_VERSION};
 pub use document_store::{LibraryError, age_days, save_document, supersede_document};
 pub use edits::{
     DataQuality, EDITS_FILE, Edit, EditChange, EditError, Edits, Review, ReviewDecision, add_edit,

@@ -14,6 +14,7 @@ pub mod compliance;
 pub mod cycle_analysis;
 pub mod cycles;
 pub mod daily;
+pub mod demonstration_library;
 pub mod edited_session;
 pub mod edits;
 pub mod exports;
@@ -28,6 +29,7 @@ pub mod haptics;
 #[cfg(feature = "haptics")]
 pub mod haptics_tape;
 pub mod imports;
+pub mod kept_files;
 #[cfg(feature = "haptics")]
 pub mod margin;
 pub mod plan;

@@ -6,10 +6,15 @@ use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
 use palpate_runner::TimeScale;
 use palpate_runner::replay::Player;
+use palpate_sessions::folder::HolderLock;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Name of the file in the library that holds what the window remembers of its user.
 pub const SETTINGS_FILE: &str = "window.json";
+
+/// Version of that file. A new key does not raise it: older versions of palpate keep keys that they do not know.
+pub const SETTINGS_VERSION: u32 = 1;
 
 pub struct WorkbenchRequest {
     pub rig: Box<dyn Rig>,
@@ -22,7 +27,14 @@ pub struct WorkbenchRequest {
     pub scale: TimeScale,
     /// Absolute paths of sessions, protocols or tables to show at once, as if they were dropped on the window.
     pub to_open: Vec<PathBuf>,
+    /// Keep the rig from other programs while the window has it.
+    pub locks: Vec<HolderLock>,
+    /// Opens another rig for the same window, if that is possible.
+    pub open_rig: Option<RigOpener>,
 }
+
+/// Opens a rig by its name, `sim` or the path of a rig file; the error says what to do. It may take seconds.
+pub type RigOpener = Arc<dyn Fn(&str) -> Result<WorkbenchRequest, String> + Send + Sync>;
 
 /// A recorded session to play back.
 pub struct PlaybackRequest {

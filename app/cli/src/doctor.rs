@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
+use palpate_analysis::kept_files::{KeptFile, kept_files};
 use palpate_sessions::atomic::find_leftovers;
 use palpate_sessions::library_folder;
 use palpate_sessions::recover::{SessionExamination, SessionHealth, examine_session};
@@ -14,6 +15,9 @@ use std::path::{Path, PathBuf};
 pub struct DoctorArgs {
     /// Session folders or files; without any, every session of the library (~/palpate or PALPATE_HOME)
     sessions: Vec<PathBuf>,
+    /// Instead, list what palpate keeps on this computer: every kind of file, its version, and how to reset it
+    #[arg(long, conflicts_with = "sessions")]
+    files: bool,
 }
 
 #[derive(Serialize)]
@@ -25,6 +29,9 @@ struct DoctorReport {
 }
 
 pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
+    if args.files {
+        return list_files(output);
+    }
     let (paths, places) = if args.sessions.is_empty() {
         let library = library_folder().map_err(Failure::usage)?;
         // Exports go to the current folder by default.
@@ -43,6 +50,26 @@ pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
             report.sessions.len()
         )));
     }
+    Ok(())
+}
+
+fn list_files(output: &Output) -> Result<(), Failure> {
+    let files = kept_files(&library_folder().map_err(Failure::usage)?);
+    let object = serde_json::json!({ "files": files });
+    output.answer("doctor", &object, || {
+        let line = |one: &KeptFile| {
+            let absent = if one.is_there { "" } else { " (none yet)" };
+            format!(
+                "{}{absent}: {}\n  {}; written by {}; to reset: {}",
+                one.what,
+                one.place.display(),
+                one.form,
+                one.written_by,
+                one.reset
+            )
+        };
+        files.iter().map(line).collect::<Vec<_>>().join("\n")
+    });
     Ok(())
 }
 

@@ -131,7 +131,7 @@ pub struct OpenRig {
     /// Interlock thresholds.
     pub limits: Limits,
     /// Lock a named rig against other programs.
-    pub _locks: Vec<HolderLock>,
+    pub locks: Vec<HolderLock>,
 }
 
 /// Opens the rig; another program that holds it is named in the error.
@@ -166,7 +166,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
             (source.calibration, doubts)
         }
     };
-    Ok(OpenRig { rig, calibration, doubts, limits, _locks: locks })
+    Ok(OpenRig { rig, calibration, doubts, limits, locks })
 }
 
 /// Opens the rig that a file describes.
@@ -182,6 +182,43 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
     // A wrong name is refused before anything is opened.
     let source = args.calibration.as_deref().map(CalibrationSource::find).transpose()?;
     let (rig, locks) = open_rig_file(&args.rig)?;
+    let missing = || {
+        format!("the load cell of {} has no calibration; give --calibration NAME or FILE", args.rig)
+    };
+    calibrated(args, rig, locks, source, missing)
+}
+
+/// Opens a rig by the name that was chosen in a window. If its load cell is not calibrated, the calibration in force for
+/// that rig is used.
+pub(super) fn open_in_window(name: &str) -> Result<OpenRig, Failure> {
+    let args = RigArgs { rig: name.to_owned(), ..RigArgs::default() };
+    if !palpate_drivers::is_rig_file(name) {
+        return open(&args);
+    }
+    let (rig, locks) = open_rig_file(name)?;
+    let is_calibrated = rig.newtons_per_volt().is_some();
+    let (source, unreadable) = match is_calibrated {
+        true => (None, Vec::new()),
+        false => CalibrationSource::in_force(&rig.description().name)?,
+    };
+    let missing = || {
+        format!(
+            "the library has no calibration of this rig; start 'palpate window --rig {name} --calibration thesis' and measure one with weights"
+        )
+    };
+    let mut bench = calibrated(&args, rig, locks, source, missing)?;
+    bench.doubts.extend(unreadable);
+    Ok(bench)
+}
+
+/// Gives an open rig the calibration of this source, or that of its own load cell.
+fn calibrated(
+    args: &RigArgs,
+    rig: Box<dyn Rig>,
+    locks: Vec<HolderLock>,
+    source: Option<CalibrationSource>,
+    missing: impl FnOnce() -> String,
+) -> Result<OpenRig, Failure> {
     let description = rig.description();
     let mut limits = Limits::for_travel(travel(args, description.travel)?);
     let full_scale = description.adc.map(|adc| f64::from(adc.counts_max) * adc.volts_per_count);
@@ -202,14 +239,9 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
             );
             (own, Vec::new())
         }
-        (None, ..) => {
-            return Err(Failure::usage(format!(
-                "the load cell of {} has no calibration; give --calibration NAME or FILE",
-                args.rig
-            )));
-        }
+        (None, ..) => return Err(Failure::Usage(missing())),
     };
-    Ok(OpenRig { rig, calibration, doubts, limits, _locks: locks })
+    Ok(OpenRig { rig, calibration, doubts, limits, locks })
 }
 
 /// Opens the rig of a file and locks it against other programs.

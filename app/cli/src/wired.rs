@@ -6,9 +6,9 @@ use super::output::Output;
 use super::rig::open_rig_file;
 use super::terminal::ctrl_c_flag;
 use clap::{Args, Subcommand};
-use palpate_drivers::detect::{DetectedDevice, detect_device};
+use palpate_drivers::rig_search::{BAUD, detect_at};
 use palpate_drivers::serial::list_ports;
-use palpate_drivers::wire::{DeviceAddress, LinkStats};
+use palpate_drivers::wire::LinkStats;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
@@ -43,7 +43,7 @@ pub struct RigDetectArgs {
     #[arg(long, value_name = "PORT|HOST:PORT")]
     at: Vec<String>,
     /// Bits a second of serial ports
-    #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    #[arg(long, value_name = "BAUD", default_value_t = BAUD, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
     baud: u32,
 }
 
@@ -108,7 +108,7 @@ fn detect(args: &RigDetectArgs, output: &Output) -> Result<(), Failure> {
     if args.ask || !args.at.is_empty() {
         for port in &mut ports {
             bar.set_message(port.at.clone());
-            match identify_device(&port.at, args.baud) {
+            match detect_at(&port.at, args.baud, &driver_clock()) {
                 Ok(found) => {
                     port.device = found.device();
                     port.says = Some(found.to_string());
@@ -122,20 +122,6 @@ fn detect(args: &RigDetectArgs, output: &Output) -> Result<(), Failure> {
     let object = serde_json::json!({ "ports": ports });
     output.answer("rig detect", &object, || port_lines(&ports));
     Ok(())
-}
-
-fn identify_device(at: &str, baud: u32) -> Result<DetectedDevice, String> {
-    // A name with a number behind the last colon is an address; ports of Windows end in their colon.
-    let is_address = at
-        .rsplit_once(':')
-        .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
-    let place = if is_address {
-        DeviceAddress::Tcp(at.to_owned())
-    } else {
-        DeviceAddress::Serial { port: at.to_owned(), baud, has_handshake: false }
-    };
-    let mut link = place.open().map_err(|err| err.to_string())?;
-    detect_device(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
 }
 
 fn port_lines(ports: &[Port]) -> String {

@@ -15,6 +15,8 @@ mod fit;
 mod haptics;
 mod import;
 mod lake;
+mod migrations;
+mod newer;
 mod plan;
 mod programme;
 mod protocol;

@@ -134,6 +134,20 @@ fn files_that_hold_no_curves_are_refused_in_one_sentence() {
 }
 
 #[test]
+fn curves_of_a_newer_version_are_not_replaced() {
+    use palpate_analysis::trade::stored::{TradeFileError, read_trade, write_trade};
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/trade/curves.json");
+    let curves = read_trade(&recorded).unwrap();
+    let file = write_trade(folder.path(), &curves).unwrap();
+    let newer = std::fs::read_to_string(&file).unwrap().replace("\"format\": 1", "\"format\": 2");
+    std::fs::write(&file, &newer).unwrap();
+    let refused = write_trade(folder.path(), &curves);
+    assert!(matches!(refused, Err(TradeFileError::Newer { format: 2, .. })), "{refused:?}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), newer);
+}
+
+#[test]
 fn wrong_wishes_are_refused_before_anything_is_measured() {
     let folder = tempfile::tempdir().unwrap();
     for (more, words) in [

@@ -1,8 +1,8 @@
 //! The workbench's window as an eframe app: `logic` reads keys and the answers of workers, `ui` draws a snapshot.
 
 use crate::command::{Commands, TextSize, UiCommand};
-use crate::screens::run;
 use crate::screens::screen::{Screen, Screens};
+use crate::screens::{rig, run, start_page};
 use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
 use crate::shell::dropped_files::push_dropped;
@@ -21,7 +21,10 @@ use crate::theme;
 use crate::widgets::places;
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
+use crate::workers::PathPurpose;
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
+use palpate_analysis::demonstration_library::has_no_session;
+use palpate_analysis::window_requests::WorkbenchRequest;
 use palpate_protocols::engine::Operator;
 use palpate_runner::RunnerSnapshot;
 use std::io::Write;
@@ -48,25 +51,34 @@ impl WorkbenchApp {
     /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(mut options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
-        let (settings, refusal) = SettingsFile::open(options.settings.take());
+        let (settings, notice) = SettingsFile::open(options.settings.take());
         if settings.now.is_dark {
             theme::switch(ctx);
-        }
-        let mut tour = Tour::default();
-        if settings.has_file() && !settings.now.is_tour_over {
-            tour.start();
         }
         let pace = FramePace::default();
         let to_open = std::mem::take(&mut options.to_open);
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
-        workbench.refusal = refusal;
+        workbench.notice = notice;
         let form = &mut workbench.form;
         form.set_label("operator", &settings.now.operator);
         if form.folder.is_empty() {
             form.folder.clone_from(&settings.now.sessions);
         }
+        let mut screens = Screens::open(&workbench, &settings.now.screen);
+        let library = workbench.library.as_ref();
+        let is_first = settings.is_new()
+            && to_open.is_empty()
+            && workbench.is_simulated
+            && library.is_ok_and(|library| has_no_session(library));
+        let mut tour = Tour::default();
+        if is_first {
+            // The tour follows the choice of the simulated rig.
+            screens.show(start_page::SCREEN.name);
+        } else if settings.has_file() && !settings.now.is_tour_over {
+            tour.start();
+        }
         let mut app = Self {
-            screens: Screens::open(&workbench, &settings.now.screen),
+            screens,
             workbench,
             tour,
             events: EventLog::default(),
@@ -134,6 +146,12 @@ impl WorkbenchApp {
                 self.tour.end();
                 self.settings.now.is_tour_over = true;
             }
+            UiCommand::TakeSimulatedRig if self.workbench.is_simulated => {
+                if self.settings.has_file() && !self.settings.now.is_tour_over {
+                    self.tour.start();
+                }
+                self.screens.show(run::SCREEN.name);
+            }
             UiCommand::NoteTyped => {
                 let text = match self.note.trim() {
                     "" => "mark".to_owned(),
@@ -156,11 +174,45 @@ impl WorkbenchApp {
         }
     }
 
+    /// Takes an open rig in place of the present one, whose link is closed. Nothing moves.
+    fn take_rig(&mut self, ctx: &Context, request: WorkbenchRequest) {
+        if let Err(reason) = self.workbench.free_verdict() {
+            self.workbench.refusal = Some(format!("the rig was not connected, because {reason}"));
+            return;
+        }
+        self.screens.stop();
+        self.screens.close();
+        let old = &self.workbench;
+        let options = WindowOptions {
+            sessions: old.library.clone().ok(),
+            list_ports: old.list_ports,
+            ..WindowOptions::from_request(request)
+        };
+        let taken = Workbench::start(options, ctx, self.pace.waker(ctx));
+        let mut new = match taken {
+            Ok(new) => new,
+            Err(reason) => return self.workbench.refusal = Some(reason),
+        };
+        new.form.set_label("operator", old.form.label_text("operator"));
+        new.form.folder.clone_from(&old.form.folder);
+        let old = std::mem::replace(&mut self.workbench, new);
+        // Closing a link may take a moment, for which no frame waits.
+        let closing = std::thread::Builder::new().name("rig-closing".into());
+        if let Err(err) = closing.spawn(move || drop(old)) {
+            self.workbench.refusal = Some(format!("the former rig was not closed: {err}"));
+        }
+        let is_simulated = self.workbench.is_simulated;
+        let shown = if is_simulated { run::SCREEN.name } else { rig::SCREEN.name };
+        self.screens = Screens::open(&self.workbench, shown);
+    }
+
     /// Copies into the settings what is only needed when the window closes.
     fn update_settings(&mut self) {
         let now = &mut self.settings.now;
         let form = &self.workbench.form;
-        now.screen = self.screens.shown().to_owned();
+        if self.screens.shown() != start_page::SCREEN.name {
+            now.screen = self.screens.shown().to_owned();
+        }
         now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);
         [now.left, now.right, now.log] = self.sizes.changes();
@@ -251,10 +303,16 @@ impl eframe::App for WorkbenchApp {
         }
         self.workbench.poll();
         if let Some((ask, path)) = self.workbench.dialog.poll() {
-            commands.push(UiCommand::Chosen(ask, path));
+            commands.push(match ask {
+                PathPurpose::Opened => UiCommand::Review(vec![path]),
+                ask => UiCommand::Chosen(ask, path),
+            });
         }
         self.workbench.occupation = self.screens.occupation();
         self.screens.poll(ctx, &mut self.workbench);
+        if let Some(request) = self.workbench.next_rig.take() {
+            self.take_rig(ctx, request);
+        }
         self.workbench.refresh_form();
         if let Some(run) = self.workbench.run() {
             self.meter.run(run);

@@ -23,6 +23,14 @@ pub enum UiCommand {
     /// Connects the rig again after its link was lost; nothing moves.
     Reconnect,
     ListPorts,
+    /// Works on the simulated rig; the first time with the tour.
+    TakeSimulatedRig,
+    /// Searches the serial ports and the rig files.
+    FindRig,
+    /// Opens the rig of this file in place of the present one.
+    ConnectRig(PathBuf),
+    /// Records the sessions of the demonstration into the empty library.
+    FillLibrary,
     /// Opens a dialog for a folder or a file.
     Choose(PathPurpose),
     View(RunPane),

@@ -1,7 +1,9 @@
 //! Settings of the window, a small JSON file in the library that is written when the window closes.
 
+use palpate_analysis::window_requests::SETTINGS_VERSION;
 use palpate_sessions::atomic;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +16,8 @@ pub const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=2.5;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct WindowSettings {
+    /// [`SETTINGS_VERSION`] of the program that wrote them.
+    pub settings_version: u32,
     pub is_dark: bool,
     /// Size of text and everything else; 1 is the usual one.
     pub zoom: f32,
@@ -29,11 +33,15 @@ pub struct WindowSettings {
     pub sessions: String,
     /// The tour was taken or ended.
     pub is_tour_over: bool,
+    /// Keys of a later palpate, which are kept.
+    #[serde(flatten)]
+    pub unknown: Map<String, Value>,
 }
 
 impl Default for WindowSettings {
     fn default() -> Self {
         Self {
+            settings_version: SETTINGS_VERSION,
             is_dark: false,
             zoom: 1.0,
             screen: String::new(),
@@ -43,6 +51,7 @@ impl Default for WindowSettings {
             operator: String::new(),
             sessions: String::new(),
             is_tour_over: false,
+            unknown: Map::new(),
         }
     }
 }
@@ -58,8 +67,14 @@ impl WindowSettings {
         if text.len() > BYTES_MAX {
             return Err(unreadable(path, "it is too long"));
         }
-        let read: Self =
+        let value: Value =
             serde_json::from_str(&text).map_err(|err| unreadable(path, &err.to_string()))?;
+        // The version comes first, because the rest of newer settings may not parse.
+        if value["settings_version"].as_u64().is_some_and(|it| it > u64::from(SETTINGS_VERSION)) {
+            return Err(newer(path));
+        }
+        let read: Self =
+            serde_json::from_value(value).map_err(|err| unreadable(path, &err.to_string()))?;
         let zoom = if read.zoom.is_finite() { read.zoom } else { 1.0 };
         Ok(Self { zoom: zoom.clamp(*ZOOM.start(), *ZOOM.end()), ..read })
     }
@@ -77,6 +92,13 @@ impl WindowSettings {
     }
 }
 
+fn newer(path: &Path) -> String {
+    format!(
+        "a newer version of palpate wrote the window's settings in {}; the window opens with the default settings, and the file stays unchanged until palpate is updated",
+        path.display()
+    )
+}
+
 fn unreadable(path: &Path, reason: &str) -> String {
     format!(
         "the window's settings in {} cannot be read ({reason}); the window opens with the default settings, and the file stays unchanged until you correct or delete it",
@@ -91,6 +113,8 @@ pub struct SettingsFile {
     /// As the file has them.
     stored: WindowSettings,
     path: Option<PathBuf>,
+    /// There is no file yet.
+    is_new: bool,
 }
 
 impl SettingsFile {
@@ -100,7 +124,10 @@ impl SettingsFile {
             return (Self::default(), None);
         };
         match WindowSettings::read(&path) {
-            Ok(read) => (Self { now: read.clone(), stored: read, path: Some(path) }, None),
+            Ok(read) => {
+                let is_new = !path.exists();
+                (Self { now: read.clone(), stored: read, path: Some(path), is_new }, None)
+            }
             Err(reason) => (Self::default(), Some(reason)),
         }
     }
@@ -109,11 +136,17 @@ impl SettingsFile {
         self.path.is_some()
     }
 
+    /// Whether the file is still to be made.
+    pub fn is_new(&self) -> bool {
+        self.is_new
+    }
+
     pub fn store(&mut self) -> Result<(), String> {
         match &self.path {
-            Some(path) if self.now != self.stored => {
+            Some(path) if self.is_new || self.now != self.stored => {
                 self.now.write(path)?;
                 self.stored = self.now.clone();
+                self.is_new = false;
                 Ok(())
             }
             _ => Ok(()),
@@ -145,8 +178,21 @@ mod tests {
             file.store().unwrap();
             assert_eq!(std::fs::read_to_string(&path).unwrap(), broken);
         }
-        // A newer palpate may store more; a size that is out of range is not taken.
-        std::fs::write(&path, "{\"zoom\": 99.0, \"from_the_future\": 1}").unwrap();
-        assert_eq!(SettingsFile::open(Some(path)).0.now.zoom, *ZOOM.end());
+        // A newer palpate may store more, which is kept; a size that is out of range is not taken.
+        std::fs::write(&path, "{\"zoom\": 99.0, \"from_the_future\": [1]}").unwrap();
+        let (mut file, _) = SettingsFile::open(Some(path.clone()));
+        assert_eq!(file.now.zoom, *ZOOM.end());
+        file.now.is_dark = true;
+        file.store().unwrap();
+        let stored: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        assert_eq!((&stored["from_the_future"][0], &stored["is_dark"]), (&1.into(), &true.into()));
+        // One that changed the meaning of a key raises the version.
+        let newer = format!("{{\"settings_version\": {}, \"zoom\": \"x\"}}", SETTINGS_VERSION + 1);
+        std::fs::write(&path, &newer).unwrap();
+        let (mut file, refusal) = SettingsFile::open(Some(path.clone()));
+        assert!(refusal.unwrap().contains("a newer version"));
+        file.now.zoom = 2.0;
+        file.store().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), newer);
     }
 }

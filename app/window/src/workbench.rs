@@ -7,10 +7,12 @@ use crate::widgets::require;
 use crate::window::WindowOptions;
 use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
 use eframe::egui::Context;
+use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
 use palpate_protocols::engine::Operator;
 use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
+use palpate_sessions::folder::HolderLock;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -55,8 +57,16 @@ pub struct Workbench {
     /// The folder of recorded sessions, or why there is none.
     pub library: Result<PathBuf, String>,
     pub ports: BackgroundTask<Vec<PortInfo>>,
-    list_ports: ListPorts,
+    pub list_ports: ListPorts,
+    pub is_simulated: bool,
+    pub open_rig: Option<RigOpener>,
+    /// Another rig, which the app takes in place of this one.
+    pub next_rig: Option<WorkbenchRequest>,
+    /// Dropped after the runner, which has the rig.
+    _locks: Vec<HolderLock>,
     pub dialog: Dialog<(PathPurpose, PathBuf)>,
+    /// What a person must know since the window opened.
+    pub notice: Option<String>,
     /// Why the last command was refused.
     pub refusal: Option<String>,
     pub front: ScreenOffers,
@@ -82,6 +92,7 @@ impl Workbench {
             .calibration
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
+        let is_simulated = options.rig.is_virtual();
         let runner = Runner::start(options.rig, options.scale, None, wake)
             .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
         let mut form = ProtocolForm::default();
@@ -105,7 +116,12 @@ impl Workbench {
             library,
             ports: BackgroundTask::default(),
             list_ports: options.list_ports,
+            is_simulated,
+            open_rig: options.open_rig,
+            next_rig: None,
+            _locks: options.locks,
             dialog: Dialog::default(),
+            notice: None,
             refusal: None,
             front: ScreenOffers::default(),
             occupation: Occupation::default(),

@@ -2,10 +2,10 @@
 
 use super::heads::KnownHeads;
 use super::walk::LibrarySession;
-use crate::analyses::{Analyses, AnalysisContent};
+use crate::analyses::{Analyses, AnalysisContent, AnalysisError};
 use crate::chain::ChainHead;
-use crate::edits::{DataQuality, Edits, Review};
-use crate::log::SessionSummary;
+use crate::edits::{DataQuality, EditError, Edits, Review};
+use crate::log::{ReadError, SessionSummary};
 use crate::manifest::Manifest;
 use chrono::{DateTime, Utc};
 use palpate_model::quantity::{base_unit, in_base_unit, split};
@@ -62,6 +62,8 @@ pub struct CatalogEntry {
     pub words: Vec<String>,
     /// Why the session, or a part of it, cannot be read.
     pub trouble: Option<String>,
+    /// A newer version of palpate wrote what cannot be read.
+    pub is_newer: bool,
     /// Heads of edits and analyses; if lines are missing now, the heads from before.
     pub heads: SessionHeads,
 }
@@ -136,7 +138,10 @@ impl CatalogEntry {
         let mut entry = Self { folder: session.name.clone(), ..Self::default() };
         match SessionSummary::read(&session.path) {
             Ok(summary) => entry.take_summary(&summary),
-            Err(err) => return Self { trouble: Some(err.to_string()), ..entry },
+            Err(err) => {
+                let is_newer = matches!(err, ReadError::Newer { .. });
+                return Self { trouble: Some(err.to_string()), is_newer, ..entry };
+            }
         }
         let id = &entry.session_id;
         let heads = known.of_session(&session.name, id);
@@ -145,13 +150,17 @@ impl CatalogEntry {
         let analyses = Analyses::read_since(&session.path, id, heads.analyses);
         let mut trouble = Vec::new();
         let analyses = analyses.unwrap_or_else(|err| {
+            entry.is_newer |= matches!(&err, AnalysisError::Chain(err) if err.is_newer());
             trouble.push(err.to_string());
             Analyses { head: heads.analyses, ..Analyses::default() }
         });
         entry.heads.analyses = analyses.head;
         match edits {
             Ok(edits) => entry.take_edits(&edits, &analyses),
-            Err(err) => trouble.push(err.to_string()),
+            Err(err) => {
+                entry.is_newer |= matches!(&err, EditError::Chain(err) if err.is_newer());
+                trouble.push(err.to_string());
+            }
         }
         entry.take_analyses(&analyses);
         entry.trouble = (!trouble.is_empty()).then(|| trouble.join("; "));

@@ -173,8 +173,8 @@ fn of_entry(entry: &CatalogEntry) -> Vec<RecordedHead> {
         .collect()
 }
 
-/// Heads from a catalog of another version, as far as they are readable.
-pub(super) fn heads_of_other_version(db: &Connection) -> Vec<RecordedHead> {
+/// Heads from a catalog of an older version, as far as they are readable.
+pub(super) fn heads_of_older_version(db: &Connection) -> Vec<RecordedHead> {
     // Older versions have no table `head`, but heads in their entries.
     let sql = "SELECT entry, checksum FROM session";
     let entries = || collect_rows(db, sql, [], |row| Ok(entry_of(row).ok()));

@@ -1,8 +1,8 @@
 //! The catalog: a searchable index of a library's sessions in one SQLite file.
 //!
 //! The file is built and updated from the sessions and may be deleted at any time. Only the recorded heads of JSON-lines
-//! files (`heads.rs`) are lost with it. A file of another version is replaced; a damaged one, or one of another program,
-//! is renamed and replaced.
+//! files (`heads.rs`) are lost with it. A file of an older version is replaced; one of a newer version stays as it is, and
+//! the catalog is made in memory; a damaged one, or one of another program, is renamed and replaced.
 //!
 //! Start reading at [`CatalogEntry`], then [`Catalog::update`] and [`Catalog::find`].
 
@@ -23,6 +23,7 @@ pub use entry::{
 };
 pub use field::{FieldWords, SearchField};
 pub use history::{HistoryEvent, HistorySubject};
+pub use schema::VERSION as CATALOG_VERSION;
 pub use search::{
     CatalogChoices, CatalogOrder, CatalogPage, CatalogQuery, QualityFilter, ReviewFilter,
 };
@@ -33,7 +34,7 @@ use crate::chain::with_ending;
 use crate::lock::{LockFailure, LockTimeout, holder_of, lock_waiting};
 use rusqlite::{Connection, ErrorCode};
 use std::fs;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use thiserror::Error;
@@ -115,20 +116,25 @@ pub struct Catalog {
 }
 
 impl Catalog {
-    /// Opens or creates the catalog of a library; in memory if the library is not writable.
+    /// Opens or creates the catalog of a library; in memory if the library is not writable, or its catalog is of a newer
+    /// version.
     pub fn open(library: &Path) -> Result<Self, CatalogError> {
         match gate(library) {
             Ok(_gate) => Self::open_behind_gate(library, Vec::new()),
-            Err(err) if err.is_forbidden() && library.is_dir() => Ok(Self {
-                db: open_new(Path::new(IN_MEMORY))?,
-                library: library.to_owned(),
-                remarks: vec![format!(
+            Err(err) if err.is_forbidden() && library.is_dir() => {
+                let remark = format!(
                     "the library {} is not writable, so every search reads every session",
                     library.display()
-                )],
-            }),
+                );
+                Self::in_memory(library, remark)
+            }
             Err(err) => Err(err),
         }
+    }
+
+    fn in_memory(library: &Path, remark: String) -> Result<Self, CatalogError> {
+        let db = open_new(Path::new(IN_MEMORY))?;
+        Ok(Self { db, library: library.to_owned(), remarks: vec![remark] })
     }
 
     /// Runs `work` with the catalog of a library. If the file proves damaged, `work` runs again with a new file.
@@ -156,7 +162,10 @@ impl Catalog {
         let path = library.join(CATALOG_FILE);
         let db = match open_file(&path) {
             Ok(CatalogFile::Current(db)) => db,
-            Ok(CatalogFile::OtherVersion(heads)) => {
+            Ok(CatalogFile::Newer(version)) => {
+                return Self::in_memory(library, newer_remark(&path, version));
+            }
+            Ok(CatalogFile::Older(heads)) => {
                 remove(&path)?;
                 let db = open_new(&path)?;
                 let outcome = heads.iter().try_for_each(|one| heads::record_head(&db, one));
@@ -193,12 +202,17 @@ impl Catalog {
 
 enum CatalogFile {
     Current(Connection),
-    OtherVersion(Vec<heads::RecordedHead>),
+    Older(Vec<heads::RecordedHead>),
+    /// Its version.
+    Newer(i64),
     Foreign,
 }
 
 fn open_file(path: &Path) -> Result<CatalogFile, CatalogError> {
     let failed = |source| CatalogError::of(path, source);
+    if let Some(version) = newer_version(path) {
+        return Ok(CatalogFile::Newer(version));
+    }
     let mut db = Connection::open(path).map_err(failed)?;
     db.busy_timeout(PATIENCE).map_err(failed)?;
     let number = |name: &str| -> Result<i64, CatalogError> {
@@ -208,8 +222,11 @@ fn open_file(path: &Path) -> Result<CatalogFile, CatalogError> {
         db.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(failed)?;
     match (number("application_id")?, number("user_version")?) {
         (schema::APPLICATION, schema::VERSION) => {}
+        (schema::APPLICATION, version) if version > schema::VERSION => {
+            return Ok(CatalogFile::Newer(version));
+        }
         (schema::APPLICATION, _) => {
-            return Ok(CatalogFile::OtherVersion(heads::heads_of_other_version(&db)));
+            return Ok(CatalogFile::Older(heads::heads_of_older_version(&db)));
         }
         (0, 0) if tables == 0 => schema::create(&mut db).map_err(failed)?,
         _ => return Ok(CatalogFile::Foreign),
@@ -218,11 +235,32 @@ fn open_file(path: &Path) -> Result<CatalogFile, CatalogError> {
     Ok(CatalogFile::Current(db))
 }
 
+/// Version of a newer catalog, from the file's bytes: opening it with SQLite may already change it.
+fn newer_version(path: &Path) -> Option<i64> {
+    // SQLite's file format, section 1.3: both numbers are big-endian.
+    const VERSION_AT: usize = 60;
+    const APPLICATION_AT: usize = 68;
+    let mut head = [0; 100];
+    fs::File::open(path).and_then(|mut file| file.read_exact(&mut head)).ok()?;
+    let number = |at: usize| Some(i32::from_be_bytes(head.get(at..at + 4)?.try_into().ok()?));
+    let is_ours = i64::from(number(APPLICATION_AT)?) == schema::APPLICATION;
+    let version = i64::from(number(VERSION_AT)?);
+    (is_ours && version > schema::VERSION).then_some(version)
+}
+
+fn newer_remark(path: &Path, version: i64) -> String {
+    format!(
+        "a newer version of palpate made the catalog {} (version {version}, this one makes {}); it stays as it is, and every search reads every session until palpate is updated",
+        path.display(),
+        schema::VERSION
+    )
+}
+
 fn open_new(path: &Path) -> Result<Connection, CatalogError> {
     match open_file(path)? {
         CatalogFile::Current(db) => Ok(db),
         // This process holds the gate, so no other can have created the file.
-        CatalogFile::OtherVersion(_) | CatalogFile::Foreign => {
+        CatalogFile::Older(_) | CatalogFile::Newer(_) | CatalogFile::Foreign => {
             Err(CatalogError::LockTimeout(LockTimeout::of(path)))
         }
     }

@@ -75,10 +75,15 @@ fn lines_cut_off_the_end_are_noticed_by_the_head() {
     append(&path, "session", &json!({"word": "four"})).unwrap();
     assert_eq!(read(&path, "session").unwrap().head().lines, 3);
     assert!(read_since(&path, "session", known).is_err());
-    for bad in ["", "{}", "{\"head_version\":2,\"lines\":1,\"checksum\":1}"] {
+    for bad in ["", "{}", "{\"head_version\":\"2\",\"lines\":1,\"checksum\":1}"] {
         fs::write(&head_file, bad).unwrap();
         let refused = read(&path, "session");
         assert!(matches!(refused, Err(ChainError::BadHead { .. })), "{bad}");
+    }
+    // A newer head may have other fields.
+    fs::write(&head_file, "{\"head_version\":2,\"entries\":[1]}").unwrap();
+    for refused in [read(&path, "session").map(|_| ()), append(&path, "session", &json!(1))] {
+        assert!(matches!(refused, Err(ChainError::Newer { version: 2, .. })), "{refused:?}");
     }
 }
 

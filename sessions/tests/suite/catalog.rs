@@ -608,17 +608,35 @@ fn random_byte(random: &mut Random) -> u8 {
 }
 
 #[test]
-fn catalog_of_another_version_is_rebuilt_silently() {
+fn catalog_of_an_older_version_is_rebuilt_silently() {
     let library = library(3, 61);
     let at = library.path();
     let expected = updated(at).all().unwrap();
     let file = at.join(CATALOG_FILE);
     let mut bytes = fs::read(&file).unwrap();
     // The user version, four bytes at 60 (SQLite file format, 1.3).
-    bytes[60..64].copy_from_slice(&999u32.to_be_bytes());
+    bytes[60..64].copy_from_slice(&1u32.to_be_bytes());
     fs::write(&file, bytes).unwrap();
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap(), expected);
     assert!(catalog.remarks.is_empty());
     assert!(!at.join(format!("{CATALOG_FILE}.aside-1")).exists());
+}
+
+#[test]
+fn catalog_of_a_newer_version_is_left_alone_and_the_search_works() {
+    let library = library(3, 61);
+    let at = library.path();
+    let expected = updated(at).all().unwrap();
+    let file = at.join(CATALOG_FILE);
+    let mut bytes = fs::read(&file).unwrap();
+    bytes[60..64].copy_from_slice(&999u32.to_be_bytes());
+    fs::write(&file, &bytes).unwrap();
+    let mut catalog = updated(at);
+    assert!(catalog.is_in_memory());
+    assert_eq!(catalog.all().unwrap(), expected);
+    assert!(catalog.remarks[0].contains("a newer version"), "{:?}", catalog.remarks);
+    catalog.rebuild(&mut |_, _| {}).unwrap();
+    drop(catalog);
+    assert_eq!(fs::read(&file).unwrap(), bytes);
 }

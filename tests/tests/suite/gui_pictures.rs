@@ -111,6 +111,15 @@ fn settle(window: &mut Window) {
     panic!("the screen never settled");
 }
 
+/// Shows a screen that has no key.
+fn show_by_name(window: &mut Window, name: &str) {
+    window.key_press(Key::F1);
+    window.run_steps(3);
+    window.get_by_label("command").set_text_value_accesskit(name);
+    window.run_steps(2);
+    window.key_press(Key::Enter);
+}
+
 /// Shows a session on the review screen, unless it is there.
 fn show(window: &mut Window, session: &Path) {
     let mut empty = window.query_all_by_label_contains("no session is shown");
@@ -200,7 +209,10 @@ fn every_screen_looks_as_it_did() {
     settle(&mut window);
     for theme in ["light", "dark"] {
         for screen in SCREENS {
-            window.key_press_modifiers(Modifiers::COMMAND, screen.key);
+            match screen.key {
+                Some(key) => window.key_press_modifiers(Modifiers::COMMAND, key),
+                None => show_by_name(&mut window, screen.name),
+            }
             window.run_steps(3);
             if screen.name == "Review" {
                 show(&mut window, &library.join("ramp-hold-lab"));
@@ -234,9 +246,12 @@ fn every_screen_looks_as_it_did() {
                 "Library" => options.clone().max_failed_pixels(200),
                 _ => options.clone(),
             };
-            let name = format!("{}-{theme}", screen.name.to_lowercase());
+            let name = format!("{}-{theme}", screen.name.to_lowercase().replace(' ', "-"));
             results.add(picture(&mut window, name, theme, &options));
         }
+        // The list stands in front of a screen with plots.
+        window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+        window.run_steps(3);
         window.key_press(Key::F1);
         settle(&mut window);
         results.add(picture(&mut window, format!("palette-{theme}"), theme, &options));

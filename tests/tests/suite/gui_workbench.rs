@@ -93,7 +93,7 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
 #[test]
 fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     let mut flow = WindowFlow::open(TimeScale::Max);
-    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key.unwrap());
     flow.window.run_steps(3);
     flow.window.check_accessibility();
     assert!(flow.says("counter, home not known") && flow.says("to 9.0 N"));
@@ -126,7 +126,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
     options.to_acknowledge = vec!["the daily check failed: zero".into()];
     let mut flow = WindowFlow::open_on(options, tempfile::tempdir().unwrap());
-    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key.unwrap());
     flow.window.run_steps(3);
     flow.click("+5 mm");
     flow.window.run_steps(10);
@@ -248,6 +248,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
         WindowFlow::open_on(options, tempfile::tempdir().unwrap())
     };
     let mut flow = open();
+    flow.click("Simulated rig");
     assert!(flow.says("Tour 1 of 7"));
     let mut stops = 0;
     while flow.window.query_by_label("Next").is_some() {

@@ -19,6 +19,7 @@ mod gui_protocols;
 mod gui_report;
 mod gui_review;
 mod gui_scene;
+mod gui_start;
 mod gui_tape;
 mod gui_tutorial;
 mod gui_workbench;

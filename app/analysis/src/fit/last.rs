@@ -21,7 +21,7 @@ use std::{fs, io};
 use thiserror::Error;
 
 const FILE: &str = "last-fit.json";
-const VERSION: u64 = 2;
+pub(crate) const VERSION: u64 = 2;
 
 const DEFAULT_FAMILY: &str = "series-3";
 
@@ -161,6 +161,9 @@ pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::E
 }
 
 fn write(file: &Path, report: &FitReport, source: &Path) -> io::Result<()> {
+    if is_newer(file) {
+        return Err(io::Error::other("a newer version of palpate wrote it; update palpate"));
+    }
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder)?;
     }
@@ -171,7 +174,14 @@ fn write(file: &Path, report: &FitReport, source: &Path) -> io::Result<()> {
     atomic::replace(file, object.to_string().as_bytes())
 }
 
-fn state_file() -> Option<PathBuf> {
+/// Whether a newer version of palpate wrote the file.
+fn is_newer(file: &Path) -> bool {
+    let text = fs::read_to_string(file).unwrap_or_default();
+    let found: Value = serde_json::from_str(&text).unwrap_or_default();
+    found["last_fit_version"].as_u64().is_some_and(|version| version > VERSION)
+}
+
+pub(crate) fn state_file() -> Option<PathBuf> {
     state_file_from(|name| std::env::var_os(name), std::env::home_dir())
 }
 
@@ -243,5 +253,21 @@ mod tests {
         assert_eq!(with(&[state]), path("/state/palpate/last-fit.json"));
         let library = ("PALPATE_HOME", "/library");
         assert_eq!(with(&[state, library]), path("/library/last-fit.json"));
+    }
+
+    #[test]
+    fn only_a_higher_version_is_newer() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(FILE);
+        assert!(!is_newer(&file));
+        for (text, expected) in [
+            ("{\"rmse_n\": 0.1}".to_owned(), false),
+            ("not JSON".to_owned(), false),
+            (json!({ "last_fit_version": VERSION }).to_string(), false),
+            (json!({ "last_fit_version": VERSION + 1 }).to_string(), true),
+        ] {
+            fs::write(&file, &text).unwrap();
+            assert_eq!(is_newer(&file), expected, "{text}");
+        }
     }
 }

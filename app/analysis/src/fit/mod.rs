@@ -2,7 +2,7 @@
 
 mod choice;
 mod lake;
-mod last;
+pub(crate) mod last;
 mod together;
 
 pub use choice::{FitChoice, FitChoiceError};

@@ -19,6 +19,8 @@ pub enum TradeFileError {
     NotCurves { path: PathBuf, reason: String },
     #[error("the curves {} were changed after they were measured; measure again", path.display())]
     Checksum { path: PathBuf },
+    #[error("a newer version of palpate wrote the curves {} (format {format}, this one writes {TRADE_FORMAT}), so they are not replaced; update palpate", path.display())]
+    Newer { path: PathBuf, format: u32 },
     #[error("{}: {source}", path.display())]
     Curves { path: PathBuf, source: CurveError },
 }
@@ -63,6 +65,12 @@ pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, Trad
         false => trade_file(library, &curves.machine),
     };
     let failed = |source| TradeFileError::Io { what: "stored", path: path.clone(), source };
+    if let Err(TradeFileError::Curves { source: CurveError::Format(format), path }) =
+        read_trade(&path)
+        && format > TRADE_FORMAT
+    {
+        return Err(TradeFileError::Newer { path, format });
+    }
     fs::create_dir_all(folder(library)).map_err(failed)?;
     let stored = Stored { checksum: checksum(curves).map_err(failed)?, curves: curves.clone() };
     let text = serde_json::to_vec_pretty(&stored).map_err(|err| failed(err.into()))?;

@@ -35,6 +35,14 @@ impl CalibrationSource {
         }
     }
 
+    /// The one of the library that is in force for a rig; and a sentence for each document that cannot be read, since it
+    /// might be a newer one of that rig.
+    pub fn in_force(rig: &str) -> Result<(Option<Self>, Vec<String>), Failure> {
+        let shelf = CalibrationStore::open(&library_folder().map_err(Failure::usage)?);
+        let unreadable = shelf.unreadable.iter().map(ToString::to_string).collect();
+        Ok((shelf.in_force(rig).map(Self::from_library), unreadable))
+    }
+
     pub fn from_library(saved: &StoredCalibration) -> Self {
         let (id, path) = (saved.id.clone(), saved.path.clone());
         Self::new(Some(id), Some(path), saved.document.clone())

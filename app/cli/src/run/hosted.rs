@@ -65,7 +65,7 @@ impl HostedRun {
         let started = StartedRun::start(bench.rig, options.rig.time_scale, request);
         let started = started.map_err(start_failure)?;
         started.wait_for_start().map_err(start_failure)?;
-        Ok(Self { started, notes: output.take().notes, _locks: bench._locks })
+        Ok(Self { started, notes: output.take().notes, _locks: bench.locks })
     }
 
     /// The next snapshot, or `None` if there is none within `patience`.

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Checks",
     purpose: "the rig's daily checks over time",
-    key: Key::D,
+    key: Some(Key::D),
     open: |workbench| {
         Box::new(ChecksScreen {
             library: workbench.library.clone(),

@@ -14,7 +14,7 @@ use palpate_rheology::extremes::{ExtremesExtent, ExtremesRow, ExtremesVerdict};
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
     purpose: "numerical stability of every family, integrator and fit at extreme inputs",
-    key: Key::Num8,
+    key: Some(Key::Num8),
     open: |_| Box::new(ExtremesScreen::default()),
 };
 

@@ -21,6 +21,7 @@ pub mod run;
 pub mod run_panes;
 pub mod scene;
 pub mod screen;
+pub mod start_page;
 pub mod table;
 mod tape;
 pub mod trade;

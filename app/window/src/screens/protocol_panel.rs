@@ -192,6 +192,9 @@ pub fn start_ui(ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands)
             commands.push(UiCommand::Reconnect);
         }
     }
+    if let Some(notice) = &workbench.notice {
+        alarm_ui(ui, notice);
+    }
     if let Some(refusal) = &workbench.refusal {
         alarm_ui(ui, format!("Not started: {refusal}"));
     }

@@ -22,7 +22,7 @@ use std::path::Path;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Run",
     purpose: "run a protocol and see its results",
-    key: Key::Num3,
+    key: Some(Key::Num3),
     open: |workbench| Box::new(RunScreen::new(workbench)),
 };
 

@@ -4,7 +4,8 @@ use super::table::SCREENS;
 pub use crate::command::{Commands, UiCommand};
 pub use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
-use crate::shell::sizes::{PanelEdge, Sizes};
+use crate::shell::sizes::PanelEdge;
+pub use crate::shell::sizes::Sizes;
 use crate::workbench::Occupation;
 pub use crate::workbench::Workbench;
 use eframe::egui::{CentralPanel, Context, Key, Ui};
@@ -16,8 +17,8 @@ pub struct ScreenEntry {
     pub name: &'static str,
     /// Hint on the rail.
     pub purpose: &'static str,
-    /// Shows the screen with Ctrl (Command on a Mac).
-    pub key: Key,
+    /// Shows the screen with Ctrl (Command on a Mac); a screen without a key is not on the rail.
+    pub key: Option<Key>,
     /// Reads nothing from disk: a thread does that once the screen is shown.
     pub open: fn(&Workbench) -> Box<dyn Screen>,
 }

@@ -15,4 +15,5 @@ pub const SCREENS: &[ScreenEntry] = &[
     super::extremes::SCREEN,
     super::haptics::SCREEN,
     super::scene::SCREEN,
+    super::start_page::SCREEN,
 ];

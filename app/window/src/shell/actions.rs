@@ -61,7 +61,8 @@ impl WorkbenchApp {
         ]);
         actions.extend(self.screens.actions(bench));
         for screen in SCREENS {
-            let keys = format!("Ctrl+{}", screen.key.symbol_or_name());
+            let keys =
+                screen.key.map_or_else(String::new, |key| format!("Ctrl+{}", key.symbol_or_name()));
             let name = format!("Screen {}: {}", screen.name, screen.purpose);
             actions.push(PaletteAction::new(name, &keys, UiCommand::Show(screen.name)));
         }

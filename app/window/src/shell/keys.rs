@@ -78,7 +78,7 @@ impl KeyReader {
                 commands.push(UiCommand::Palette);
             }
             for screen in SCREENS {
-                if is_pressed(&input.events, screen.key, true) {
+                if screen.key.is_some_and(|key| is_pressed(&input.events, key, true)) {
                     commands.push(UiCommand::Show(screen.name));
                 }
             }

@@ -115,6 +115,8 @@ impl Palette {
         ScrollArea::vertical()
             .id_salt("actions")
             .max_height(420.0)
+            // The area remembers the few lines of the last search.
+            .min_scrolled_height(420.0)
             .auto_shrink([false, true])
             .show(ui, |ui| {
                 for (index, action) in found.iter().enumerate() {

@@ -9,10 +9,10 @@ pub const WIDTH: f32 = 100.0;
 
 pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
     for screen in SCREENS {
+        let Some(key) = screen.key else { continue };
         let button = Button::selectable(screen.name == shown, screen.name)
             .min_size(vec2(ui.available_width(), 32.0));
-        let keys = screen.key.symbol_or_name();
-        let hint = format!("{} (Ctrl+{keys})", screen.purpose);
+        let hint = format!("{} (Ctrl+{})", screen.purpose, key.symbol_or_name());
         if ui.add(button).on_hover_text(hint).clicked() {
             commands.push(UiCommand::Show(screen.name));
         }

@@ -21,6 +21,10 @@ pub enum PathPurpose {
     Body,
     /// A scene file.
     Scene,
+    /// A recorded session to look at.
+    Opened,
+    /// A rig file to connect.
+    Rig,
 }
 
 /// A dialog that may be open, and gives a `T`.
@@ -86,11 +90,12 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
     };
     let path = match ask {
         PathPurpose::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-        PathPurpose::Session | PathPurpose::Body => {
+        PathPurpose::Session | PathPurpose::Body | PathPurpose::Opened => {
             dialog.set_title("Folder of a session").pick_folder()
         }
         PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
+        PathPurpose::Rig => of_kind("Rig file", "rig files", &["toml"]),
         PathPurpose::Protocol => of_kind("Protocol", "protocols", &["toml"]),
     };
     Some((ask, path?))

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
     purpose: "load-cell calibrations in the library, which convert volts to newtons",
-    key: Key::Num2,
+    key: Some(Key::Num2),
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),
 };
 

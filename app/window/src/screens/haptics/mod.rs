@@ -35,7 +35,7 @@ pub struct HapticsCheck {
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
     purpose: "feel a material through a haptic device: stability margin, limit cycle and force loop",
-    key: Key::Num9,
+    key: Some(Key::Num9),
     open: |_| Box::new(HapticsScreen::default()),
 };
 

@@ -205,6 +205,7 @@ fn unread(folder: &str) -> TableLine {
 /// State of a session's files according to the catalog: a glyph, a word, and what is wrong.
 pub(super) fn health(entry: &CatalogEntry) -> (Glyph, &'static str, Option<&str>) {
     match (&entry.trouble, &entry.ending) {
+        (Some(trouble), _) if entry.is_newer => (Glyph::Question, "newer", Some(trouble)),
         (Some(trouble), _) => (Glyph::Diamond, "damaged", Some(trouble)),
         (None, None) => (Glyph::Half, "unfinished", None),
         (None, Some(_)) => (Glyph::Disc, "whole", None),

@@ -29,7 +29,7 @@ use std::rc::Rc;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Library",
     purpose: "find sessions",
-    key: Key::Num4,
+    key: Some(Key::Num4),
     open: |workbench| Box::new(LibraryScreen::new(workbench.library.clone())),
 };
 

@@ -14,7 +14,7 @@ use palpate_analysis::select::{SelectionReport, select_sources};
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
     purpose: "which model family a recording needs",
-    key: Key::Num6,
+    key: Some(Key::Num6),
     open: |_| Box::new(ModelsScreen::default()),
 };
 

@@ -27,7 +27,7 @@ use std::path::PathBuf;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
     purpose: "one session in detail, or several side by side",
-    key: Key::Num5,
+    key: Some(Key::Num5),
     open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),
 };
 

@@ -18,7 +18,7 @@ use palpate_runner::RigView;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
     purpose: "readings of the rig, and manual moves",
-    key: Key::Num1,
+    key: Some(Key::Num1),
     open: |_| Box::new(RigScreen::default()),
 };
 

@@ -31,7 +31,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
     purpose: "press into a piece of tissue and see it deform",
     // Every number is taken: Ctrl+0 is the usual size of text.
-    key: Key::E,
+    key: Some(Key::E),
     open: |_| Box::new(SceneScreen::default()),
 };
 

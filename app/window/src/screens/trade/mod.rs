@@ -69,7 +69,7 @@ struct TradeMeasurement {
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Trade",
     purpose: "what accuracy costs on this machine",
-    key: Key::Num7,
+    key: Some(Key::Num7),
     open: |workbench| Box::new(TradeScreen::new(workbench.library.clone())),
 };
 

@@ -1,0 +1,150 @@
+//! What palpate keeps on a computer: every kind of file, its place, its version, and how it is reset.
+//!
+//! `docs/guide/settings.md` has the same table.
+
+use crate::fit::last;
+use crate::window_requests::{SETTINGS_FILE, SETTINGS_VERSION};
+use palpate_model::calibration::CALIBRATION_FORMAT;
+use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
+use palpate_rheology::trade::TRADE_FORMAT;
+use palpate_sessions::catalog::{CATALOG_FILE, CATALOG_VERSION};
+use palpate_sessions::{LINES_VERSION, RECORD_VERSION};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// One kind of file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct KeptFile {
+    pub what: &'static str,
+    pub place: PathBuf,
+    /// Form and version that this program writes.
+    pub form: String,
+    pub written_by: &'static str,
+    pub reset: &'static str,
+    /// Whether there is such a file or folder here.
+    pub is_there: bool,
+}
+
+/// All kinds, for a library.
+#[must_use]
+pub fn kept_files(library: &Path) -> Vec<KeptFile> {
+    let lines = format!("JSON lines, head version {LINES_VERSION}");
+    let rows = [
+        (
+            "window settings",
+            SETTINGS_FILE,
+            format!("JSON, settings version {SETTINGS_VERSION}"),
+            "the window when it closes",
+            "delete the file",
+        ),
+        (
+            "sessions",
+            "sessions",
+            format!("MCAP, record version {RECORD_VERSION}"),
+            "runs, imports and recoveries",
+            "move a session's folder elsewhere",
+        ),
+        (
+            "edits and analyses",
+            "sessions/*/*.jsonl",
+            lines.clone(),
+            "tags, notes, reviews, saved fits",
+            "undo or withdraw; nothing is erased",
+        ),
+        (
+            "programmes",
+            "programmes",
+            lines.clone(),
+            "runs of programmes",
+            "move a programme's folder elsewhere",
+        ),
+        (
+            "calibrations",
+            "calibrations",
+            format!("JSON, format {CALIBRATION_FORMAT}"),
+            "'palpate calibration' and the window",
+            "supersede the calibration by a newer one",
+        ),
+        (
+            "machine compliances",
+            "compliances",
+            format!("JSON, format {COMPLIANCE_FORMAT}"),
+            "'palpate compliance --save'",
+            "measure again; the newest counts",
+        ),
+        (
+            "daily checks",
+            "checks",
+            lines,
+            "'palpate daily-check'",
+            "check again; the newest counts",
+        ),
+        (
+            "curves of the trade",
+            "trade",
+            format!("JSON, format {TRADE_FORMAT}"),
+            "'palpate trade' and the window",
+            "delete the folder and measure again",
+        ),
+        (
+            "catalog",
+            CATALOG_FILE,
+            format!("SQLite, version {CATALOG_VERSION}"),
+            "every search",
+            "delete the file; the next search makes it again",
+        ),
+        (
+            "rig files and locks",
+            "rigs",
+            "TOML; locks are empty".to_owned(),
+            "you; locks: a program that holds a rig",
+            "delete a lock that no program holds",
+        ),
+        (
+            "log of the program",
+            "log",
+            "text, 5 files at most".to_owned(),
+            "every command",
+            "delete the folder",
+        ),
+    ];
+    let mut files: Vec<KeptFile> = rows
+        .into_iter()
+        .map(|(what, place, form, written_by, reset)| {
+            let place = library.join(place);
+            let is_there = match place.to_string_lossy().split_once('*') {
+                Some((before, _)) => Path::new(before).exists(),
+                None => place.exists(),
+            };
+            KeptFile { what, place, form, written_by, reset, is_there }
+        })
+        .collect();
+    files.extend(last::state_file().map(|place| KeptFile {
+        what: "last fit",
+        is_there: place.exists(),
+        place,
+        form: format!("JSON, last fit version {}", last::VERSION),
+        written_by: "'palpate fit'",
+        reset: "delete the file",
+    }));
+    files
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A raised version, or a new kind of file, is to be in the guide too.
+    #[test]
+    fn guide_has_every_kind_of_file_with_its_version() {
+        let guide = include_str!("../../../docs/guide/settings.md");
+        let files = kept_files(Path::new("library"));
+        assert!(files.len() >= 11);
+        for file in files {
+            let row = guide.lines().find(|line| line.starts_with(&format!("| {} |", file.what)));
+            let row = row.unwrap_or_else(|| panic!("the guide has no row '{}'", file.what));
+            assert!(row.contains(&file.form), "'{}' is not in: {row}", file.form);
+            assert!(row.contains(file.reset), "'{}' is not in: {row}", file.reset);
+        }
+    }
+}
