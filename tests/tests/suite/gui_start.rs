@@ -131,6 +131,7 @@ fn open_rig(name: &str) -> Result<WorkbenchRequest, String> {
         calibration: palpate_drivers::sim::calibration(settings.profile),
         to_acknowledge: vec!["the calibration is old".into()],
         scale: TimeScale::Max,
+        to_open: Vec::new(),
         locks: Vec::new(),
         open_rig: None,
     })
