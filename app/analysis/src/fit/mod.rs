@@ -152,6 +152,10 @@ impl SourceFit {
         let solution = FitSolution::fit_signals(&[record], options, &[]);
         let mut result = solution.as_ref().map(FitSolution::report).map_err(Clone::clone);
         let seconds = watch.seconds();
+        if let (Ok(solution), Ok(report)) = (&solution, &mut result) {
+            let richer = solution.richer_words(0, report);
+            report.warnings.extend(richer);
+        }
         let mut systematic = None;
         if let (Ok(solution), Ok(report), true) = (&solution, &mut result, is_systematic) {
             let origin = Origin::of(calibration.as_ref(), compliance.as_ref());

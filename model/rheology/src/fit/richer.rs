@@ -2,6 +2,8 @@
 
 use super::columns::OuterPoint;
 use super::options::FitOptions;
+use super::report::FitReport;
+use super::sentences::lacks_fit;
 use super::solve::{FitSolution, joint_system, search_start};
 use super::system::{Rows, System};
 use crate::families::{Family, all_families};
@@ -25,9 +27,12 @@ impl ThinFit {
 }
 
 impl FitSolution<'_> {
-    /// What the best of the families that add something to the fitted one makes of the parameters, in a sentence; `None`
-    /// where no such family has parameters of the same names. `samples` is the number of independent samples.
-    pub(super) fn richer_words(&self, record: usize, samples: f64) -> Option<String> {
+    /// What the best of the families that add something to the fitted one makes of a record's parameters, in a sentence;
+    /// `None` without lack of fit, and where no such family has parameters of the same names. `report` is that of the record.
+    #[must_use]
+    pub fn richer_words(&self, record: usize, report: &FitReport) -> Option<String> {
+        let noise = report.noise.as_ref().filter(|noise| lacks_fit(self, report, noise))?;
+        let samples = noise.effective_samples;
         let own = self.system.source.family.key();
         let own_fit = self.thin_fit(record, &own)?;
         let richer = richer_than(&own);

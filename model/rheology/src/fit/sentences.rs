@@ -1,6 +1,6 @@
 //! Warnings and findings of a fit; window, command line and files use the same sentences.
 
-use super::report::{FitReport, FittedParameter};
+use super::report::{FitReport, FittedParameter, NoiseEstimate};
 use super::solve::FitSolution;
 use super::uncertainty::RangeEnd;
 use crate::families::OuterRange;
@@ -47,11 +47,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
             fitted.inseparable.join(", ")
         ));
     }
-    let times: Vec<&FittedParameter> = (0..layout.outers)
-        .filter(|&k| fitted.system.source.range_kind(k) == OuterRange::Time)
-        .map(|k| &report.parameters[k])
-        .collect();
-    for time in &times {
+    for time in relaxation_times(fitted, report) {
         let is_uncertain = |error: f64| error > UNCERTAIN_SHARE * time.value;
         if time.std_error.is_some_and(is_uncertain) {
             warnings.push(format!(
@@ -73,29 +69,43 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
     }
     if let Some(noise) = &report.noise {
         let unknowns = fitted.system.unknowns.len() as f64;
-        let is_few = noise.effective_samples < EFFECTIVE_MIN * unknowns;
         if noise.correlation_time_s.is_none() {
-            if is_few {
+            if noise.effective_samples < EFFECTIVE_MIN * unknowns {
                 warnings.push(format!(
                     "only {} samples for {unknowns} parameters; the intervals are rough",
                     report.samples
                 ));
             }
-        } else if is_few
-            || noise.correlation_time_s.is_some_and(|time| {
-                let longest = times.iter().map(|one| one.value).reduce(f64::max);
-                longest.is_some_and(|longest| time > MEMORY_LONG * longest)
-            })
-        {
+        } else if lacks_fit(fitted, report, noise) {
             warnings.push(format!(
                 "lack of fit: the residuals are autocorrelated over a long time, so the model does not \
                  describe the record to within its noise, and intervals based on about {} are rough",
                 independent_words(noise.effective_samples)
             ));
-            warnings.extend(fitted.richer_words(record, noise.effective_samples));
         }
     }
     warnings
+}
+
+fn relaxation_times<'a>(
+    fitted: &FitSolution<'_>,
+    report: &'a FitReport,
+) -> impl Iterator<Item = &'a FittedParameter> {
+    let is_time = |k: &usize| fitted.system.source.range_kind(*k) == OuterRange::Time;
+    let times: Vec<usize> = (0..fitted.system.layout().outers).filter(is_time).collect();
+    times.into_iter().map(|k| &report.parameters[k])
+}
+
+/// Whether residuals are autocorrelated over so long that the model does not describe the record.
+pub(super) fn lacks_fit(
+    fitted: &FitSolution<'_>,
+    report: &FitReport,
+    noise: &NoiseEstimate,
+) -> bool {
+    let Some(time) = noise.correlation_time_s else { return false };
+    let is_few = noise.effective_samples < EFFECTIVE_MIN * fitted.system.unknowns.len() as f64;
+    let longest = relaxation_times(fitted, report).map(|one| one.value).reduce(f64::max);
+    is_few || longest.is_some_and(|longest| time > MEMORY_LONG * longest)
 }
 
 /// Findings that are not numbers.

@@ -88,6 +88,8 @@ fn bands_of_one_press_are_compared_with_the_other() {
         samples[..=last].to_vec()
     };
     let presses = [loaded(one), loaded(other)];
+    let of_deep = FitSolution::of(&presses[0], &FitOptions::default()).unwrap();
+    println!("{}", of_deep.richer_words(0, &of_deep.report()).unwrap());
     for (fitted, held, documented) in [(0, 1, 0.13), (1, 0, 0.01)] {
         let known = FitSolution::of(&presses[fitted], &FitOptions::default()).unwrap();
         let path: Vec<_> = presses[held].iter().map(|one| (one.t, one.depth)).collect();
