@@ -6,13 +6,16 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 24] = [
+const PROPER_NAMES: [&str; 27] = [
     // Programs, libraries, repositories and formats.
+    "AppImage",
     "CarbonFiberData",
+    "CycloneDX",
     "DuckDB",
     "GalilConnector",
     "GitHub",
     "JavaScript",
+    "ModemManager",
     "JuliaRheology",
     "MiB",
     "NaN",
