@@ -7,6 +7,7 @@
     reason = "a test that cannot go on must fail"
 )]
 
+use eframe::egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_analysis::fit::FitRecipe;
@@ -119,6 +120,15 @@ impl WindowFlow {
     #[must_use]
     pub fn run(&self) -> Option<RunView> {
         self.window.state().snapshot().run.clone()
+    }
+
+    /// Opens the list of everything by name, types and takes the first that is found.
+    pub fn act_by_name(&mut self, words: &str) {
+        self.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+        self.window.run_steps(3);
+        self.type_into("command", words);
+        self.window.key_press(Key::Enter);
+        self.window.run_steps(3);
     }
 
     pub fn type_into(&mut self, name: &str, text: &str) {

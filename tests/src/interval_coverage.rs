@@ -19,6 +19,7 @@ use palpate_runner::programme::calibration_from_session;
 use palpate_sessions::Session;
 use palpate_sessions::document_store::save_document;
 use std::fmt::Write;
+use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 
 use crate::built_in_plan;
@@ -284,11 +285,20 @@ fn draws_of(parameters: &[FittedParameter], truth: &[f64; 6]) -> CoverageDraws {
 
 /// Draws of these seeds on so many threads.
 #[must_use]
-pub fn draws(case: CoverageCase, seeds: std::ops::Range<u64>, threads: u64) -> Vec<SeedDraws> {
+pub fn draws(case: CoverageCase, seeds: Range<u64>, threads: u64) -> Vec<SeedDraws> {
     let of = |seed| {
         let settings = SimSettings { seed, ..case.settings };
         draw(&CoverageCase { settings, ..case })
     };
+    by_seeds(seeds, threads, of)
+}
+
+/// What `of` makes of each seed, on so many threads.
+pub(crate) fn by_seeds<T: Send>(
+    seeds: Range<u64>,
+    threads: u64,
+    of: impl Fn(u64) -> T + Sync,
+) -> Vec<T> {
     let part = |k| seeds.clone().filter(move |seed| seed % threads == k);
     let (part, of) = (&part, &of);
     std::thread::scope(|scope| {

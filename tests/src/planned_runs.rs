@@ -1,6 +1,6 @@
 //! Runs of planned protocols, each planned from a first run on the same specimen.
 
-use crate::interval_coverage::{CoverageCase, draw, recorded};
+use crate::interval_coverage::{CoverageCase, by_seeds, draw, recorded};
 use palpate_analysis::plan::{PlanAssumptions, PlanRequest, PlanningRig, plan};
 use palpate_analysis::recordings::Recordings;
 use palpate_drivers::Rig;
@@ -101,12 +101,5 @@ pub fn planned_runs(
         let found = draw(&CoverageCase { press: Some((speed, hold)), ..case }).signal[0];
         PlannedRun { assumed, secs, error: 100.0 * found.error, stated: 100.0 * found.half }
     };
-    let part = |k| seeds.clone().filter(move |seed| seed % threads == k);
-    let (part, of) = (&part, &of);
-    std::thread::scope(|scope| {
-        let handles: Vec<_> = (0..threads)
-            .map(|k| scope.spawn(move || part(k).map(of).collect::<Vec<_>>()))
-            .collect();
-        handles.into_iter().flat_map(|one| one.join().expect("runs")).collect()
-    })
+    by_seeds(seeds, threads, of)
 }

@@ -19,7 +19,7 @@ use std::path::Path;
 /// If the run is not started or says nothing for minutes.
 #[must_use]
 pub fn record_ramp_hold(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
-    let asked = Asked { is_acknowledged: true, ..Asked::of(params.plan()) };
+    let asked = RecordingRequest { is_acknowledged: true, ..RecordingRequest::of(params.plan()) };
     record(rig, calibration, asked).expect("a start")
 }
 
@@ -44,18 +44,18 @@ pub fn try_record_plan(
     calibration: Calibration,
     plan: Plan,
 ) -> Result<Session, StartError> {
-    record(rig, calibration, Asked::of(plan))
+    record(rig, calibration, RecordingRequest::of(plan))
 }
 
 /// What is asked of the runner.
-struct Asked {
+struct RecordingRequest {
     plan: Plan,
     scale: TimeScale,
     leader: Option<SharedLeadSource>,
     is_acknowledged: bool,
 }
 
-impl Asked {
+impl RecordingRequest {
     fn of(plan: Plan) -> Self {
         Self { plan, scale: TimeScale::Max, leader: None, is_acknowledged: false }
     }
@@ -64,11 +64,11 @@ impl Asked {
 fn record(
     rig: Box<dyn Rig>,
     calibration: Calibration,
-    asked: Asked,
+    request: RecordingRequest,
 ) -> Result<Session, StartError> {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    wait_for_end(ask(rig, calibration, asked, &out)?);
+    wait_for_end(ask(rig, calibration, request, &out)?);
     Ok(Session::open(&out).expect("the session"))
 }
 
@@ -99,7 +99,8 @@ pub fn start(
     scale: TimeScale,
     out: &Path,
 ) -> StartedRun {
-    ask(rig, calibration, Asked { scale, ..Asked::of(plan) }, out).expect("a start")
+    ask(rig, calibration, RecordingRequest { scale, ..RecordingRequest::of(plan) }, out)
+        .expect("a start")
 }
 
 /// A plan with a step that follows, at full pace or in real time, as a session read back from disk.
@@ -114,17 +115,17 @@ pub fn record_led_plan(
     scale: TimeScale,
     leader: SharedLeadSource,
 ) -> Session {
-    let asked = Asked { scale, leader: Some(leader), ..Asked::of(plan) };
+    let asked = RecordingRequest { scale, leader: Some(leader), ..RecordingRequest::of(plan) };
     record(rig, calibration, asked).expect("a start")
 }
 
 fn ask(
     rig: Box<dyn Rig>,
     calibration: Calibration,
-    asked: Asked,
+    request: RecordingRequest,
     out: &Path,
 ) -> Result<StartedRun, StartError> {
-    let Asked { plan, scale, leader, is_acknowledged } = asked;
+    let RecordingRequest { plan, scale, leader, is_acknowledged } = request;
     let request = RunRequest {
         plan,
         calibration,

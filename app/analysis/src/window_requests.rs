@@ -33,6 +33,28 @@ pub struct WorkbenchRequest {
     pub open_rig: Option<RigOpener>,
 }
 
+impl WorkbenchRequest {
+    /// A rig with nothing to acknowledge or to open, held by no lock, which stays the window's only one.
+    #[must_use]
+    pub fn of(
+        rig: Box<dyn Rig>,
+        calibration: Calibration,
+        limits: Limits,
+        scale: TimeScale,
+    ) -> Self {
+        Self {
+            rig,
+            calibration,
+            limits,
+            to_acknowledge: Vec::new(),
+            scale,
+            to_open: Vec::new(),
+            locks: Vec::new(),
+            open_rig: None,
+        }
+    }
+}
+
 /// Opens a rig by its name, `sim` or the path of a rig file; the error says what to do. It may take seconds.
 pub type RigOpener = Arc<dyn Fn(&str) -> Result<WorkbenchRequest, String> + Send + Sync>;
 

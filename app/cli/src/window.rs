@@ -36,18 +36,11 @@ pub(super) fn run(
 fn request(bench: OpenRig, scale: TimeScale) -> Result<WorkbenchRequest, Failure> {
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
     let OpenRig { rig, calibration, limits, locks, .. } = bench;
-    let to_acknowledge = gate.to_acknowledge();
-    let open_rig = Some(opener());
-    let to_open = Vec::new();
     Ok(WorkbenchRequest {
-        rig,
-        calibration,
-        limits,
-        to_acknowledge,
-        scale,
-        to_open,
+        to_acknowledge: gate.to_acknowledge(),
         locks,
-        open_rig,
+        open_rig: Some(opener()),
+        ..WorkbenchRequest::of(rig, calibration, limits, scale)
     })
 }
 

@@ -56,7 +56,7 @@ impl WorkbenchApp {
             theme::switch(ctx);
         }
         let pace = FramePace::default();
-        let to_open = std::mem::take(&mut options.to_open);
+        let to_open = std::mem::take(&mut options.request.to_open);
         let mut workbench = Workbench::start(options, ctx, pace.waker(ctx))?;
         workbench.notice = notice;
         let form = &mut workbench.form;

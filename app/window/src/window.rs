@@ -3,14 +3,11 @@
 use crate::app::WorkbenchApp;
 use crate::workbench::ListPorts;
 use eframe::egui::{Context, ViewportBuilder, ViewportCommand, vec2};
-use palpate_analysis::window_requests::{RigOpener, SETTINGS_FILE, WorkbenchRequest};
-use palpate_drivers::Rig;
+use palpate_analysis::window_requests::{SETTINGS_FILE, WorkbenchRequest};
 use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
-use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_runner::TimeScale;
-use palpate_sessions::folder::HolderLock;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
 
@@ -19,22 +16,11 @@ const ICON: &[u8] = include_bytes!("../icon.png");
 
 /// What a window opens with.
 pub struct WindowOptions {
-    pub rig: Box<dyn Rig>,
-    pub calibration: Calibration,
-    pub limits: Limits,
-    /// What must be acknowledged before any run, such as a daily check that failed.
-    pub to_acknowledge: Vec<String>,
-    /// Pace of a simulated rig.
-    pub scale: TimeScale,
+    /// The rig, and what goes with it.
+    pub request: WorkbenchRequest,
     /// Folder for new sessions; the library if none.
     pub sessions: Option<PathBuf>,
-    /// What is shown at once, as if it were dropped on the window.
-    pub to_open: Vec<PathBuf>,
     pub list_ports: ListPorts,
-    /// Keep the rig from other programs.
-    pub locks: Vec<HolderLock>,
-    /// Opens another rig; without it the window keeps its own.
-    pub open_rig: Option<RigOpener>,
     /// File of the window's settings; none are kept without one.
     pub settings: Option<PathBuf>,
 }
@@ -45,45 +31,17 @@ impl WindowOptions {
         let rig = palpate_drivers::open(name, settings).map_err(|err| err.to_string())?;
         let limits = Limits::for_travel(rig.description().travel);
         let calibration = palpate_drivers::sim::calibration(settings.profile);
-        let to_acknowledge = Vec::new();
-        let (to_open, locks, open_rig) = (Vec::new(), Vec::new(), None);
-        let request = WorkbenchRequest {
-            rig,
-            calibration,
-            limits,
-            to_acknowledge,
-            scale,
-            to_open,
-            locks,
-            open_rig,
-        };
+        let request = WorkbenchRequest::of(rig, calibration, limits, scale);
         Ok(Self { settings: None, ..Self::from_request(request) })
     }
 
     /// Options for an open rig, with the settings file of the library.
     #[must_use]
     pub fn from_request(request: WorkbenchRequest) -> Self {
-        let WorkbenchRequest {
-            rig,
-            calibration,
-            limits,
-            to_acknowledge,
-            scale,
-            to_open,
-            locks,
-            open_rig,
-        } = request;
         Self {
-            rig,
-            calibration,
-            limits,
-            to_acknowledge,
-            scale,
+            request,
             sessions: None,
-            to_open,
             list_ports,
-            locks,
-            open_rig,
             settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
         }
     }

@@ -88,15 +88,16 @@ impl Workbench {
         ctx: &Context,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self, String> {
-        let curve = options
+        let WindowOptions { request, sessions, list_ports, .. } = options;
+        let curve = request
             .calibration
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
-        let is_simulated = options.rig.is_virtual();
-        let runner = Runner::start(options.rig, options.scale, None, wake)
+        let is_simulated = request.rig.is_virtual();
+        let runner = Runner::start(request.rig, request.scale, None, wake)
             .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
         let mut form = ProtocolForm::default();
-        let library = match options.sessions {
+        let library = match sessions {
             Some(folder) => {
                 form.folder = folder.display().to_string();
                 Ok(folder)
@@ -107,19 +108,19 @@ impl Workbench {
             snapshot: runner.snapshot(),
             runner,
             bench: RunSetup {
-                calibration: options.calibration,
+                calibration: request.calibration,
                 curve,
-                limits: options.limits,
-                to_acknowledge: options.to_acknowledge,
+                limits: request.limits,
+                to_acknowledge: request.to_acknowledge,
             },
             form,
             library,
             ports: BackgroundTask::default(),
-            list_ports: options.list_ports,
+            list_ports,
             is_simulated,
-            open_rig: options.open_rig,
+            open_rig: request.open_rig,
             next_rig: None,
-            _locks: options.locks,
+            _locks: request.locks,
             dialog: Dialog::default(),
             notice: None,
             refusal: None,

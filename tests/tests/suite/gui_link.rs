@@ -58,7 +58,7 @@ impl Rig for Unplugged {
 fn a_lost_link_is_reported_and_reconnected_by_a_button() {
     let scale = TimeScale::Factor(1.0);
     let mut options = WindowOptions::open("sim", &SimSettings::default(), scale).unwrap();
-    options.rig = Box::new(Unplugged {
+    options.request.rig = Box::new(Unplugged {
         rig: SimRig::new(SimSettings::default()),
         tries: 0,
         is_reported: false,

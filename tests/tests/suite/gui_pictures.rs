@@ -78,7 +78,7 @@ impl Rig for Still {
 fn open(library: &Path) -> Window {
     let settings = SimSettings::default();
     let mut options = WindowOptions::open("sim", &settings, TimeScale::Max).unwrap();
-    options.rig = Box::new(Still(SimRig::new(settings)));
+    options.request.rig = Box::new(Still(SimRig::new(settings)));
     options.sessions = Some(library.to_owned());
     options.list_ports = || Ok(Vec::new());
     Harness::builder()

@@ -1,6 +1,6 @@
 //! The start page: shown once, to whom has nothing yet; its choices by accessible name and by key.
 
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::Key;
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_analysis::window_requests::{SETTINGS_VERSION, WorkbenchRequest};
 use palpate_drivers::serial::PortInfo;
@@ -22,14 +22,6 @@ fn options(settings: &Path) -> WindowOptions {
     options.settings = Some(settings.to_owned());
     options.list_ports = || Ok(Vec::new());
     options
-}
-
-fn by_name(flow: &mut WindowFlow, words: &str) {
-    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
-    flow.window.run_steps(3);
-    flow.type_into("command", words);
-    flow.window.key_press(Key::Enter);
-    flow.window.run_steps(3);
 }
 
 #[test]
@@ -62,7 +54,7 @@ fn start_page_is_shown_once_and_leads_to_the_tour_by_keys_alone() {
     // The settings alone are enough, whatever the library has.
     let mut flow = WindowFlow::open_on(options(&settings), tempfile::tempdir().unwrap());
     assert!(!flow.says(TITLE) && !flow.says("Tour 1 of 7"));
-    by_name(&mut flow, "start page");
+    flow.act_by_name("start page");
     assert!(flow.says(TITLE));
     // It is no screen to come back to.
     eframe::App::on_exit(flow.window.state_mut());
@@ -78,7 +70,7 @@ fn start_page_is_not_shown_where_sessions_are_or_where_nothing_is_remembered() {
     let settings = library.path().join("window.json");
     let mut flow = WindowFlow::open_on(options(&settings), library);
     assert!(!flow.says(TITLE) && flow.says("Tour 1 of 7"));
-    by_name(&mut flow, "start page");
+    flow.act_by_name("start page");
     flow.wait_for_words("the library has sessions already");
     assert!(!flow.is_enabled(FILL));
     // Windows without settings, as those of tests, have neither page nor tour.
@@ -125,15 +117,11 @@ fn open_rig(name: &str) -> Result<WorkbenchRequest, String> {
     };
     let known = if name == "sim" { "sim" } else { "sim:bench" };
     let rig = palpate_drivers::open(known, &settings).unwrap();
+    let limits = Limits::for_travel(rig.description().travel);
+    let calibration = palpate_drivers::sim::calibration(settings.profile);
     Ok(WorkbenchRequest {
-        limits: Limits::for_travel(rig.description().travel),
-        rig,
-        calibration: palpate_drivers::sim::calibration(settings.profile),
         to_acknowledge: vec!["the calibration is old".into()],
-        scale: TimeScale::Max,
-        to_open: Vec::new(),
-        locks: Vec::new(),
-        open_rig: None,
+        ..WorkbenchRequest::of(rig, calibration, limits, TimeScale::Max)
     })
 }
 
@@ -145,7 +133,7 @@ fn rig_is_found_and_connected_in_place_of_the_simulated_one() {
         let name = "/dev/there-is-no-such-port".into();
         Ok(vec![PortInfo { name, description: "USB 0403:6001".into() }])
     };
-    options.open_rig = Some(Arc::new(open_rig));
+    options.request.open_rig = Some(Arc::new(open_rig));
     let mut flow = WindowFlow::open_on(options, library);
     flow.click("Find my rig");
     flow.wait_for_words("does not exist");
@@ -159,10 +147,10 @@ fn rig_is_found_and_connected_in_place_of_the_simulated_one() {
     let snapshot = flow.window.state().snapshot();
     assert!(snapshot.run.is_none(), "connecting moved the rig");
     // What nobody reads on a terminal must be acknowledged.
-    by_name(&mut flow, "screen run");
+    flow.act_by_name("screen run");
     assert!(flow.says("the calibration is old"));
     // The operator is known there, too, and the folder of the library is the same.
-    by_name(&mut flow, "start page");
+    flow.act_by_name("start page");
     assert!(flow.says(TITLE));
 }
 
@@ -172,7 +160,7 @@ fn search_that_finds_nothing_says_what_to_do() {
     let settings = library.path().join("window.json");
     let rigs = library.path().join("rigs").display().to_string();
     let mut flow = WindowFlow::open_on(options(&settings), library);
-    by_name(&mut flow, "find my rig");
+    flow.act_by_name("find my rig");
     flow.wait_for_words("No rig file and no serial port was found");
     assert!(flow.says(&rigs) && flow.says("this window cannot open another rig"));
 }
@@ -187,7 +175,7 @@ fn settings_of_a_newer_version_are_reported_and_stay_when_the_window_closes() {
     flow.window.run_steps(3);
     assert!(!flow.says(TITLE), "settings are no first start");
     assert!(flow.says("a newer version of palpate wrote the window's settings"));
-    by_name(&mut flow, "light and dark");
+    flow.act_by_name("light and dark");
     eframe::App::on_exit(flow.window.state_mut());
     assert_eq!(std::fs::read_to_string(&settings).unwrap(), newer);
 }

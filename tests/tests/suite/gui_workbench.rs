@@ -16,15 +16,6 @@ use palpate_window::screens::table::SCREENS;
 use palpate_window::widgets::places::places;
 use palpate_window::window::WindowOptions;
 
-/// Opens the palette, types and takes the first that is found.
-fn by_name(flow: &mut WindowFlow, words: &str) {
-    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
-    flow.window.run_steps(3);
-    flow.type_into("command", words);
-    flow.window.key_press(Key::Enter);
-    flow.window.run_steps(3);
-}
-
 #[test]
 fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     let mut flow = WindowFlow::open(TimeScale::Max);
@@ -54,7 +45,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     let button = flow.window.get_by_label(SCREENS[3].name);
     assert!(button.accesskit_node().toggled().is_some());
     // What cannot be asked for now stays where it is.
-    by_name(&mut flow, "retract after");
+    flow.act_by_name("retract after");
     assert!(flow.window.query_by_label("command").is_some());
     // Escape stops and closes it.
     flow.window.key_press(Key::Escape);
@@ -65,7 +56,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
 #[test]
 fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
     let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
-    by_name(&mut flow, "start the protocol");
+    flow.act_by_name("start the protocol");
     flow.wait_for_phase(Phase::Contact);
     flow.type_into("note", "a visitor leaned on the table");
     flow.click("Note  F3");
@@ -75,12 +66,12 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
         let mut found = window.query_all_by_label_contains("note: ");
         found.next().is_some() && found.next().is_some()
     });
-    by_name(&mut flow, "stop motion");
+    flow.act_by_name("stop motion");
     flow.wait("the stop", |window| {
         let run = window.state().snapshot().run.as_ref();
         run.is_some_and(|run| run.holding.is_some())
     });
-    by_name(&mut flow, "close the session");
+    flow.act_by_name("close the session");
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
     let session = Session::open(&flow.sessions()[0]).unwrap();
@@ -124,7 +115,7 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
 #[test]
 fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
-    options.to_acknowledge = vec!["the daily check failed: zero".into()];
+    options.request.to_acknowledge = vec!["the daily check failed: zero".into()];
     let mut flow = WindowFlow::open_on(options, tempfile::tempdir().unwrap());
     flow.window.key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key.unwrap());
     flow.window.run_steps(3);
@@ -143,7 +134,7 @@ fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
     let mut flow = WindowFlow::open(TimeScale::Max);
     let mut seen = 0;
     for screen in SCREENS {
-        by_name(&mut flow, &format!("screen {}", screen.name));
+        flow.act_by_name(&format!("screen {}", screen.name));
         let known: Vec<String> =
             places(&flow.window.ctx).into_iter().map(|(name, _)| name).collect();
         for role in [Role::CheckBox, Role::RadioButton, Role::ComboBox, Role::TextInput] {
@@ -166,7 +157,7 @@ fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
 #[test]
 fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
     let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
-    by_name(&mut flow, "protocol load-cell-calibration");
+    flow.act_by_name("protocol load-cell-calibration");
     flow.type_into("operator", "Ada");
     flow.type_into("masses", "140 g, 540 g");
     flow.type_into("repeats", "1");
@@ -222,7 +213,7 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
 #[test]
 fn zeroing_shows_what_the_probe_feels() {
     let mut flow = WindowFlow::open(TimeScale::Max);
-    by_name(&mut flow, "protocol zeroing");
+    flow.act_by_name("protocol zeroing");
     flow.window.key_press(Key::F5);
     flow.wait_for_end();
     flow.window.run_steps(3);
@@ -259,12 +250,12 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     assert_eq!(stops, 6);
     flow.click("Done with the tour");
     flow.type_into("operator", "Grace");
-    by_name(&mut flow, "light and dark");
-    by_name(&mut flow, "larger text");
+    flow.act_by_name("light and dark");
+    flow.act_by_name("larger text");
     // The view's tabs stand right of the left panel: they move with its edge, by name and by the pointer.
     let edge = |flow: &WindowFlow| flow.window.get_by_label("Protocols").rect().left();
     let usual = edge(&flow);
-    by_name(&mut flow, "larger left panel");
+    flow.act_by_name("larger left panel");
     let larger = edge(&flow);
     assert!((larger - usual - 40.0).abs() < 0.6, "{usual} {larger}");
     let grip = flow.window.get_by_label("operator").rect().center();
@@ -277,7 +268,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     flow.window.run_steps(2);
     let dragged = edge(&flow);
     assert!((dragged - larger - 25.0).abs() < 0.6, "{larger} {dragged}");
-    by_name(&mut flow, "screen library");
+    flow.act_by_name("screen library");
     eframe::App::on_exit(flow.window.state_mut());
     let mut flow = open();
     flow.window.run_steps(3);
@@ -285,7 +276,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     let ctx = flow.window.ctx.clone();
     assert!((ctx.zoom_factor() - 1.1).abs() < 1e-6);
     assert!(ctx.global_style().visuals.dark_mode);
-    by_name(&mut flow, "screen run");
+    flow.act_by_name("screen run");
     assert!((edge(&flow) - dragged).abs() < 0.6, "{}", edge(&flow));
     assert!(
         flow.window

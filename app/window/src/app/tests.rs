@@ -37,7 +37,7 @@ fn open(ctx: &Context) -> (WorkbenchApp, CommandLog) {
     let settings = SimSettings::default();
     let mut options = WindowOptions::open("sim", &settings, TimeScale::Max).unwrap();
     let commanded = CommandLog::default();
-    options.rig = Box::new(Recorder(SimRig::new(settings), Arc::clone(&commanded)));
+    options.request.rig = Box::new(Recorder(SimRig::new(settings), Arc::clone(&commanded)));
     options.list_ports = || Ok(Vec::new());
     // A library that is not there: nothing of this computer is read.
     let folder = tempfile::tempdir().unwrap();
@@ -156,7 +156,7 @@ fn a_log_that_the_window_opens_with_shows_its_session_for_review() {
     let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
     options.list_ports = || Ok(Vec::new());
     options.sessions = Some(folder.path().join("none"));
-    options.to_open = vec![log];
+    options.request.to_open = vec![log];
     let mut app = WorkbenchApp::new(options, &ctx).unwrap();
     assert_eq!(app.screens.shown(), "Review");
     app.screens.poll(&ctx, &mut app.workbench);
