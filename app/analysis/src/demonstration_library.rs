@@ -14,7 +14,7 @@ use thiserror::Error;
 pub enum DemonstrationLibraryError {
     #[error("the library {} already has sessions", .0.display())]
     InUse(PathBuf),
-    #[error("the recording was interrupted, so {} lacks sessions", .0.display())]
+    #[error("the recording was interrupted, so the library {} lacks some of the sessions; use an empty folder to record all of them", .0.display())]
     Interrupted(PathBuf),
     #[error(transparent)]
     Run(#[from] DemonstrationError),

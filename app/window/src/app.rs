@@ -199,7 +199,9 @@ impl WorkbenchApp {
         // Closing a link may take a moment, for which no frame waits.
         let closing = std::thread::Builder::new().name("rig-closing".into());
         if let Err(err) = closing.spawn(move || drop(old)) {
-            self.workbench.refusal = Some(format!("the former rig was not closed: {err}"));
+            self.workbench.refusal = Some(format!(
+                "the former rig was not closed ({err}); restart palpate to free its ports"
+            ));
         }
         let is_simulated = self.workbench.is_simulated;
         let shown = if is_simulated { run::SCREEN.name } else { rig::SCREEN.name };

@@ -170,7 +170,9 @@ impl StartPage {
                 commands.push(UiCommand::FillLibrary);
             }
             match &verdict {
-                Ok(()) => quiet_ui(ui, "for Library, Review, Models and Trade to show"),
+                Ok(()) => {
+                    quiet_ui(ui, "so that Library, Review, Models and Trade have something to show")
+                }
                 Err(reason) => quiet_ui(ui, reason),
             }
         });

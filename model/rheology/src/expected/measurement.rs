@@ -7,8 +7,7 @@ use crate::fit::{ExpectedSignal, FitSample, student_t975};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 
-/// Samples at which a press is evaluated: with them, intervals of the usual ramp and hold are within 0.1 % of those from all
-/// samples.
+/// Samples at which a press is evaluated: with them, intervals are within 1 % of those from all samples (the test below).
 const SAMPLES: f64 = 2048.0;
 /// But at least so many in a relaxation time.
 const SAMPLES_PER_TAU: f64 = 16.0;
@@ -37,7 +36,7 @@ impl Measurement<'_> {
     ) -> Result<ExpectedPrecision, ExpectedError> {
         match self {
             Self::Forces { noise, unknowns } => intervals(body, protocol, noise, *unknowns),
-            Self::Signal(signal) => of_signal(body, protocol, signal),
+            Self::Signal(signal) => of_signal(body, protocol, signal, SAMPLES),
         }
     }
 }
@@ -46,13 +45,14 @@ fn of_signal(
     body: &ModifiedKelvin,
     protocol: &ProtocolPath,
     signal: &ExpectedSignal,
+    samples_wanted: f64,
 ) -> Result<ExpectedPrecision, ExpectedError> {
     protocol.check()?;
     body.checked()?;
     let rate = protocol.sample_rate_hz;
     let longest = protocol.presses.iter().map(|press| duration_of(press)).fold(0.0, f64::max);
     check_resolved(body.tau_eps, rate, longest)?;
-    let wanted = SAMPLES.max(SAMPLES_PER_TAU * longest / body.tau_eps) / longest;
+    let wanted = samples_wanted.max(SAMPLES_PER_TAU * longest / body.tau_eps) / longest;
     let taken_rate = rate.min(wanted);
     let mut forces = [f64::INFINITY, f64::NEG_INFINITY];
     let presses =
@@ -101,4 +101,68 @@ fn samples(
         found.push(FitSample { t: Seconds(t), depth: Depth(to), force, sigma: Newtons(1.0) });
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::{FitOptions, FitSolution, Signal, SignalRecord, UnloadedMean};
+    use palpate_model::calibration::Calibration;
+    use palpate_model::units::{MmPerS, Volts};
+
+    /// White noise of one sample in V.
+    const NOISE_V: f64 = 1e-3;
+
+    /// What a run on a straight cell of 0.15 V/N tells of the next one; the zero is seen for half a minute before and after.
+    fn known_signal() -> ExpectedSignal {
+        let calibration = Calibration::linear("straight", Volts(1.28), 0.15, Newtons(10.0));
+        let curve = calibration.curve().unwrap();
+        // Digits of the golden ratio's multiples, as even as random ones and the same each time.
+        let mut place = 0.0f64;
+        let mut noise = move || {
+            place = (place + 0.618_033_988_749_895).fract();
+            // As wide as a standard deviation of one.
+            (place - 0.5) * 12.0f64.sqrt()
+        };
+        let press = ProtocolPath::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(20.0), 100.0);
+        let mut forces = [f64::INFINITY, f64::NEG_INFINITY];
+        let samples = samples(&ModifiedKelvin::THESIS, &press.presses[0], 100.0, &mut forces);
+        let volts = samples.iter().map(|one| curve.volts_from_newtons(one.force).0);
+        let volts = volts.map(|volts| volts + NOISE_V * noise()).collect();
+        let end = samples[samples.len() - 1].t.0;
+        let times = (0..120).map(|k| 0.25 * f64::from(k));
+        let times = times.clone().map(|t| t - 30.0).chain(times.map(|t| end + 1.0 + t));
+        let unloaded = times.map(|t| UnloadedMean {
+            t: Seconds(t),
+            volts: Volts(1.28 + 0.2 * NOISE_V * noise()),
+            count: 25,
+        });
+        let unloaded = unloaded.collect();
+        let signal = Signal {
+            volts,
+            unloaded,
+            curve,
+            hysteresis: None,
+            contact_error_mm: 1e-3,
+            search_secs: 20.0,
+        };
+        let record = SignalRecord { name: "known", samples: &samples, signal: Some(&signal) };
+        let fitted = FitSolution::fit_signals(&[record], &FitOptions::default(), &[]).unwrap();
+        fitted.expected_signal().unwrap()
+    }
+
+    #[test]
+    fn thinned_presses_expect_what_all_samples_expect() {
+        let signal = known_signal();
+        let body = ModifiedKelvin::THESIS;
+        for (speed, hold) in [(0.75, 20.0), (0.75, 50.0), (0.69, 1.33), (0.2, 600.0)] {
+            let press = ProtocolPath::ramp_hold(MmPerS(speed), Depth(30.0), Seconds(hold), 1e3);
+            let [thinned, all] =
+                [SAMPLES, 1e9].map(|samples| of_signal(&body, &press, &signal, samples).unwrap());
+            for (thinned, all) in thinned.parameters.iter().zip(&all.parameters) {
+                let ratio = thinned.std_error / all.std_error;
+                assert!((ratio - 1.0).abs() < 0.01, "{speed} {hold} {}: {ratio}", all.name);
+            }
+        }
+    }
 }

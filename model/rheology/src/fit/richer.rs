@@ -40,7 +40,10 @@ impl FitSolution<'_> {
         let best =
             fits.min_by(|one, other| one.criterion(samples).total_cmp(&other.criterion(samples)))?;
         if best.criterion(samples) >= own_fit.criterion(samples) {
-            return Some(format!("none of {} describes the record better", richer.join(", ")));
+            return Some(format!(
+                "none of the richer families {} describes the record better",
+                richer.join(", ")
+            ));
         }
         let shifts = own_fit.values.iter().filter_map(|(name, value)| {
             let other = best.values.iter().find(|(other, _)| other == name)?.1;
@@ -49,7 +52,7 @@ impl FitSolution<'_> {
         let shifts: Vec<String> = shifts.collect();
         (!shifts.is_empty()).then(|| {
             format!(
-                "the richer family {} leaves {:.0} % of the residual variance and changes {}; no interval includes this choice",
+                "the richer family {} leaves {:.0} % of the residual variance and changes {}; the intervals do not cover the choice of the family",
                 best.key,
                 100.0 * best.sum / own_fit.sum,
                 shifts.join(", ")
