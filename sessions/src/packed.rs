@@ -26,8 +26,7 @@ pub(crate) fn read_fields<'a>(
 /// Takes the next field off the front: number and value.
 fn next_field<'a>(bytes: &mut &'a [u8]) -> Result<(u32, Field<'a>), String> {
     let key = varint(bytes)?;
-    let number =
-        u32::try_from(key >> 3).map_err(|_| "the number of a field is invalid".to_owned())?;
+    let number = u32::try_from(key >> 3).map_err(|_| "the field number is invalid".to_owned())?;
     let field = match key & 7 {
         0 => Field::Number(varint(bytes)?),
         2 => {

@@ -44,7 +44,7 @@ impl GalilError {
             E::ARRAY_SPACE | E::TOO_MANY_NAMES => {
                 "free the controller's arrays and variables (DA*[],*)"
             }
-            E::RECORDING => "end the recording with RC 0",
+            E::RECORDING => "send the command RC 0 to end the recording",
             E::NOT_FOR_STEPPER => {
                 "this command is for servo axes, and palpate drives stepper axes only; report this error with the log"
             }

@@ -137,7 +137,7 @@ impl Protocol {
         if steps.is_empty() && !is_nothing && problems.count() == before {
             problems.error(
                 self.procedure.line,
-                "the protocol has no steps with these values; choose other values",
+                "with these values the protocol has no steps to run; choose other values",
             );
         }
         let (steps, lines) = steps.into_iter().map(|placed| (placed.planned, placed.line)).unzip();

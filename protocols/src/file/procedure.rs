@@ -19,7 +19,7 @@ pub(super) const LOOP_KEYS: [Key; 5] = [
     Key::optional(
         "as",
         QuantityKind::Text,
-        "name for the number of the pass, from 1; write `$name` in values and `{name}` in texts",
+        "name of the pass counter, which starts at 1; write `$name` in values and `{name}` in texts",
     ),
     Key::optional("reverse", QuantityKind::Flag, "`true` takes the values in reverse order"),
     Key::optional(

@@ -47,12 +47,12 @@ pub(super) const FACTS: StepFacts = StepFacts {
         Key::optional(
             "bath_from",
             QuantityKind::Temperature,
-            "the wait ends only while the bath is at or above this temperature; required with `bath_to`",
+            "for the wait to end, the bath must be at or above this temperature; required with `bath_to`",
         ),
         Key::optional(
             "bath_to",
             QuantityKind::Temperature,
-            "the wait ends only while the bath is at or below this temperature",
+            "for the wait to end, the bath must be at or below this temperature",
         ),
         Key::usual("timeout", QuantityKind::Time, "10 min", "longest wait"),
         Key::usual(

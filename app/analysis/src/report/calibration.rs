@@ -243,7 +243,7 @@ fn spread(quality: &CalibrationQuality) -> String {
             one.rms_v * 1e3,
             one.rms_n
         ),
-        None => "hysteresis: not measured; unload weight by weight".to_owned(),
+        None => "hysteresis: not measured; to measure it, take the weights off one by one and read each step".to_owned(),
     };
     let repeatability = match quality.repeatability_v {
         Some(volts) => format!("repeatability: {:.2} mV from reading to reading", volts * 1e3),

@@ -25,7 +25,9 @@ pub enum SourceError {
         "the session was imported from {file} and has no raw signal, so its forces cannot be recalculated; if the forces are wrong, import the file again with other units"
     )]
     NoSignal { file: String },
-    #[error("the session has no ramp and hold with known force and depth to fit")]
+    #[error(
+        "the session has no ramp and hold with a known force and depth, so there is nothing to fit"
+    )]
     Empty,
     #[error("the session has no loading and no sine with known force and depth to analyse")]
     NoCycles,

@@ -51,13 +51,12 @@ pub struct RunArgs {
     session: SessionArgs,
 }
 
-const SHORT: &str =
-    "Short forms of --set, for ramp-hold and every protocol with the same parameters";
+const SHORT: &str = "Short forms of --set, for protocols that have the parameters of ramp-hold";
 
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
 #[derive(Debug, Args)]
 #[command(
-    next_help_heading = "Short forms of --set, for ramp-hold and every protocol with the same parameters"
+    next_help_heading = "Short forms of --set, for protocols that have the parameters of ramp-hold"
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s

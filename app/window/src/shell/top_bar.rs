@@ -70,7 +70,7 @@ fn halt_ui(ui: &mut Ui) -> Id {
         .fill(tokens.control)
         .stroke(Stroke::new(1.0, tokens.alarm_fill))
         .min_size(vec2(72.0, HEIGHT));
-    let hint = "stops the motion without braking; the axis must be homed again";
+    let hint = "stops the motion at once, without slowing down; the axis must be homed again";
     ui.add(button).on_hover_text(hint).id
 }
 

@@ -82,7 +82,7 @@ impl SceneCurves {
             let good = |value: f64| value >= 0.0 && value.is_finite();
             if let Some((error, cost)) = points.iter().find(|(e, c)| !(good(*e) && good(*c))) {
                 return Err(format!(
-                    "a measured {what} with an error of {error} and a cost of {cost} is not possible; measure the scene again"
+                    "the measurement of the scene is invalid: a {what} has the error {error} and the cost {cost}; measure again"
                 ));
             }
         }
