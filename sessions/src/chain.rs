@@ -64,9 +64,8 @@ impl ChainError {
 fn missing(found: u64, written: u64) -> String {
     match written.checked_sub(found) {
         None | Some(0) => "its lines differ from the lines that were written".to_owned(),
-        Some(1) => format!("its last line is missing ({found} of {written} lines are present)"),
-        Some(count) => {
-            format!("its last {count} lines are missing ({found} of {written} lines are present)")
+        Some(_) => {
+            format!("the end of the file is missing: only {found} of {written} lines are present")
         }
     }
 }

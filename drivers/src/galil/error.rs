@@ -42,7 +42,7 @@ impl GalilError {
                 "a limit switch is closed; move the axis the other way and check the switch"
             }
             E::ARRAY_SPACE | E::TOO_MANY_NAMES => {
-                "free the controller's arrays and variables (DA*[],*)"
+                "delete the arrays and variables on the controller with its command DA *[],*"
             }
             E::RECORDING => "send the command RC 0 to end the recording",
             E::NOT_FOR_STEPPER => {

@@ -83,7 +83,7 @@ pub(super) fn check_settings(
         // Bit 0 of `$10`: machine position rather than work position.
         (
             10,
-            "status reports, which must contain the machine position",
+            "content of the status reports: they must contain the machine position",
             "1".into(),
             has(10) as i64 & 1 == 1,
         ),

@@ -139,7 +139,7 @@ impl Writer<'_> {
         let mistake = |message: &str| Err((table.line, message.to_owned()));
         if depth == LOOPS_MAX {
             return mistake(&format!(
-                "loops are nested more than {LOOPS_MAX} levels deep; write out the passes of one loop"
+                "loops are nested more than {LOOPS_MAX} levels deep; replace the innermost loop by its steps, written once for each pass"
             ));
         }
         let Some(steps) = table.get("steps") else {

@@ -44,7 +44,7 @@ impl Need {
                 "compares forces, but the load cell is not tared yet; put { do = \"tare\" } before it"
             }
             Self::Contact => {
-                "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it"
+                "measures depth from the surface, but the surface is not known yet; put { do = \"find-contact\" } before it"
             }
             Self::Inside => {
                 "keeps the force of the probe on the tissue, but the probe does not press yet; put { do = \"load\", to = \"1 N\", ... } before it"

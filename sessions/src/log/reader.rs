@@ -415,7 +415,7 @@ pub(crate) fn refused(path: &Path, refusal: Refusal) -> ReadError {
     match refusal {
         Refusal::Foreign => ReadError::NotASession {
             path: path.into(),
-            reason: "its header names another program".into(),
+            reason: "according to its header, another program wrote the file".into(),
         },
         Refusal::Newer(software_version, record_version) => {
             ReadError::Newer { path: path.into(), software_version, record_version }

@@ -51,12 +51,12 @@ pub struct RunArgs {
     session: SessionArgs,
 }
 
-const SHORT: &str = "Short forms of --set, for protocols that have the parameters of ramp-hold";
+const SHORT: &str = "Short forms of --set, for protocols with the same parameters as 'ramp-hold'";
 
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
 #[derive(Debug, Args)]
 #[command(
-    next_help_heading = "Short forms of --set, for protocols that have the parameters of ramp-hold"
+    next_help_heading = "Short forms of --set, for protocols with the same parameters as 'ramp-hold'"
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s

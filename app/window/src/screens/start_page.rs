@@ -170,9 +170,10 @@ impl StartPage {
                 commands.push(UiCommand::FillLibrary);
             }
             match &verdict {
-                Ok(()) => {
-                    quiet_ui(ui, "so that Library, Review, Models and Trade have something to show")
-                }
+                Ok(()) => quiet_ui(
+                    ui,
+                    "gives the screens Library, Review, Models and Trade something to show",
+                ),
                 Err(reason) => quiet_ui(ui, reason),
             }
         });

@@ -177,7 +177,7 @@ fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Com
                     control_ui(ui, run, RunControl::Redo, "Last weight again", commands);
                 }
                 let left = match run.pause {
-                    PauseView::Paused { .. } => "the time to answer is paused too".into(),
+                    PauseView::Paused { .. } => "the countdown for the answer is paused too".into(),
                     _ => format!("{} left to answer", clock(prompt.time_left.0)),
                 };
                 ui.label(RichText::new(left).color(tokens.text_quiet));

@@ -109,7 +109,7 @@ fn no_answer_error(console: &TextConsole<'_>) -> DeviceError {
     };
     if console.received().lines().any(is_part) {
         return unfit(
-            "it does not send force and travel together; check the cable to its gauge and the travel option",
+            "the stand does not send force and travel together; check the cable between stand and gauge, and that the stand's travel option is on",
         );
     }
     console.no_answer(

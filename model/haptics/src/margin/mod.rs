@@ -238,13 +238,13 @@ impl MarginReport {
         };
         let why = match cause {
             MarginCause::Lag => {
-                "the relaxation of the model requires this damping, so a faster loop does not help"
+                "this damping is needed because of the model's relaxation; a faster loop would not need less"
             }
             MarginCause::Tick => {
-                "the period and the delay of the loop require this damping, so a faster loop helps"
+                "this damping is needed because of the loop's period and delay; a faster loop would need less"
             }
             MarginCause::Sudden => {
-                "sudden moves require this damping, so a faster loop or a shorter delay helps"
+                "this damping is needed because of sudden moves; a faster loop or a shorter delay would need less"
             }
         };
         if self.worst.is_enough() {

@@ -72,12 +72,12 @@ fn special_paths() -> Vec<PathCase> {
     }
     vec![
         path(
-            "touches the surface in the last 1e-12 of the duration of a step",
+            "the probe touches the surface at the very end of a step, in the last 1e-12 of its duration",
             -1.0,
             &[(1.0, 1e-12), (1.0, 2e-12)],
         ),
         path(
-            "leaves the surface in the last 1e-12 of the duration of a step",
+            "the probe leaves the surface at the very end of a step, in the last 1e-12 of its duration",
             5.0,
             &[(1.0, 5.0), (1e3, -1e-12), (1e-3, -1e-12), (1.0, 4.0)],
         ),

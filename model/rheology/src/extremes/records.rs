@@ -122,7 +122,7 @@ fn cases(extent: ExtremesExtent) -> Vec<RecordCase> {
         ),
         RecordCase::new("ramp only", Either, ramp),
         RecordCase::new("every depth twice", Number, stairs),
-        RecordCase::new("ramp, hold and retraction by half", Number, full()),
+        RecordCase::new("ramp, hold, then retraction to half the depth", Number, full()),
         RecordCase {
             offset: 2e6,
             tolerance: 1e-3,

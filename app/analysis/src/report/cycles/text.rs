@@ -132,7 +132,7 @@ fn prediction(report: &CycleReport) -> Option<String> {
         Err(err) => vec![one.cycle.to_string(), err.to_string()],
     });
     let title = "prediction minus measurement, percent of the measured peak";
-    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | time of worst s | N at peak | % at peak | N at end | % at end";
+    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | worst at s | N at peak | % at peak | N at end | % at end";
     section(title, head, rows.collect())
 }
 

@@ -76,7 +76,9 @@ impl Grid {
         match self.rows.last() {
             Some((last, _)) if *last == number => {}
             Some((last, _)) if *last > number => {
-                return Err(damaged(format!("row {number} comes after row {last}")));
+                return Err(damaged(format!(
+                    "its rows are not in order: row {number} follows row {last}"
+                )));
             }
             _ => self.rows.push((number, Vec::new())),
         }
