@@ -157,7 +157,7 @@ struct Server<'a> {
 impl<'a> Server<'a> {
     #[expect(
         clippy::disallowed_methods,
-        reason = "an emulator is the other end of the wire and has a clock of its own"
+        reason = "an emulator replaces a device, and a device has a clock of its own"
     )]
     fn open(
         device: &'a mut dyn EmulatedDevice,

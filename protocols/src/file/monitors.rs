@@ -18,7 +18,7 @@ const LIMIT_KEYS: [Key; 2] = [
     Key::optional(
         "travel_max",
         QuantityKind::Length,
-        "furthest position from home, such as a little before the base; the rig's own limit also applies",
+        "largest distance from home that the probe may reach, for example just short of the base; the rig's own limit also applies",
     ),
 ];
 

@@ -46,7 +46,7 @@ pub fn records(selection: &ModelSelection) -> String {
 #[must_use]
 pub fn table(selection: &ModelSelection) -> Vec<Vec<String>> {
     let mut names = head(
-        "family | fitted values | rms mN | worst mN | dAICc | dBIC | predicted mN | scaled mN | state variables | operations",
+        "family | fitted values | rms (mN) | worst (mN) | dAICc | dBIC | predicted (mN) | scaled (mN) | state variables | operations",
     );
     names.extend(selection.tolerance_n.map(|_| "within".to_owned()));
     std::iter::once(names).chain(selection.candidates.iter().map(row)).collect()
@@ -78,7 +78,7 @@ fn row(one: &ModelCandidate) -> Vec<String> {
 /// Rows of the ladder, the head first.
 #[must_use]
 pub fn ladder(selection: &ModelSelection) -> Vec<Vec<String>> {
-    let mut rows = vec![head("step | adds | rms mN | predicted mN | dBIC | operations")];
+    let mut rows = vec![head("step | adds | rms (mN) | predicted (mN) | dBIC | operations")];
     let change =
         |[before, after]: [f64; 2]| format!("{} > {}", digits(1e3 * before), digits(1e3 * after));
     rows.extend(selection.steps.iter().map(|step| {

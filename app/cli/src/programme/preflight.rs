@@ -176,8 +176,9 @@ pub(super) fn preview_object(
 }
 
 pub(super) fn preview_table(programme: &Programme, foreseen: &ProgrammeForecast) -> String {
-    let mut lines =
-        vec![["task", "times", "min", "at most", "peak N", "protocol"].map(str::to_owned).to_vec()];
+    let mut lines = vec![
+        ["task", "times", "min", "at most", "peak (N)", "protocol"].map(str::to_owned).to_vec(),
+    ];
     for (task, ahead) in programme.tasks.iter().zip(&foreseen.tasks) {
         let [low, high] = ahead.force_band.map(|force| force.0);
         lines.push(vec![

@@ -220,7 +220,7 @@ impl Screen for RunScreen {
             (RunPane::Course, "View: expected course"),
             (RunPane::Measured, "View: measured"),
             (RunPane::Weighing, "View: weights"),
-            (RunPane::Approach, "View: search for the surface"),
+            (RunPane::Approach, "View: surface search"),
         ];
         let mut actions: Vec<PaletteAction> = views
             .into_iter()

@@ -182,7 +182,7 @@ fn best(
             if choice.share_of_period.is_some_and(|used| used > share) =>
         {
             Advice::None(format!(
-                "the cheapest setting within {tolerance} is {}, which takes {:.3} % of each period at {rate} updates a second, more than the {} % allowed",
+                "no setting is fast enough: even the cheapest within {tolerance}, {}, takes {:.3} % of each period at {rate} updates a second, but at most {} % is allowed",
                 choice.setting,
                 100.0 * choice.share_of_period.unwrap_or_default(),
                 100.0 * share

@@ -49,7 +49,7 @@ fn loops(report: &CycleReport) -> String {
     let at = report.cycles.iter().find_map(|one| one.stiffness);
     let at = at.map_or(String::new(), |one| format!(" at {:.2} mm", one.depth.0));
     let head = format!(
-        "cycle | mm/s | depth mm | start N | peak N | change % | shift mm | loading N·mm | loop N·mm | lost % | N/mm{at}"
+        "cycle | speed (mm/s) | depth (mm) | start (N) | peak (N) | change (%) | shift (mm) | loading (N·mm) | loop (N·mm) | lost (%) | stiffness (N/mm){at}"
     );
     let row = |(index, one): (usize, &CycleAnalysis)| {
         let change = index.checked_sub(1).map(|before| report.steadiness.changes[before]);
@@ -102,8 +102,7 @@ fn relaxation(report: &CycleReport) -> Option<String> {
             estimate(relaxation.equilibrium, Newtons::get),
         ])
     };
-    let head =
-        "cycle | held s | peak N | end N | relaxed % | half-time s | end rate N/s | equilibrium N";
+    let head = "cycle | hold (s) | peak (N) | end (N) | relaxed (%) | half-time (s) | rate at the end (N/s) | equilibrium (N)";
     section("relaxation at constant depth", head, report.cycles.iter().filter_map(row).collect())
 }
 
@@ -121,7 +120,7 @@ fn creep(report: &CycleReport) -> Option<String> {
             number(creep.rate_end),
         ]
     });
-    let head = "cycle | held s | force N | sd N | from mm | to mm | added % | end rate mm/s";
+    let head = "cycle | hold (s) | force (N) | sd (N) | from (mm) | to (mm) | added (%) | rate at the end (mm/s)";
     section("creep at constant force", head, rows.collect())
 }
 
@@ -132,7 +131,7 @@ fn prediction(report: &CycleReport) -> Option<String> {
         Err(err) => vec![one.cycle.to_string(), err.to_string()],
     });
     let title = "prediction minus measurement, percent of the measured peak";
-    let head = "cycle | rms N | rms % | mean N | sd % | worst N | worst % | worst at s | N at peak | % at peak | N at end | % at end";
+    let head = "cycle | rms (N) | rms (%) | mean (N) | sd (%) | worst (N) | worst (%) | time of worst (s) | at peak (N) | at peak (%) | at end (N) | at end (%)";
     section(title, head, rows.collect())
 }
 
@@ -170,6 +169,6 @@ fn sines(report: &CycleReport) -> Option<String> {
         ],
         Err(err) => vec![NONE.into(), err.to_string()],
     });
-    let head = "Hz | cycles | depth mm | ± mm | force N | ± N | phase ° | storage N/mm | loss N/mm | distortion %";
+    let head = "frequency (Hz) | cycles | depth (mm) | amplitude (mm) | force (N) | amplitude (N) | phase (°) | storage (N/mm) | loss (N/mm) | distortion (%)";
     section("sine", head, rows.collect())
 }

@@ -191,7 +191,7 @@ pub(super) fn parameters(body: &mut HtmlBody, parameters: &[FittedParameter]) {
     let statistical = "Parameters. The 95 % interval is statistical";
     if parameters.iter().any(|one| one.total95.is_some()) {
         let caption = format!(
-            "{statistical}; the systematic column is the standard uncertainty from calibration and compliance, which is the same in every repeat; the total interval includes both."
+            "{statistical}; the systematic column is the standard uncertainty from calibration and compliance, whose error is the same in every repeat; the total interval includes the statistical and the systematic part."
         );
         body.table(&caption, &PARAMETER_HEADS, &rows);
     } else {

@@ -186,7 +186,7 @@ impl ProgrammePage {
                 run.verdict.clone().unwrap_or_default(),
             ]
         };
-        let head = "task | repeat | ended by | duration s | peak N | session | operator | specimen | verdict";
+        let head = "task | repeat | ended by | duration (s) | peak (N) | session | operator | specimen | verdict";
         table(head, self.runs.iter().map(row))
     }
 

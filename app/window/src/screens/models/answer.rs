@@ -18,15 +18,15 @@ const PLOT_SHARE: f32 = 0.46;
 /// Columns of [`selection::table`] by their heads, what decides first, with widths in points.
 const COLUMNS: [(&str, f32); 11] = [
     ("family", 92.0),
-    ("predicted mN", 100.0),
+    ("predicted (mN)", 108.0),
     ("operations", 74.0),
     ("within", 46.0),
-    ("rms mN", 60.0),
+    ("rms (mN)", 68.0),
     ("dBIC", 78.0),
     ("fitted values", 86.0),
-    ("worst mN", 68.0),
+    ("worst (mN)", 78.0),
     ("state variables", 98.0),
-    ("scaled mN", 72.0),
+    ("scaled (mN)", 84.0),
     ("dAICc", 78.0),
 ];
 

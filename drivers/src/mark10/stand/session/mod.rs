@@ -389,7 +389,7 @@ impl Dialogue for StandSession {
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
         (self.lost_answers >= LOST_MAX && !self.stop_due).then(|| {
-            "the stand no longer gives valid answers; a moving crosshead stops no later than at its travel limit; check cable and power"
+            "the stand no longer gives valid answers; if the crosshead moves, it stops at its travel limit at the latest; check cable and power"
                 .into()
         })
     }
