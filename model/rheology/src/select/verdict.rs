@@ -148,7 +148,7 @@ fn choose_within(
                 newtons(error(one))
             ),
             None => {
-                "no winner: no family can be fitted to the data that are not held out; add records"
+                "no winner: with the held-out data set aside, no family can be fitted to the rest; add records"
                     .into()
             }
         };
