@@ -4,7 +4,7 @@ use super::Failure;
 use super::new_file;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::extremes::survey;
+use palpate_analysis::extremes::{ExtremesError, survey};
 use palpate_analysis::report::extremes::{PAGE_HEAD, page, text};
 use palpate_rheology::extremes::{ExtremesExtent, ExtremesVerdict};
 use palpate_sessions::atomic::replace;
@@ -39,7 +39,11 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     }
     let rows = survey(extent, args.family.as_deref(), &output.share_bar());
     // Only cancelling gives no rows, and a progress bar never cancels.
-    let rows = rows.map_err(Failure::usage)?.unwrap_or_default();
+    let rows = rows.map_err(|err| match err {
+        ExtremesError::Family(err) => Failure::usage(err),
+        err => Failure::failed(err),
+    });
+    let rows = rows?.unwrap_or_default();
     let count = |verdict| rows.iter().filter(|row| row.verdict == verdict).count();
     let wrong = count(ExtremesVerdict::Wrong);
     let object = serde_json::json!({

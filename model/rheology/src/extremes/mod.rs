@@ -47,7 +47,7 @@ pub struct ExtremesPart {
 }
 
 /// Makes rows and reports the share done, 0 to 1.
-type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow>;
+type Rows = dyn Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow> + Send + Sync;
 
 /// The same of a family.
 type FamilyRows = fn(ExtremesExtent, &Arc<dyn Family>, &mut dyn FnMut(f64)) -> Vec<ExtremesRow>;
@@ -66,7 +66,7 @@ impl ExtremesPart {
     fn new(
         group: &'static str,
         subject: String,
-        run: impl Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow> + 'static,
+        run: impl Fn(&mut dyn FnMut(f64)) -> Vec<ExtremesRow> + Send + Sync + 'static,
     ) -> Self {
         Self { group, subject, run: Box::new(run) }
     }
