@@ -62,11 +62,10 @@ impl ChainError {
 }
 
 fn missing(found: u64, written: u64) -> String {
-    match written.checked_sub(found) {
-        None | Some(0) => "its lines differ from the lines that were written".to_owned(),
-        Some(_) => {
-            format!("the end of the file is missing: only {found} of {written} lines are present")
-        }
+    if found < written {
+        format!("the end of the file is missing: only {found} of {written} lines are present")
+    } else {
+        "its lines differ from the lines that were written".to_owned()
     }
 }
 

@@ -169,6 +169,6 @@ fn sines(report: &CycleReport) -> Option<String> {
         ],
         Err(err) => vec![NONE.into(), err.to_string()],
     });
-    let head = "frequency (Hz) | cycles | depth (mm) | amplitude (mm) | force (N) | amplitude (N) | phase (°) | storage (N/mm) | loss (N/mm) | distortion (%)";
+    let head = "frequency (Hz) | cycles | depth (mm) | depth amplitude (mm) | force (N) | force amplitude (N) | phase (°) | storage (N/mm) | loss (N/mm) | distortion (%)";
     section("sine", head, rows.collect())
 }
