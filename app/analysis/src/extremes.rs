@@ -40,18 +40,41 @@ pub fn survey(
             }
         };
         tell(0.0);
-        part.rows(tell)
+        (!is_ending.load(Ordering::Relaxed)).then(|| part.rows(tell))
     };
     let jobs = available_parallelism().map_or(1, usize::from);
-    let (mut rows, mut failure) = (Vec::new(), None);
+    let (mut rows, mut has_died) = (Some(Vec::new()), false);
     in_order(jobs, &pieces, &is_ending, work, |event| match event {
-        WorkEvent::Next(Ok(more)) => rows.extend(more),
-        WorkEvent::Next(Err(reason)) => failure = failure.or(Some(reason)),
+        WorkEvent::Next(Ok(Some(more))) => {
+            if let Some(rows) = &mut rows {
+                rows.extend(more);
+            }
+        }
+        WorkEvent::Next(Ok(None) | Err(WorkFailure::NotBegun)) => rows = None,
+        WorkEvent::Next(Err(WorkFailure::Died)) => has_died = true,
         WorkEvent::Done(_) => {}
     })?;
-    match failure {
-        None => Ok(Some(rows)),
-        Some(WorkFailure::NotBegun) => Ok(None),
-        Some(WorkFailure::Died) => Err(ExtremesError::Died),
+    if has_died { Err(ExtremesError::Died) } else { Ok(rows) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::NoProgress;
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn rows_come_in_the_order_of_their_parts() {
+        let parts = list_extremes(ExtremesExtent::Quick, Some("voigt")).unwrap();
+        let expected: Vec<ExtremesRow> = parts.iter().flat_map(|part| part.rows(|_| {})).collect();
+        let found = survey(ExtremesExtent::Quick, Some("voigt"), &NoProgress).unwrap().unwrap();
+        // As texts: a row may hold a NaN.
+        assert_eq!(format!("{found:?}"), format!("{expected:?}"));
+    }
+
+    #[test]
+    fn a_survey_that_is_ended_has_no_rows() {
+        let end = |_: usize, _: usize, _: &str| ControlFlow::Break(());
+        assert!(survey(ExtremesExtent::Quick, Some("voigt"), &end).unwrap().is_none());
     }
 }
