@@ -116,7 +116,12 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &SelectionReport) {
         let line = |words: RichText| Label::new(words.small()).wrap();
         ui.add(line(RichText::new(format!("{}: {}", step[0], step[1]))));
         let numbers = ladder[0].iter().zip(step).skip(2);
-        let numbers: Vec<String> = numbers.map(|(head, cell)| format!("{head} {cell}")).collect();
+        // "rms (mN)" as the head of a column is "rms 5 > 3 mN" in a line.
+        let number = |(head, cell): (&String, &String)| match head.split_once(" (") {
+            Some((name, unit)) => format!("{name} {cell} {}", unit.trim_end_matches(')')),
+            None => format!("{head} {cell}"),
+        };
+        let numbers: Vec<String> = numbers.map(number).collect();
         ui.add(line(RichText::new(numbers.join(", ")).color(tokens.text_quiet)));
     }
     section_ui(ui, "Recordings");
