@@ -2,16 +2,18 @@
 //! sessions. The axis travels as far as the probe sinks in and the rig yields, so the probe's own depth is
 //! `depth - compliance * force`. Raw depths stay as they are; corrected ones stand beside them.
 
+use crate::analysed_session::time_between;
 use crate::source::{
     FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
+    unloaded_off_surface,
 };
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
-use palpate_model::units::{Depth, Newtons, Position};
+use palpate_model::units::{Depth, Newtons, Position, Volts};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
-use palpate_rheology::fit::FitSample;
+use palpate_rheology::fit::{FitSample, PressedSignal, compliance_in_volts};
 use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
 use palpate_sessions::{LibraryError, SampleRow, Session};
 use palpate_tables::export::ExtraColumns;
@@ -51,13 +53,20 @@ pub fn compliance_from_session(
     if session.manifest.imported.is_some() {
         return Err(ComplianceMeasurementError::Imported);
     }
-    let presses = presses(session)?;
+    let StiffPresses { found, surface, presses, signal } = StiffPresses::of(session)?;
     let forces = presses.iter().flat_map(|(_, samples)| samples);
     let highest = forces.map(|sample| sample.force.0).fold(0.0, f64::max);
     if presses.is_empty() {
         return Err(ComplianceMeasurementError::NoPress);
     }
     let seating = seating.unwrap_or(Newtons(FindBase::SEATED_SHARE * highest));
+    let by_force = RigCompliance::of_presses(&presses, seating)?;
+    let line = by_force.compliance();
+    let seated_from = line.surface.0 + line.mm_per_newton * seating.0;
+    let seated = signal.into_iter().filter(|one| one.position.0 >= seated_from);
+    let unloaded = unloaded_off_surface(session, found, surface)?;
+    let seated: Vec<PressedSignal> = seated.collect();
+    let by_signal = compliance_in_volts(&line, &seated, &unloaded, &curve_of(session)?);
     let manifest = &session.manifest;
     Ok(RigCompliance {
         rig: manifest.rig.as_ref().map_or_else(String::new, |rig| rig.name.clone()),
@@ -66,39 +75,51 @@ pub fn compliance_from_session(
         session_id: manifest.session_id.clone(),
         session_checksum: format!("{:08x}", session.checksum()),
         software_version: env!("CARGO_PKG_VERSION").into(),
-        ..RigCompliance::of_presses(&presses, seating)?
+        ..by_signal.map_or(by_force.clone(), |line| by_force.improved(&line))
     })
 }
 
-/// Loading samples after a stiff surface was found, press by press.
-fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, ComplianceMeasurementError> {
-    let curve = curve_of(session)?;
-    let decisions = decisions(session)?;
-    let noise = noise_of(&decisions).ok_or(ComplianceMeasurementError::NoPress)?;
-    let found = records(&decisions).rev().find_map(|(after, record)| match record {
-        Record::BaseFound { position, .. } => Some((after as usize, *position)),
-        _ => None,
-    });
-    let (after, surface) = found.ok_or(ComplianceMeasurementError::NoSurface)?;
-    let trusted = trusted_samples(&decisions);
-    let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
-    let rows = session.rows.iter().enumerate().take(trusted).skip(after);
-    for (_, row) in rows {
-        let (Some(force), Some(depth)) = (row.force, row.depth) else { continue };
-        if row.phase != Phase::Ramp || is_saturated(session, row) {
-            continue;
+/// Loading samples after a stiff surface was found.
+struct StiffPresses {
+    /// Samples before it was found.
+    found: usize,
+    surface: Position,
+    /// Forces, press by press.
+    presses: Vec<(u32, Vec<StiffSample>)>,
+    /// The signal of all presses; times count from the session's first sample.
+    signal: Vec<PressedSignal>,
+}
+
+impl StiffPresses {
+    fn of(session: &Session) -> Result<Self, ComplianceMeasurementError> {
+        let curve = curve_of(session)?;
+        let decisions = decisions(session)?;
+        let noise = noise_of(&decisions).ok_or(ComplianceMeasurementError::NoPress)?;
+        let found = records(&decisions).rev().find_map(|(after, record)| match record {
+            Record::BaseFound { position, .. } => Some((after as usize, *position)),
+            _ => None,
+        });
+        let (found, surface) = found.ok_or(ComplianceMeasurementError::NoSurface)?;
+        let mut all = Self { found, surface, presses: Vec::new(), signal: Vec::new() };
+        for row in session.rows.iter().take(trusted_samples(&decisions)).skip(found) {
+            let (Some(force), Some(depth), Some(volts)) = (row.force, row.depth, row.volts) else {
+                continue;
+            };
+            if row.phase != Phase::Ramp || is_saturated(session, row) {
+                continue;
+            }
+            let position = Position(surface.0 + depth);
+            let sigma = curve.force_sigma(Newtons(force), noise);
+            let sample = StiffSample { position, force: Newtons(force), sigma };
+            match all.presses.last_mut() {
+                Some((press, samples)) if *press == row.cycle => samples.push(sample),
+                _ => all.presses.push((row.cycle, vec![sample])),
+            }
+            let t = time_between(&session.manifest, &session.rows[0], row);
+            all.signal.push(PressedSignal { t, position, volts: Volts(volts) });
         }
-        let sample = StiffSample {
-            position: Position(surface.0 + depth),
-            force: Newtons(force),
-            sigma: curve.force_sigma(Newtons(force), noise),
-        };
-        match presses.last_mut() {
-            Some((press, samples)) if *press == row.cycle => samples.push(sample),
-            _ => presses.push((row.cycle, vec![sample])),
-        }
+        Ok(all)
     }
-    Ok(presses)
 }
 
 #[derive(Debug, Error)]

@@ -4,6 +4,7 @@ mod error;
 mod signal;
 
 pub use error::SourceError;
+pub(crate) use signal::unloaded_off_surface;
 
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::Phase;

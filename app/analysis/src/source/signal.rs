@@ -5,7 +5,7 @@ use crate::analysed_session;
 use super::{SourceError, calibration_of, curve_of, decisions, records};
 use palpate_model::calibration::HysteresisLoop;
 use palpate_model::rig::Phase;
-use palpate_model::units::{Seconds, Volts};
+use palpate_model::units::{Position, Seconds, Volts};
 use palpate_protocols::engine::Record;
 use palpate_rheology::fit::{Signal, UnloadedMean};
 use palpate_sessions::{SampleRow, Session};
@@ -58,6 +58,22 @@ pub(super) fn of_session(
     }))
 }
 
+/// The signal out of contact around presses onto a surface that was found after so many samples; times count from the session's
+/// first sample. Empty where it was not recorded.
+pub(crate) fn unloaded_off_surface(
+    session: &Session,
+    found: usize,
+    surface: Position,
+) -> Result<Vec<UnloadedMean>, SourceError> {
+    let decisions = decisions(session)?;
+    let records: Vec<_> = records(&decisions).collect();
+    let span = ZeroSpan::around(session, &records, found, (found, surface.0, 0.0));
+    let Some(span) = span else { return Ok(Vec::new()) };
+    let rows = session.rows[span.rows.clone()].iter().filter(|row| span.is_unloaded(row));
+    let at = |row| analysed_session::time_between(&session.manifest, &session.rows[0], row).0;
+    Ok(means(rows.filter_map(|row| Some((at(row), row.volts?)))))
+}
+
 /// Rows around a record in which the zero may be seen.
 struct ZeroSpan {
     rows: std::ops::Range<usize>,
@@ -73,12 +89,23 @@ impl ZeroSpan {
     /// From the tare before the record up to the next one, or to a new contact position or an interlock.
     fn of(session: &Session, records: &[(u64, &Record)], first: usize) -> Option<Self> {
         let before = || records.iter().filter(|(after, _)| *after as usize <= first).rev();
-        let (found, contact, error) = before().find_map(|(after, record)| match record {
+        let contact = before().find_map(|(after, record)| match record {
             Record::ContactFound { position, std_error_mm } => {
                 Some((*after as usize, position.0, *std_error_mm))
             }
             _ => None,
         })?;
+        Self::around(session, records, first, contact)
+    }
+
+    /// The same of a contact position that was found after so many samples, with its standard uncertainty.
+    fn around(
+        session: &Session,
+        records: &[(u64, &Record)],
+        first: usize,
+        (found, contact_mm, contact_error_mm): (usize, f64, f64),
+    ) -> Option<Self> {
+        let before = || records.iter().filter(|(after, _)| *after as usize <= first).rev();
         let is_start = |record: &Record, wanted: Phase| matches!(record, Record::PhaseStarted { phase, .. } if *phase == wanted);
         let is_tare = |record: &Record| is_start(record, Phase::Tare);
         let (start, _) = before().find(|(_, record)| is_tare(record))?;
@@ -94,8 +121,8 @@ impl ZeroSpan {
         let end = end.map_or(session.rows.len(), |(after, _)| *after as usize);
         Some(Self {
             rows: *start as usize..end.min(session.rows.len()),
-            contact_mm: contact,
-            contact_error_mm: error,
+            contact_mm,
+            contact_error_mm,
             search: search..found.min(session.rows.len() - 1),
             mm_per_pulse: session.manifest.rig.as_ref()?.mm_per_pulse,
         })

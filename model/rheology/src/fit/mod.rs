@@ -44,7 +44,9 @@ pub use report::{
     BudgetEntry, FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate,
 };
 pub use sample::{FitError, FitSample};
-pub use signal::{ExpectedSignal, Signal, SignalRecord, UnloadedMean};
+pub use signal::{
+    ExpectedSignal, PressedSignal, Signal, SignalRecord, UnloadedMean, compliance_in_volts,
+};
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
     SystematicError, SystematicUncertainty, TermError, TracedRecord, estimate_systematic,

@@ -11,10 +11,12 @@ mod drift;
 mod expected;
 mod lag;
 mod pass;
+mod spring;
 mod zero;
 
 pub(super) use drift::{Drift, DriftSizes};
 pub use expected::ExpectedSignal;
+pub use spring::{PressedSignal, compliance_in_volts};
 use palpate_model::calibration::{CalibrationCurve, HysteresisLoop};
 use palpate_model::units::{Newtons, Seconds, Volts};
 
