@@ -7,13 +7,14 @@ use crate::source::{
     FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
     unloaded_off_surface,
 };
+use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
-use palpate_model::units::{Depth, Newtons, Position, Volts};
+use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
-use palpate_rheology::fit::{FitSample, PressedSignal, compliance_in_volts};
+use palpate_rheology::fit::{FitSample, PressedSignal, UnloadedMean, compliance_in_volts, zero_at};
 use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
 use palpate_sessions::{LibraryError, SampleRow, Session};
 use palpate_tables::export::ExtraColumns;
@@ -53,7 +54,7 @@ pub fn compliance_from_session(
     if session.manifest.imported.is_some() {
         return Err(ComplianceMeasurementError::Imported);
     }
-    let StiffPresses { found, surface, presses, signal } = StiffPresses::of(session)?;
+    let StiffPresses { presses, signal, unloaded } = StiffPresses::of(session)?;
     let forces = presses.iter().flat_map(|(_, samples)| samples);
     let highest = forces.map(|sample| sample.force.0).fold(0.0, f64::max);
     if presses.is_empty() {
@@ -64,9 +65,12 @@ pub fn compliance_from_session(
     let line = by_force.compliance();
     let seated_from = line.surface.0 + line.mm_per_newton * seating.0;
     let seated = signal.into_iter().filter(|one| one.position.0 >= seated_from);
-    let unloaded = unloaded_off_surface(session, found, surface)?;
     let seated: Vec<PressedSignal> = seated.collect();
-    let by_signal = compliance_in_volts(&line, &seated, &unloaded, &curve_of(session)?);
+    let curve = curve_of(session)?;
+    let found = match compliance_in_volts(&line, &seated, &unloaded, &curve) {
+        Some(line) => by_force.improved(&line),
+        None => by_force,
+    };
     let manifest = &session.manifest;
     Ok(RigCompliance {
         rig: manifest.rig.as_ref().map_or_else(String::new, |rig| rig.name.clone()),
@@ -75,19 +79,18 @@ pub fn compliance_from_session(
         session_id: manifest.session_id.clone(),
         session_checksum: format!("{:08x}", session.checksum()),
         software_version: env!("CARGO_PKG_VERSION").into(),
-        ..by_signal.map_or(by_force.clone(), |line| by_force.improved(&line))
+        ..found
     })
 }
 
 /// Loading samples after a stiff surface was found.
 struct StiffPresses {
-    /// Samples before it was found.
-    found: usize,
-    surface: Position,
-    /// Forces, press by press.
+    /// Forces above the zero of their time, press by press.
     presses: Vec<(u32, Vec<StiffSample>)>,
     /// The signal of all presses; times count from the session's first sample.
     signal: Vec<PressedSignal>,
+    /// The signal out of contact, on the same clock.
+    unloaded: Vec<UnloadedMean>,
 }
 
 impl StiffPresses {
@@ -99,26 +102,33 @@ impl StiffPresses {
             Record::BaseFound { position, .. } => Some((after as usize, *position)),
             _ => None,
         });
-        let (found, surface) = found.ok_or(ComplianceMeasurementError::NoSurface)?;
-        let mut all = Self { found, surface, presses: Vec::new(), signal: Vec::new() };
-        for row in session.rows.iter().take(trusted_samples(&decisions)).skip(found) {
-            let (Some(force), Some(depth), Some(volts)) = (row.force, row.depth, row.volts) else {
-                continue;
-            };
-            if row.phase != Phase::Ramp || is_saturated(session, row) {
-                continue;
-            }
-            let position = Position(surface.0 + depth);
-            let sigma = curve.force_sigma(Newtons(force), noise);
-            let sample = StiffSample { position, force: Newtons(force), sigma };
-            match all.presses.last_mut() {
-                Some((press, samples)) if *press == row.cycle => samples.push(sample),
-                _ => all.presses.push((row.cycle, vec![sample])),
-            }
+        let (after, surface) = found.ok_or(ComplianceMeasurementError::NoSurface)?;
+        let rows = session.rows.iter().take(trusted_samples(&decisions)).skip(after);
+        let rows = rows.filter(|row| row.phase == Phase::Ramp && !is_saturated(session, row));
+        let pressed = rows.filter_map(|row| {
             let t = time_between(&session.manifest, &session.rows[0], row);
-            all.signal.push(PressedSignal { t, position, volts: Volts(volts) });
+            let position = Position(surface.0 + row.depth?);
+            let signal = PressedSignal { t, position, volts: Volts(row.volts?) };
+            Some((row.cycle, Newtons(row.force?), signal))
+        });
+        let pressed: Vec<(u32, Newtons, PressedSignal)> = pressed.collect();
+        let unloaded = unloaded_off_surface(session, after, surface)?;
+        let times: Vec<Seconds> = pressed.iter().map(|(.., signal)| signal.t).collect();
+        let zero = zero_at(&unloaded, &times);
+        let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
+        for (k, (press, above_tare, signal)) in pressed.iter().enumerate() {
+            let zero = zero.as_ref().map(|zero| zero[k]);
+            let force = zero.map(|zero| curve.newtons_above_tare(signal.volts, Some(zero)));
+            let force = force.unwrap_or(*above_tare);
+            let sigma = curve.force_sigma(force, noise);
+            let sample = StiffSample { position: signal.position, force, sigma };
+            match presses.last_mut() {
+                Some((last, samples)) if last == press => samples.push(sample),
+                _ => presses.push((*press, vec![sample])),
+            }
         }
-        Ok(all)
+        let signal = pressed.into_iter().map(|(.., signal)| signal).collect();
+        Ok(Self { presses, signal, unloaded })
     }
 }
 
@@ -222,7 +232,9 @@ impl ComplianceCorrections {
         };
         let correction = ComplianceCorrection::of(stored, is_applied, &source.samples);
         if is_applied {
-            correct_samples(&mut source.samples, &stored.document.compliance());
+            let curve = source.calibration.as_ref().and_then(|one| one.curve().ok());
+            let compliance = stored.document.compliance();
+            correct_samples(&mut source.samples, &compliance, curve.as_ref());
             source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
             if let CorrectionChoice::InForce = self.choice {
@@ -295,11 +307,20 @@ impl ComplianceCorrection {
 /// Forces are averaged over so long, in s, before they bend the rig in a fit: noise is in the reading and bends
 /// nothing, and a depth that moved with the noise of its own force would pull the fitted stiffness down. At the
 /// corner of a ramp, where the force turns from 2 N/s to rest, the mean is off by 2 * 0.05 / 8 = 0.0125 N, a
-/// micrometre on a soft rig.
+/// micrometre on a soft rig. Signals are averaged where the curve is known: the mean force of a noisy signal is not the force
+/// of the mean signal.
 const AVERAGED_SECS: f64 = 0.05;
 
 /// Takes from every depth what the rig gives way. Where no force near is known, the last one known bends the rig.
-fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
+fn correct_samples(
+    samples: &mut [FitSample],
+    compliance: &Compliance,
+    curve: Option<&CalibrationCurve>,
+) {
+    let signal = |force: Newtons| curve.map_or(force.0, |curve| curve.volts_from_newtons(force).0);
+    let read = |signal: f64| {
+        curve.map_or(Newtons(signal), |curve| curve.newtons_from_volts(Volts(signal)))
+    };
     let half = 0.5 * AVERAGED_SECS;
     let (mut first, mut end, mut force) = (0, 0, Newtons(0.0));
     let bends: Vec<Newtons> = samples
@@ -313,9 +334,9 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
             }
             let near = samples[first..end].iter().filter(|one| one.is_measured());
             let (sum, count) =
-                near.fold((0.0, 0.0), |(sum, count), one| (sum + one.force.0, count + 1.0));
+                near.fold((0.0, 0.0), |(sum, count), one| (sum + signal(one.force), count + 1.0));
             if count > 0.0 {
-                force = Newtons(sum / count);
+                force = read(sum / count);
             }
             force
         })

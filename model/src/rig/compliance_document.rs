@@ -102,14 +102,14 @@ impl RigCompliance {
 
     /// The same presses with a line through all of them that was found more exactly. How the presses differ stays.
     #[must_use]
-    pub fn improved(&self, line: &Compliance) -> Self {
+    pub fn improved(self, line: &Compliance) -> Self {
         let scatter = std_error_of_mean(&self.presses).unwrap_or(0.0);
         Self {
             mm_per_n: line.mm_per_newton,
             std_error_mm_per_n: line.std_error.max(scatter),
             surface_mm: line.surface.0,
             surface_std_error_mm: line.surface_std_error_mm,
-            ..self.clone()
+            ..self
         }
     }
 

@@ -45,7 +45,7 @@ pub use report::{
 };
 pub use sample::{FitError, FitSample};
 pub use signal::{
-    ExpectedSignal, PressedSignal, Signal, SignalRecord, UnloadedMean, compliance_in_volts,
+    ExpectedSignal, PressedSignal, Signal, SignalRecord, UnloadedMean, compliance_in_volts, zero_at,
 };
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{

@@ -16,9 +16,9 @@ mod zero;
 
 pub(super) use drift::{Drift, DriftSizes};
 pub use expected::ExpectedSignal;
-pub use spring::{PressedSignal, compliance_in_volts};
 use palpate_model::calibration::{CalibrationCurve, HysteresisLoop};
 use palpate_model::units::{Newtons, Seconds, Volts};
+pub use spring::{PressedSignal, compliance_in_volts, zero_at};
 
 use super::sample::FitSample;
 use std::ops::Range;

@@ -1,7 +1,7 @@
 //! The compliance of a rig from the load cell's signal on a stiff surface.
 //!
-//! A line through forces takes the zero of the tare for that of every press, and the force of a noisy signal for the force of
-//! the mean signal. On the lab rig that makes a compliance of 60 um/N wrong by up to 0.6 um/N, the same in every press, where
+//! A line through forces above the tare takes its zero for that of every press, and the force of a noisy signal for the force
+//! of the mean signal. On the lab rig that makes a compliance of 60 um/N wrong by up to 0.6 um/N, the same in every press, where
 //! the line states 0.01 to 0.1. Here the signal is predicted, and its slow zero is found where the probe touches nothing.
 
 use super::UnloadedMean;
@@ -22,6 +22,20 @@ pub struct PressedSignal {
 
 /// Each step leaves the square of the error before, and the start is good to a percent.
 const STEPS: usize = 4;
+
+/// The zero at times, found from the signal out of contact alone. `None` where there is too little of it.
+#[must_use]
+pub fn zero_at(unloaded: &[UnloadedMean], times: &[Seconds]) -> Option<Vec<Volts>> {
+    let all = || unloaded.iter().map(|one| one.t.0).chain(times.iter().map(|t| t.0));
+    let (first, last) = (all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max));
+    let drift = DriftSizes::of(unloaded, first, last)?.mean()?;
+    let mut filter = ZeroFilter::new(drift.nodes(1.0), 1);
+    for one in unloaded {
+        filter.push(one.t.0, &[one.volts.0], (one.count as f64).sqrt() / drift.noise);
+    }
+    let zero = filter.finish();
+    Some(times.iter().map(|t| Volts(zero.explained(t.0, 0))).collect())
+}
 
 /// A compliance found from forces, improved by the signal itself: `signal = curve((position - surface) / compliance) + zero(t) +
 /// noise`. Samples and means are in the order of time, on one clock. `None` where too little of the signal is out of contact
