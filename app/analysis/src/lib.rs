@@ -37,6 +37,7 @@ pub mod pool;
 pub mod progress;
 pub mod recordings;
 pub mod report;
+pub mod run_quality;
 #[cfg(feature = "haptics")]
 pub mod scene;
 #[cfg(feature = "haptics")]

@@ -370,3 +370,24 @@ fn an_exported_table_has_the_whole_name_of_the_folder() {
     succeeded(&typed(at, "export depth-2.5 --format csv --to ."));
     assert!(at.join("depth-2.5.csv").exists());
 }
+
+#[test]
+fn the_noise_of_a_run_is_judged_by_the_last_daily_check_of_its_rig() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let quality = |session: &str| json(&palpate(at, &["quality", session, "--json"]));
+    let noise = |found: &serde_json::Value| found["checks"][1].clone();
+    succeeded(&short_run(at, "before", &[]));
+    let before = quality("before");
+    assert_eq!((&before["rank"], &noise(&before)["rank"]), (&"good".into(), &"not judged".into()));
+    succeeded(&typed(at, "daily-check --operator Ada --time-scale max"));
+    succeeded(&short_run(at, "usual", &[]));
+    assert_eq!(noise(&quality("usual"))["rank"], "good");
+    let text = stdout(&palpate(at, &["quality", "usual"]));
+    assert!(text.starts_with("quality") && text.lines().count() == 10, "{text}");
+    // 9 mV where the check of the lab rig has 1.
+    succeeded(&short_run(at, "loud", &["--profile", "ideal", "--noise", "60"]));
+    let loud = noise(&quality("loud"));
+    assert_eq!(loud["rank"], "doubtful", "{loud}");
+    assert!(loud["sentence"].as_str().unwrap().contains("loose plug"), "{loud}");
+}

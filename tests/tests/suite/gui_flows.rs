@@ -10,6 +10,7 @@ use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
 use palpate_rheology::fit::{FitReport, FittedParameter};
 use palpate_runner::TimeScale;
+use palpate_sessions::edits::{DataQuality, Edits};
 use palpate_sessions::log::Session;
 use palpate_tests::flow::{TestWindow, WindowFlow, refit};
 use palpate_tests::workspace;
@@ -81,6 +82,35 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
     flow.click("Start  F5");
     flow.wait("live numbers", |window| window.query_by_label("Live parameters").is_some());
     assert!(!flow.says("Exact fit"));
+}
+
+#[test]
+fn a_run_is_judged_by_its_checks_and_by_its_operator() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    flow.type_into("operator", "A. Tester");
+    flow.type_into("hold", "10");
+    flow.click("Start  F5");
+    flow.wait_for_end();
+    flow.wait("the checks", |window| window.query_by_label("Quality").is_some());
+    assert!(flow.says("8 checks good, 1 not judged"));
+    flow.click("8 checks good, 1 not judged");
+    assert!(flow.says("noise not judged"));
+    let session = flow.sessions()[0].clone();
+    let verdict = || {
+        let id = Session::open(&session).unwrap().manifest.session_id;
+        let edits = Edits::read(&session, &id).unwrap();
+        edits.verdict().map(|(verdict, edit)| (verdict, edit.by.clone(), edit.reason.clone()))
+    };
+    assert!(!flow.is_enabled("Reject") && !flow.is_enabled("Repeat"), "without a reason");
+    flow.click("Accept");
+    flow.wait("the verdict", |window| window.query_by_label_contains("valid: looked at").is_some());
+    assert_eq!(verdict().unwrap().1, "A. Tester");
+    flow.type_into("reason", "hair under the probe");
+    flow.click("Repeat");
+    flow.wait("the second run", |_| session.with_file_name("session-0002").exists());
+    let (rejected, by, reason) = verdict().unwrap();
+    assert_eq!((rejected, by.as_str()), (DataQuality::Rejected, "A. Tester"));
+    assert_eq!(reason, "hair under the probe");
 }
 
 #[test]

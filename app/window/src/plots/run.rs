@@ -5,6 +5,8 @@ use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{LiveCycle, RunPlots, set_course};
+use palpate_analysis::run_quality::{QualityCheck, RunQuality};
+use palpate_figures::figure::{Ink, PlotLevel};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::Newtons;
@@ -48,6 +50,16 @@ impl PlotCache {
         set_course(&mut self.force_time.plot, run, force_max, self.is_from_ramp);
         self.force_depth.plot.x.visible_values = vec![0.0, depth_mm];
         self.force_depth.plot.y.visible_values = vec![0.0, 0.5];
+    }
+
+    /// Marks where somebody should look.
+    pub fn mark(&mut self, quality: Option<&RunQuality>) {
+        let doubts = quality.map(RunQuality::doubts).unwrap_or_default();
+        let place = |check: &QualityCheck| {
+            let [at, _] = check.at_s?;
+            Some(PlotLevel { name: check.name.to_owned(), at, ink: Ink::Limit, is_dashed: true })
+        };
+        self.force_time.plot.x_levels = doubts.into_iter().filter_map(place).collect();
     }
 
     fn follow(&mut self, trace: &Arc<LiveTrace>, starts: &[(f64, u32)]) {

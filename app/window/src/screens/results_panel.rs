@@ -3,11 +3,13 @@
 use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
+use super::quality_panel::quality_ui;
 use crate::command::Commands;
 use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
 use crate::workers::fit::Refit;
 use eframe::egui::Ui;
 use palpate_analysis::report::live::LiveCycle;
+use palpate_analysis::run_quality::RunQuality;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, RunnerSnapshot};
 
@@ -18,12 +20,18 @@ pub fn results_ui(
     ui: &mut Ui,
     snapshot: &RunnerSnapshot,
     refit: Refit<'_>,
+    quality: Option<&RunQuality>,
     cycles: &[LiveCycle],
     commands: &mut Commands,
+    verdict_ui: impl FnOnce(&mut Ui, &mut Commands),
 ) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {
         after_stop_ui(ui, run, commands);
+    }
+    if let Some(quality) = quality {
+        quality_ui(ui, quality);
+        verdict_ui(ui, commands);
     }
     findings_ui(ui, snapshot, refit, cycles);
 }

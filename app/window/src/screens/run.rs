@@ -6,6 +6,7 @@ use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
 use super::results_panel::results_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
+use super::run_verdict::RunVerdict;
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::weighing::weighing_ui;
 use crate::plots::PlotCache;
@@ -35,6 +36,7 @@ pub struct RunScreen {
     /// The start that the plots are of.
     plotted: u64,
     refitter: Refitter,
+    verdict: RunVerdict,
     /// Sessions recovered after a crash, a line each.
     recovery: BackgroundTask<Vec<String>>,
     is_recovery_begun: bool,
@@ -51,6 +53,7 @@ impl RunScreen {
             plots: PlotCache::for_calibration(&workbench.bench.calibration),
             plotted: 0,
             refitter: Refitter::default(),
+            verdict: RunVerdict::default(),
             recovery: BackgroundTask::default(),
             is_recovery_begun: false,
             library: palpate_sessions::library_folder()
@@ -144,14 +147,23 @@ impl Screen for RunScreen {
                     Refit::Done(exact) => Some(exact),
                     _ => None,
                 };
+                self.plots.mark(self.refitter.quality(run));
                 self.plots.ui(ui, exact);
             }
         }
     }
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let refit = self.refit(workbench.run());
-        results_ui(ui, &workbench.snapshot, refit, self.plots.cycles(), commands);
+        let run = workbench.run();
+        let (refitter, verdict) = (&self.refitter, &mut self.verdict);
+        let (refit, quality) = (refitter.of(run), refitter.quality(run));
+        let verdict_ui = |ui: &mut Ui, commands: &mut Commands| {
+            if let Some((session, operator)) = refitter.assessed(run) {
+                verdict.ui(ui, session, operator, &workbench.start_verdict(), commands);
+            }
+        };
+        let (snapshot, cycles) = (&workbench.snapshot, self.plots.cycles());
+        results_ui(ui, snapshot, refit, quality, cycles, commands, verdict_ui);
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -179,7 +191,7 @@ impl Screen for RunScreen {
         }
         let depth = workbench.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
         self.plots.update(workbench.run(), workbench.bench.limits.force_max, depth);
-        self.refitter.update(ctx, workbench.run());
+        self.refitter.update(ctx, workbench.run(), workbench.library.as_ref().ok());
     }
 
     fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {

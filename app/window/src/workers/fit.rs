@@ -3,9 +3,11 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
-use palpate_analysis::fit::FitRecipe;
+use palpate_analysis::analysed_session;
+use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
-use palpate_analysis::source::SourceSelection;
+use palpate_analysis::run_quality::{self, RunQuality, usual_noise};
+use palpate_analysis::source::{RecordStretch, SourceSelection, of_session};
 use palpate_figures::figure::{Ink, SeriesShape};
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
@@ -25,6 +27,13 @@ pub struct ExactFit {
     pub residual: PlacedPlot,
 }
 
+/// What becomes of a run that has ended.
+struct RunAnswer {
+    operator: String,
+    quality: RunQuality,
+    fit: Result<ExactFit, String>,
+}
+
 /// How far the exact fit of the run on the screen is.
 #[derive(Clone, Copy, Debug)]
 pub enum Refit<'a> {
@@ -40,37 +49,60 @@ pub enum Refit<'a> {
 /// Fits every run exactly when it has ended.
 #[derive(Default)]
 pub struct Refitter {
-    fit: BackgroundTask<ExactFit>,
+    answer: BackgroundTask<RunAnswer>,
     /// The session that is or was fitted.
     session: Option<PathBuf>,
 }
 
 impl Refitter {
-    /// Fetches an answer, and starts when a run has ended.
-    pub fn update(&mut self, ctx: &Context, run: Option<&RunView>) {
-        self.fit.poll();
+    /// Fetches an answer, and starts when a run has ended. `library` has the daily checks of the rig.
+    pub fn update(&mut self, ctx: &Context, run: Option<&RunView>, library: Option<&PathBuf>) {
+        self.answer.poll();
         let ended = run.filter(|run| run.outcome.is_some() && has_ramp(run));
         let folder = ended.map(|run| &run.folder);
-        if self.fit.is_busy() || self.session.as_ref() == folder {
+        if self.answer.is_busy() || self.session.as_ref() == folder {
             return;
         }
-        self.fit = BackgroundTask::default();
+        self.answer = BackgroundTask::default();
         self.session = folder.cloned();
         if let Some(folder) = folder.cloned() {
-            self.fit.start("fit", ctx, move |_| fit_exactly(&folder));
+            let library = library.cloned();
+            self.answer.start("fit", ctx, move |_| assess(&folder, library.as_deref()));
         }
+    }
+
+    fn is_of(&self, run: Option<&RunView>) -> bool {
+        let ended = run.filter(|run| run.outcome.is_some()).map(|run| &run.folder);
+        ended.is_some() && ended == self.session.as_ref()
     }
 
     /// How far the fit of this run is.
     pub fn of(&self, run: Option<&RunView>) -> Refit<'_> {
-        let ended = run.filter(|run| run.outcome.is_some()).map(|run| &run.folder);
-        match (self.fit.state(), self.fit.answer()) {
-            _ if ended.is_none() || ended != self.session.as_ref() => Refit::NotYet,
+        match (self.answer.state(), self.answer.answer()) {
+            _ if !self.is_of(run) => Refit::NotYet,
             (Some(state), _) => Refit::Busy(state.seconds),
             (None, None) => Refit::Busy(0.0),
-            (None, Some(Ok(exact))) => Refit::Done(exact),
-            (None, Some(Err(reason))) => Refit::Refused(reason),
+            (None, Some(Ok(RunAnswer { fit: Ok(exact), .. }))) => Refit::Done(exact),
+            (None, Some(Ok(RunAnswer { fit: Err(reason), .. }) | Err(reason))) => {
+                Refit::Refused(reason)
+            }
         }
+    }
+
+    fn answer_of(&self, run: Option<&RunView>) -> Option<&RunAnswer> {
+        self.answer.answer().filter(|_| self.is_of(run))?.as_ref().ok()
+    }
+
+    /// The checks of this run, once they are made.
+    pub fn quality(&self, run: Option<&RunView>) -> Option<&RunQuality> {
+        self.answer_of(run).map(|answer| &answer.quality)
+    }
+
+    /// Session and operator of this run, once its checks are made.
+    pub fn assessed(&self, run: Option<&RunView>) -> Option<(&Path, &str)> {
+        self.answer_of(run)
+            .zip(self.session.as_deref())
+            .map(|(one, at)| (at, one.operator.as_str()))
     }
 }
 
@@ -79,9 +111,20 @@ fn has_ramp(run: &RunView) -> bool {
     run.phases.iter().any(|(_, phase)| *phase == Phase::Ramp)
 }
 
-fn fit_exactly(folder: &Path) -> Result<ExactFit, String> {
+fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {
+    let opened = analysed_session::open(folder, None).map_err(|err| err.to_string())?;
+    let session = opened.edited.session;
     let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
-    let fitted = recipe.fit(folder).map_err(|err| err.to_string())?;
+    let source = of_session(session.clone(), RecordStretch::RampHold, &opened.left_out_s);
+    let fitted = source.and_then(|source| recipe.fit_read(source));
+    let usual = usual_noise(&session, library);
+    let quality = run_quality::of_session(&session, fitted.as_ref().ok(), usual);
+    let quality = quality.map_err(|err| err.to_string())?;
+    let fit = fitted.map_err(|err| err.to_string()).and_then(exact_fit);
+    Ok(RunAnswer { operator: session.manifest.operator, quality, fit })
+}
+
+fn exact_fit(fitted: SourceFit) -> Result<ExactFit, String> {
     let report = fitted.result.map_err(|err| err.to_string())?;
     let [mut force, mut residual] =
         fit_plots(&fitted.samples, &report, None, fitted.start.0, COLUMNS);

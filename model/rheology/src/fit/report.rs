@@ -97,6 +97,12 @@ impl FitReport {
         self.warnings.iter().chain(&self.findings).map(String::as_str)
     }
 
+    /// The warning that the model does not describe the record to within its noise; `None` where it does.
+    pub fn lack_of_fit(&self) -> Option<&str> {
+        let is_one = |one: &&String| one.starts_with(sentences::LACK_OF_FIT);
+        self.warnings.iter().find(is_one).map(String::as_str)
+    }
+
     /// The value of a parameter, in its unit; `None` for a name that is not one.
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameter(name).map(|parameter| parameter.value)

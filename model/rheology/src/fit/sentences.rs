@@ -78,7 +78,7 @@ pub(super) fn warnings(fitted: &FitSolution<'_>, record: usize, report: &FitRepo
             }
         } else if lacks_fit(fitted, report, noise) {
             warnings.push(format!(
-                "lack of fit: the residuals are autocorrelated over a long time, so the model does not \
+                "{LACK_OF_FIT}: the residuals are autocorrelated over a long time, so the model does not \
                  describe the record to within its noise, and intervals based on about {} are rough",
                 independent_words(noise.effective_samples)
             ));
@@ -95,6 +95,9 @@ fn relaxation_times<'a>(
     let times: Vec<usize> = (0..fitted.system.layout().outers).filter(is_time).collect();
     times.into_iter().map(|k| &report.parameters[k])
 }
+
+/// The warning that the model does not describe a record begins so.
+pub(super) const LACK_OF_FIT: &str = "lack of fit";
 
 /// Whether residuals are autocorrelated over so long that the model does not describe the record.
 pub(super) fn lacks_fit(

@@ -1,0 +1,604 @@
+//! The checks that a good operator makes after a run: each a rank, a sentence with its numbers, and the place in the curve.
+//!
+//! They advise; whether a session is valid, suspect or rejected is said by a person.
+
+use crate::analysed_session;
+use crate::catalog_search::session_folders;
+use crate::fidelity;
+use crate::fit::{FitRecipe, SourceFit};
+use crate::progress::NoProgress;
+use crate::source::{
+    self, RecordStretch, SourceError, SourceSelection, decisions, is_saturated, noise_of, records,
+};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Newtons, Volts};
+use palpate_protocols::engine::{EndingKind, Record};
+use palpate_rheology::fit::{FitOptions, FitSample, UnloadedMean};
+use palpate_runner::base::FoundBase;
+use palpate_sessions::checks::read_checks;
+use palpate_sessions::{SampleRow, Session};
+use serde::Serialize;
+use std::path::Path;
+
+palpate_model::named! {
+    /// How a run stands in one respect, from best to worst.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum QualityRank {
+        /// What the check needs was not recorded.
+        NotJudged = "not judged",
+        Good = "good",
+        /// Worth a look before the result is used.
+        Doubtful = "doubtful",
+        Bad = "bad",
+    }
+}
+
+impl Serialize for QualityRank {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// One check of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct QualityCheck {
+    pub name: &'static str,
+    pub rank: QualityRank,
+    pub sentence: String,
+    /// Where it shows, from and to in s of session time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_s: Option<[f64; 2]>,
+}
+
+impl QualityCheck {
+    fn new(name: &'static str, rank: QualityRank, sentence: impl Into<String>) -> Self {
+        Self { name, rank, sentence: sentence.into(), at_s: None }
+    }
+
+    fn at(mut self, from: f64, to: f64) -> Self {
+        self.at_s = Some([from, to]);
+        self
+    }
+}
+
+/// All checks of a run, in the order of the run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunQuality {
+    pub checks: Vec<QualityCheck>,
+}
+
+impl RunQuality {
+    /// The worst rank of all checks.
+    #[must_use]
+    pub fn rank(&self) -> QualityRank {
+        self.checks.iter().map(|one| one.rank).max().unwrap_or(QualityRank::NotJudged)
+    }
+
+    /// The worst rank, then a line for each check.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let lines = self.checks.iter().map(|one| {
+            let place = one.at_s.map_or_else(String::new, |[from, to]| match to - from < 0.1 {
+                true => format!(" (at {from:.2} s)"),
+                false => format!(" (from {from:.2} to {to:.2} s)"),
+            });
+            format!("{:<11} {:<10}  {}{place}", one.name, one.rank.name(), one.sentence)
+        });
+        let first = format!("{:<11} {}", "quality", self.rank());
+        std::iter::once(first).chain(lines).collect::<Vec<_>>().join("\n")
+    }
+
+    /// The checks that somebody should look at, the worst first.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<&QualityCheck> {
+        let is_doubt = |one: &&QualityCheck| one.rank >= QualityRank::Doubtful;
+        let mut doubts: Vec<&QualityCheck> = self.checks.iter().filter(is_doubt).collect();
+        doubts.sort_by_key(|one| std::cmp::Reverse(one.rank));
+        doubts
+    }
+}
+
+/// The search for contact presses tissue with no more than this, in N; more has preconditioned it.
+const SEARCH_FORCE_MAX_N: f64 = 0.5;
+/// A contact point is doubtful beyond this standard uncertainty in mm: over 30 mm it changes mu3 by half a percent.
+const CONTACT_ERROR_MAX_MM: f64 = 0.05;
+/// A zero may move by so much of the peak force: the 1 % that ASTM E4 allows a force. Five times as much is bad.
+const DRIFT_SHARE: f64 = 0.01;
+/// The zero after a run is the mean of so long, in s.
+const ZERO_SECS: f64 = 5.0;
+/// Noise may be so many times that of the last daily check, and ten times as much is bad: a loose plug multiplies it.
+const NOISE_RATIO: f64 = 2.0;
+/// More saturated samples than this share are bad: the fit has lost a part of the curve.
+const SATURATED_SHARE: f64 = 0.01;
+/// More missing samples than this share are bad.
+const MISSING_SHARE: f64 = 0.001;
+/// Forces are averaged over so long before a drop is looked for, in s: a slip takes a few hundredths of a second.
+const DROP_SECS: f64 = 0.02;
+/// A drop is one beyond so many standard uncertainties and this share of the highest force so far ...
+const DROP_SIGMAS: f64 = 8.0;
+const DROP_SHARE: f64 = 0.02;
+/// ... and so many times that of the time before: relaxation slows down, it never speeds up.
+const DROP_RATIO: f64 = 2.0;
+/// The probe goes on as it did if its way over the same time differs by no more than this share and this length in mm, which
+/// the steps of a slider make.
+const STEADY_SHARE: f64 = 0.2;
+const STEADY_MM: f64 = 2e-3;
+/// Tissue pressed by more than this share of its thickness feels the base: a common rule is 10 %, and the model has no base;
+/// here only what nearly touches it is doubted.
+const THICKNESS_SHARE: f64 = 0.9;
+/// The stiffness over the last part of a ramp may be so many times that over the part before. A cubic spring has 1.3.
+const STIFFENING: f64 = 3.0;
+/// The last part of a ramp, and the part before, as shares of its way.
+const LAST_WAY: f64 = 0.03;
+const WAY_BEFORE: f64 = 0.15;
+
+/// The checks of a session in a folder, fitted with the default model; `library` knows the daily checks of its rig.
+pub fn of_folder(path: &Path, library: Option<&Path>) -> Result<RunQuality, SourceError> {
+    let opened = analysed_session::open(path, None)?;
+    let session = opened.edited.session;
+    let usual = usual_noise(&session, library);
+    if session.manifest.imported.is_some() {
+        return of_session(&session, None, usual);
+    }
+    let read = source::of_session(session.clone(), RecordStretch::RampHold, &opened.left_out_s);
+    let fitted = match read {
+        Ok(source) => {
+            let mut recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
+            recipe.is_systematic = false;
+            Some(recipe.fit_read(source)?)
+        }
+        Err(SourceError::Empty) => None,
+        Err(error) => return Err(error),
+    };
+    of_session(&session, fitted.as_ref(), usual)
+}
+
+/// The checks of a session and its fit; none of it where it pressed nothing. `usual_noise` is that of the rig's daily check.
+pub fn of_session(
+    session: &Session,
+    fitted: Option<&SourceFit>,
+    usual_noise: Option<Volts>,
+) -> Result<RunQuality, SourceError> {
+    let found = fidelity::of_session(session)?;
+    let decisions = decisions(session)?;
+    let records: Vec<(usize, &Record)> =
+        records(&decisions).map(|(after, record)| (after as usize, record)).collect();
+    let mut checks = vec![ending(session)];
+    checks.push(noise(noise_of(&decisions), usual_noise));
+    checks.push(missing(found.samples, found.dropped));
+    if let Some(fitted) = fitted {
+        let measured: Vec<FitSample> =
+            fitted.samples.iter().filter(|one| one.is_measured()).copied().collect();
+        let start = fitted.start.0;
+        checks.insert(2, contact(session, &records));
+        checks.push(saturation(session));
+        checks.push(force_drop(&measured, start));
+        checks.push(base(&measured, start, FoundBase::of_session(session).thickness_mm));
+        checks.push(drift(fitted));
+        checks.push(lack_of_fit(fitted));
+    }
+    Ok(RunQuality { checks })
+}
+
+/// The noise of the empty load cell in the last daily check of a session's rig, where the library has that check's session.
+#[must_use]
+pub fn usual_noise(session: &Session, library: Option<&Path>) -> Option<Volts> {
+    let (library, rig) = (library?, session.manifest.rig.as_ref()?);
+    let checks = read_checks(library, &rig.name).ok()?;
+    let last = checks.last()?;
+    let folder = session_folders(library, &NoProgress).ok()?.get(&last.session_id)?.clone();
+    let checked = Session::open(&library.join(folder)).ok()?;
+    let checked = decisions(&checked).ok()?;
+    records(&checked).find_map(|(_, record)| match record {
+        Record::Weighed { mass_g: 0.0, noise, .. } => Some(*noise),
+        _ => None,
+    })
+}
+
+fn ending(session: &Session) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("ending", rank, words);
+    match &session.end {
+        Some(end) if end.outcome == EndingKind::Finish.name() => {
+            of(QualityRank::Good, "the run went to its end".into())
+        }
+        Some(end) => of(QualityRank::Bad, format!("the run did not finish: {}", end.reason)),
+        None => of(QualityRank::Bad, "the recording was interrupted".into()),
+    }
+}
+
+fn noise(found: Option<Volts>, usual: Option<Volts>) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("noise", rank, words);
+    let Some(found) = found else {
+        return of(QualityRank::NotJudged, "the run has no tare, so its noise is not known".into());
+    };
+    let mv = 1e3 * found.0;
+    let Some(usual) = usual else {
+        let words = format!("the noise is {mv:.2} mV; no daily check says what is usual here");
+        return of(QualityRank::NotJudged, words);
+    };
+    let ratio = found.0 / usual.0;
+    let rank = rank_of(ratio, NOISE_RATIO, 5.0 * NOISE_RATIO);
+    let advice = match rank {
+        QualityRank::Good => "",
+        _ => "; look for a loose plug, a cable that moves, or a motor nearby",
+    };
+    let usual = 1e3 * usual.0;
+    of(rank, format!("the noise is {mv:.2} mV, and {usual:.2} mV in the last daily check{advice}"))
+}
+
+/// Good up to one limit, bad beyond the other.
+fn rank_of(value: f64, doubtful: f64, bad: f64) -> QualityRank {
+    match value {
+        value if value > bad => QualityRank::Bad,
+        value if value > doubtful => QualityRank::Doubtful,
+        _ => QualityRank::Good,
+    }
+}
+
+fn missing(samples: u64, missing: u64) -> QualityCheck {
+    let share = missing as f64 / (samples + missing).max(1) as f64;
+    let of = |rank, words: String| QualityCheck::new("samples", rank, words);
+    match missing {
+        0 => of(QualityRank::Good, "no sample is missing".into()),
+        missing => of(
+            rank_of(share, 0.0, MISSING_SHARE),
+            format!(
+                "{missing} of {} samples are missing; close other programs on this computer",
+                samples + missing
+            ),
+        ),
+    }
+}
+
+/// Whether contact was found before the probe pressed, gently and well.
+fn contact(session: &Session, records: &[(usize, &Record)]) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("contact", rank, words);
+    let found = records.iter().find_map(|(after, record)| match record {
+        Record::ContactFound { std_error_mm, .. } => Some((*after, *std_error_mm)),
+        _ => None,
+    });
+    let pressed = session.rows.iter().position(|row| row.phase == Phase::Ramp);
+    let Some((after, error)) =
+        found.filter(|(after, _)| pressed.is_none_or(|first| *after <= first))
+    else {
+        return of(
+            QualityRank::Doubtful,
+            "the tissue was pressed before contact was searched for, so depths count from elsewhere"
+                .into(),
+        );
+    };
+    let before = session.rows.iter().take(after);
+    let hardest = before.filter_map(|row| Some((row, row.force?)));
+    let hardest = hardest.max_by(|one, other| one.1.total_cmp(&other.1));
+    if let Some((row, force)) = hardest.filter(|(_, force)| *force > SEARCH_FORCE_MAX_N) {
+        let at = row.host.seconds().0;
+        let words = format!(
+            "the tissue was pressed with {force:.2} N before contact was found, and may have changed by it"
+        );
+        return of(QualityRank::Doubtful, words).at(at, at);
+    }
+    let rank = rank_of(error, CONTACT_ERROR_MAX_MM, f64::INFINITY);
+    of(rank, format!("contact was found to {:.1} um before the probe pressed", 1e3 * error))
+}
+
+fn saturation(session: &Session) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("saturation", rank, words);
+    let pressed = |row: &&SampleRow| matches!(row.phase, Phase::Ramp | Phase::Hold);
+    let rows = || session.rows.iter().filter(pressed);
+    let mut full = rows().filter(|row| is_saturated(session, row)).map(|row| row.host.seconds().0);
+    let Some(first) = full.next() else {
+        return of(
+            QualityRank::Good,
+            "the load cell stayed within the range of its converter".into(),
+        );
+    };
+    let (last, count) = full.fold((first, 1), |(_, count), at| (at, count + 1));
+    let share = f64::from(count) / rows().count() as f64;
+    let words = format!(
+        "{count} samples of ramp and hold are at an end of the converter's range; press less deep, or use a lower gain"
+    );
+    of(rank_of(share, 0.0, SATURATED_SHARE), words).at(first, last)
+}
+
+/// A sudden loss of force while the probe presses or rests: it slipped, or the tissue tore.
+fn force_drop(samples: &[FitSample], start: f64) -> QualityCheck {
+    let means = means(samples);
+    let mut highest = f64::NEG_INFINITY;
+    // A drop within the fourth mean shows whole between the third and the fifth.
+    for five in means.windows(5) {
+        let [first, _, one, _, next] = five else { continue };
+        highest = highest.max(one.force);
+        let (drop, usual) = (one.force - next.force, first.force - one.force);
+        let is_drop = drop > DROP_SIGMAS * one.sigma.hypot(next.sigma)
+            && drop > DROP_SHARE * highest
+            && drop > DROP_RATIO * usual
+            && is_steady(first, one, next);
+        if is_drop {
+            let words = format!(
+                "the force fell from {:.2} to {:.2} N within {:.0} ms; the probe slipped or the tissue tore",
+                one.force,
+                next.force,
+                1e3 * (next.t - one.t)
+            );
+            let check = QualityCheck::new("force drop", QualityRank::Bad, words);
+            return check.at(start + one.t, start + next.t);
+        }
+    }
+    QualityCheck::new("force drop", QualityRank::Good, "the force never fell suddenly")
+}
+
+/// The mean over a short time.
+#[derive(Clone, Copy, Debug, Default)]
+struct ShortMean {
+    t: f64,
+    depth: f64,
+    force: f64,
+    sigma: f64,
+}
+
+/// Whether the probe goes on as it did and no time is missing: where a ramp ends, tissue relaxes at once.
+fn is_steady(first: &ShortMean, one: &ShortMean, next: &ShortMean) -> bool {
+    let [before, after] = [one.depth - first.depth, next.depth - one.depth];
+    let is_alike = (after - before).abs() < STEADY_SHARE * before.abs() + STEADY_MM;
+    is_alike && next.t - first.t < 6.0 * DROP_SECS
+}
+
+fn means(samples: &[FitSample]) -> Vec<ShortMean> {
+    let first = samples.first().map_or(0.0, |one| one.t.0);
+    let block = |one: &FitSample| ((one.t.0 - first) / DROP_SECS) as u64;
+    let blocks = samples.chunk_by(|one, next| block(one) == block(next));
+    let mean = |block: &[FitSample]| {
+        let over = 1.0 / block.len() as f64;
+        let of = |value: fn(&FitSample) -> f64| over * block.iter().map(value).sum::<f64>();
+        ShortMean {
+            t: of(|one| one.t.0),
+            depth: of(|one| one.depth.0),
+            force: of(|one| one.force.0),
+            sigma: over.sqrt() * of(|one| one.sigma.0),
+        }
+    };
+    blocks.map(mean).collect()
+}
+
+/// Whether the probe met what lies under the tissue.
+fn base(samples: &[FitSample], start: f64, thickness_mm: Option<f64>) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("base", rank, words);
+    let Some(deepest) = samples.iter().max_by(|a, b| a.depth.0.total_cmp(&b.depth.0)) else {
+        return of(QualityRank::NotJudged, "no force is known in this run".into());
+    };
+    let (deep, at) = (deepest.depth.0, start + deepest.t.0);
+    if let Some(thickness) = thickness_mm {
+        let share = deep / thickness;
+        let words = format!(
+            "the probe went to {deep:.1} mm, {:.0} % of the thickness of {thickness:.1} mm",
+            100.0 * share
+        );
+        return of(rank_of(share, THICKNESS_SHARE, 1.0), words).at(at, at);
+    }
+    let way = |from: f64, to: f64| slope(samples, deep * from, deep * to);
+    let last = way(1.0 - LAST_WAY, 1.0);
+    let before = way(1.0 - LAST_WAY - WAY_BEFORE, 1.0 - LAST_WAY);
+    match (last, before) {
+        (Some(last), Some(before)) if last > STIFFENING * before && before > 0.0 => {
+            let from = samples.iter().find(|one| one.depth.0 > (1.0 - LAST_WAY) * deep);
+            let words = format!(
+                "over the last {:.1} mm the force rises {:.1} times as steeply as before; the probe may have met what is under the tissue",
+                LAST_WAY * deep,
+                last / before
+            );
+            let check = of(QualityRank::Doubtful, words);
+            check.at(from.map_or(at, |one| start + one.t.0), at)
+        }
+        (Some(_), Some(_)) => of(
+            QualityRank::Good,
+            "the force does not stiffen suddenly at the end of the ramp".into(),
+        ),
+        _ => {
+            of(QualityRank::NotJudged, "the ramp is too short to tell whether it met a base".into())
+        }
+    }
+}
+
+/// Mean rise of the force in N/mm between two depths on the way to the deepest sample; `None` where few samples lie there.
+fn slope(samples: &[FitSample], from: f64, to: f64) -> Option<f64> {
+    let deepest =
+        samples.iter().position(|one| one.depth.0 >= to - 1e-9).unwrap_or(samples.len() - 1);
+    let near = samples[..=deepest].iter().filter(|one| (from..=to).contains(&one.depth.0));
+    let (mut count, mut depth, mut force, mut both, mut square) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for one in near {
+        count += 1.0;
+        depth += one.depth.0;
+        force += one.force.0;
+        both += one.depth.0 * one.force.0;
+        square += one.depth.0.powi(2);
+    }
+    let spread = square - depth * depth / count;
+    (count > 20.0 && spread > 0.0).then(|| (both - depth * force / count) / spread)
+}
+
+/// How far the zero moved from before the run to after it.
+fn drift(fitted: &SourceFit) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("drift", rank, words);
+    let unknown = |words: &str| of(QualityRank::NotJudged, words.into());
+    let (Some(signal), Some(last)) = (&fitted.signal, fitted.samples.last()) else {
+        return unknown("the signal out of contact was not recorded, so drift is not known");
+    };
+    let mean = |is_near: &dyn Fn(f64) -> bool| zero(&signal.unloaded, is_near);
+    let before = mean(&|t| t < 0.0 && t > signal_end(&signal.unloaded, |t| t < 0.0) - ZERO_SECS);
+    let after_from =
+        signal.unloaded.iter().map(|one| one.t.0).find(|t| *t > last.t.0).unwrap_or(f64::INFINITY);
+    let after = mean(&|t| t >= after_from && t < after_from + ZERO_SECS);
+    let (Some((_, before)), Some((_, after))) = (before, after) else {
+        return unknown("the zero was not seen before and after the run, so drift is not known");
+    };
+    let newtons = (after - before) / signal.curve.sensitivity_at(Newtons(0.0));
+    let peak = fitted.samples.iter().filter(|one| one.is_measured());
+    let peak = peak.map(|one| one.force.0).fold(0.0, f64::max);
+    let share = newtons.abs() / peak;
+    let words = format!(
+        "the zero moved by {:.1} mN from before to after the run, {:.2} % of the peak force; the fit follows it",
+        1e3 * newtons,
+        100.0 * share
+    );
+    of(rank_of(share, DRIFT_SHARE, 5.0 * DRIFT_SHARE), words)
+}
+
+/// The last time at which this holds.
+fn signal_end(unloaded: &[UnloadedMean], is_there: impl Fn(f64) -> bool) -> f64 {
+    let times = unloaded.iter().map(|one| one.t.0).filter(|t| is_there(*t));
+    times.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Samples and mean signal in V out of contact at these times; `None` without any.
+fn zero(unloaded: &[UnloadedMean], is_near: &dyn Fn(f64) -> bool) -> Option<(f64, f64)> {
+    let near = unloaded.iter().filter(|one| is_near(one.t.0));
+    let (count, sum) = near.fold((0.0, 0.0), |(count, sum), one| {
+        (count + one.count as f64, sum + one.count as f64 * one.volts.0)
+    });
+    (count > 0.0).then(|| (count, sum / count))
+}
+
+fn lack_of_fit(fitted: &SourceFit) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("lack of fit", rank, words);
+    match &fitted.result {
+        Err(reason) => of(QualityRank::Doubtful, format!("there is no fit: {reason}")),
+        Ok(report) => match report.lack_of_fit() {
+            Some(sentence) => of(QualityRank::Doubtful, sentence.to_owned()),
+            None => {
+                let words = format!(
+                    "the model describes the force to within its noise (R² {:.5}, {:.1} mN rms)",
+                    report.r2,
+                    1e3 * report.rmse_n
+                );
+                of(QualityRank::Good, words)
+            }
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorded() -> Session {
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
+        Session::open(&sessions.join("ramp-hold-lab")).unwrap()
+    }
+
+    fn assess(session: &Session, usual_noise: Option<Volts>) -> RunQuality {
+        let source = source::of_session(session.clone(), RecordStretch::RampHold, &[]).unwrap();
+        let fitted = SourceFit::of(source, &FitOptions::default());
+        of_session(session, Some(&fitted), usual_noise).unwrap()
+    }
+
+    fn check(quality: &RunQuality, name: &str) -> QualityCheck {
+        let found = quality.checks.iter().find(|one| one.name == name);
+        found.unwrap_or_else(|| panic!("{name}: {quality:?}")).clone()
+    }
+
+    /// What becomes of one check by a change of the session: it is good before and has this rank after.
+    fn becomes(name: &str, wanted: QualityRank, change: impl FnOnce(&mut Session)) -> QualityCheck {
+        let mut session = recorded();
+        let usual = Some(Volts(0.001));
+        assert_eq!(check(&assess(&session, usual), name).rank, QualityRank::Good);
+        change(&mut session);
+        let found = assess(&session, usual);
+        let one = check(&found, name);
+        assert_eq!(one.rank, wanted, "{one:?}");
+        assert!(found.rank() >= wanted && !found.doubts().is_empty());
+        println!("{}", one.sentence);
+        one
+    }
+
+    fn is_in(phase: Phase) -> impl Fn(&&mut SampleRow) -> bool {
+        move |row| row.phase == phase
+    }
+
+    fn deepest(session: &Session) -> f64 {
+        session.rows.iter().filter_map(|row| row.depth).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_sound_run_is_good_in_every_respect() {
+        let quality = assess(&recorded(), Some(Volts(0.001)));
+        println!("{}", quality.text());
+        assert_eq!(quality.rank(), QualityRank::Good, "{quality:?}");
+        assert_eq!(quality.checks.len(), 9);
+        // Without a daily check the noise has nothing to be judged by.
+        let alone = assess(&recorded(), None);
+        assert_eq!(check(&alone, "noise").rank, QualityRank::NotJudged);
+        assert_eq!(alone.rank(), QualityRank::Good);
+    }
+
+    #[test]
+    fn a_slip_is_found_where_it_is() {
+        for phase in [Phase::Ramp, Phase::Hold] {
+            let mut at = 0.0;
+            let found = becomes("force drop", QualityRank::Bad, |session| {
+                let deepest = deepest(session);
+                let pressed = session.rows.iter_mut().filter(is_in(phase));
+                let deep =
+                    pressed.filter(|row| row.depth.is_some_and(|depth| depth > 0.8 * deepest));
+                let mut later: Vec<_> = deep.skip(400).collect();
+                at = later[0].host.seconds().0;
+                later.iter_mut().for_each(|row| row.force = row.force.map(|force| 0.9 * force));
+            });
+            let [from, to] = found.at_s.unwrap();
+            assert!(from < at + DROP_SECS && at < to + DROP_SECS, "{from} {to} {at}");
+        }
+    }
+
+    #[test]
+    fn a_base_under_the_tissue_is_found_by_its_stiffness() {
+        let found = becomes("base", QualityRank::Doubtful, |session| {
+            let base = 0.975 * deepest(session);
+            for row in session.rows.iter_mut().filter(is_in(Phase::Ramp)) {
+                let into_base = row.depth.map_or(0.0, |depth| (depth - base).max(0.0));
+                row.force = row.force.map(|force| force + 5.0 * into_base);
+            }
+        });
+        assert!(found.at_s.is_some_and(|[from, to]| to > from));
+    }
+
+    #[test]
+    fn a_known_thickness_bounds_the_depth() {
+        let samples = source::fit_samples(&recorded(), RecordStretch::RampHold).unwrap();
+        let deepest = deepest(&recorded());
+        let rank = |share| base(&samples, 0.0, Some(deepest / share)).rank;
+        assert_eq!(
+            [0.5, 0.95, 1.01].map(rank),
+            [QualityRank::Good, QualityRank::Doubtful, QualityRank::Bad]
+        );
+    }
+
+    #[test]
+    fn what_went_wrong_has_its_own_check() {
+        becomes("ending", QualityRank::Bad, |session| session.end = None);
+        becomes("saturation", QualityRank::Bad, |session| {
+            let most = session.manifest.rig.as_ref().unwrap().adc.unwrap().counts_max;
+            let hold = session.rows.iter_mut().filter(is_in(Phase::Hold));
+            hold.step_by(3).for_each(|row| row.counts = Some(most));
+        });
+        becomes("samples", QualityRank::Doubtful, |session| {
+            let hold = session.rows.iter().position(|row| row.phase == Phase::Hold).unwrap();
+            for entry in &mut session.entries {
+                entry.after_sample -= 3 * u64::from(entry.after_sample > hold as u64 + 503);
+            }
+            session.rows.drain(hold + 500..hold + 503);
+        });
+        becomes("contact", QualityRank::Doubtful, |session| {
+            let search = session.rows.iter_mut().filter(is_in(Phase::Contact));
+            search.skip(5000).take(3).for_each(|row| row.force = Some(0.8));
+        });
+        becomes("drift", QualityRank::Doubtful, |session| {
+            let slope = source::curve_of(session).unwrap().sensitivity_at(Newtons(0.0));
+            let retract = session.rows.iter().rposition(|row| row.phase == Phase::Hold).unwrap();
+            // 0.05 N of the 1.8 N of this run.
+            for row in &mut session.rows[retract..] {
+                row.volts = row.volts.map(|volts| volts + 0.05 * slope);
+            }
+        });
+        let quiet = assess(&recorded(), Some(Volts(1e-4)));
+        assert_eq!(check(&quiet, "noise").rank, QualityRank::Doubtful);
+    }
+}
