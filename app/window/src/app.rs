@@ -6,7 +6,7 @@ use crate::screens::{rig, run, start_page};
 use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
 use crate::shell::dropped_files::push_dropped;
-use crate::shell::event_log::EventLog;
+use crate::shell::event_log::{EventLog, FOLDED_HEIGHT};
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::KeyReader;
 use crate::shell::pace::FramePace;
@@ -263,9 +263,14 @@ impl WorkbenchApp {
             .frame(frame(ui, false))
             .show(ui, |ui| rail_ui(ui, self.screens.shown(), commands));
         let log = Panel::bottom("log").frame(frame(ui, true));
-        let log = self.sizes.of(PanelEdge::Log, log);
-        let log = log.show(ui, |ui| self.events.ui(ui, &snapshot, commands));
-        self.sizes.drag(ui, PanelEdge::Log, log.response.rect);
+        if self.events.update(&snapshot) {
+            let log = self.sizes.of(PanelEdge::Log, log);
+            let log = log.show(ui, |ui| self.events.ui(ui, &snapshot, commands));
+            self.sizes.drag(ui, PanelEdge::Log, log.response.rect);
+        } else {
+            let log = log.exact_size(FOLDED_HEIGHT).resizable(false);
+            log.show(ui, |ui| self.events.folded_ui(ui, &snapshot, commands));
+        }
         let screen = self.screens.shown_mut();
         screen.ui(ui, &mut self.sizes, &mut self.workbench, commands);
     }

@@ -7,7 +7,7 @@ use crate::command::{Commands, UiCommand};
 use crate::plots::PlotCache;
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
-use crate::shell::event_log::EventLog;
+use crate::shell::event_log::{EventLog, FOLDED_HEIGHT};
 use crate::shell::panels::frame;
 use crate::shell::top_bar::{HEIGHT, numbers_ui};
 use crate::theme::{self};
@@ -66,7 +66,7 @@ impl PlaybackApp {
             force_max: options.force_max,
             is_same_engine,
             plots: PlotCache::for_calibration(&options.calibration),
-            events: EventLog::default(),
+            events: EventLog::unfolded(),
         })
     }
 
@@ -133,11 +133,14 @@ impl eframe::App for PlaybackApp {
             .resizable(false)
             .frame(frame(ui, false))
             .show(ui, |ui| self.state_ui(ui));
-        Panel::bottom("log")
-            .exact_size(LOG_HEIGHT)
-            .resizable(false)
-            .frame(frame(ui, true))
-            .show(ui, |ui| self.events.ui(ui, &self.snapshot, &mut commands));
+        let log = Panel::bottom("log").resizable(false).frame(frame(ui, true));
+        if self.events.update(&self.snapshot) {
+            let log = log.exact_size(LOG_HEIGHT);
+            log.show(ui, |ui| self.events.ui(ui, &self.snapshot, &mut commands));
+        } else {
+            let log = log.exact_size(FOLDED_HEIGHT);
+            log.show(ui, |ui| self.events.folded_ui(ui, &self.snapshot, &mut commands));
+        }
         Panel::bottom("transport").resizable(false).frame(frame(ui, false)).show(ui, |ui| {
             let run = self.snapshot.run.as_ref();
             let shown = run.map_or(0.0, |run| run.now.seconds().0);

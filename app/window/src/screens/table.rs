@@ -2,6 +2,9 @@
 
 use super::screen::ScreenEntry;
 
+/// How many of the screens are a technician's, for a day at the rig; the others are a researcher's.
+pub const TECHNICIAN_SCREENS: usize = 4;
+
 /// The screens as they stand on the rail.
 pub const SCREENS: &[ScreenEntry] = &[
     super::rig::SCREEN,

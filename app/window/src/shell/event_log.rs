@@ -1,17 +1,61 @@
-//! Events of the run, newest last, with a filter and a copy of the lines shown.
+//! Events of the run: the newest in one line, or all of them with a filter and a copy of the lines shown.
 
 use crate::command::{Commands, UiCommand};
 use crate::widgets::{NamedControl, placeholder_ui, tokens_of};
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_runner::{LogLine, RunnerSnapshot};
 
-/// The filter as typed.
+/// Height of the log in one line, in points: as large as anything that a gloved finger has to hit.
+pub const FOLDED_HEIGHT: f32 = 48.0;
+
 #[derive(Clone, Debug, Default)]
 pub struct EventLog {
+    /// The filter as typed.
     filter: String,
+    is_unfolded: bool,
+    /// Alarms so far.
+    alarms: usize,
 }
 
 impl EventLog {
+    /// A log that shows every line.
+    #[must_use]
+    pub fn unfolded() -> Self {
+        Self { is_unfolded: true, ..Self::default() }
+    }
+
+    /// Whether it shows every line. A new alarm unfolds it.
+    pub fn update(&mut self, snapshot: &RunnerSnapshot) -> bool {
+        self.take(snapshot.run.as_ref().map_or(&[], |run| run.events.as_slice()));
+        self.is_unfolded
+    }
+
+    fn take(&mut self, events: &[LogLine]) {
+        let alarms = events.iter().filter(|line| line.is_alarm).count();
+        self.is_unfolded |= alarms > self.alarms;
+        self.alarms = alarms;
+    }
+
+    /// Draws the newest line and the switch to all of them.
+    pub fn folded_ui(&mut self, ui: &mut Ui, snapshot: &RunnerSnapshot, commands: &mut Commands) {
+        let last = snapshot.run.as_ref().and_then(|run| run.events.last());
+        ui.horizontal_centered(|ui| {
+            if ui.button("All events").clicked() {
+                self.is_unfolded = true;
+            }
+            let tokens = tokens_of(ui);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                theme_button(ui, commands);
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    let text = last.map_or_else(|| "no event yet".to_owned(), line_text);
+                    let is_alarm = last.is_some_and(|line| line.is_alarm);
+                    let ink = if is_alarm { tokens.alarm_text } else { tokens.text_quiet };
+                    ui.add(Label::new(RichText::new(text.trim_start()).color(ink)).truncate());
+                });
+            });
+        });
+    }
+
     /// Draws the log in the space there is.
     pub fn ui(&mut self, ui: &mut Ui, snapshot: &RunnerSnapshot, commands: &mut Commands) {
         let events = snapshot.run.as_ref().map_or(&[][..], |run| run.events.as_slice());
@@ -47,17 +91,22 @@ impl EventLog {
             ui.add(TextEdit::singleline(&mut self.filter).desired_width(160.0).char_limit(100))
                 .labelled_by(label.id)
                 .named("filter of the events");
+            if ui.button("Fold").named("Fold the events").clicked() {
+                self.is_unfolded = false;
+            }
             if ui.button("Copy").clicked() {
                 let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
                 ui.ctx().copy_text(lines.join("\n"));
             }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
-                if ui.button(name).clicked() {
-                    commands.push(UiCommand::SwitchTheme);
-                }
-            });
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| theme_button(ui, commands));
         });
+    }
+}
+
+fn theme_button(ui: &mut Ui, commands: &mut Commands) {
+    let name = if ui.visuals().dark_mode { "Light screen" } else { "Dark screen" };
+    if ui.button(name).clicked() {
+        commands.push(UiCommand::SwitchTheme);
     }
 }
 
@@ -75,6 +124,23 @@ fn line_text(line: &LogLine) -> String {
 mod tests {
     use super::*;
     use palpate_model::Nanos;
+
+    #[test]
+    fn a_new_alarm_unfolds_the_log_and_an_old_one_does_not() {
+        let line = |is_alarm| LogLine { at: Nanos::ZERO, text: "a line".into(), is_alarm };
+        let mut log = EventLog::default();
+        log.take(&[line(false)]);
+        assert!(!log.is_unfolded);
+        log.take(&[line(false), line(true)]);
+        assert!(log.is_unfolded);
+        log.is_unfolded = false;
+        log.take(&[line(false), line(true), line(false)]);
+        assert!(!log.is_unfolded);
+        // The next run begins without alarms.
+        log.take(&[]);
+        log.take(&[line(true)]);
+        assert!(log.is_unfolded);
+    }
 
     #[test]
     fn the_filter_finds_words_times_and_alarms() {
