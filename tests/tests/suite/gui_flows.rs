@@ -187,6 +187,7 @@ fn f12_and_escape_stop_with_a_text_field_focused() {
         flow.window.key_press(Key::F5);
         flow.wait_for_phase(Phase::Contact);
         assert!(flow.says("State: CONTACT"));
+        flow.click("All events");
         flow.window.get_by_label("filter").focus();
         flow.window.step();
         assert!(flow.window.get_by_label("filter").is_focused());

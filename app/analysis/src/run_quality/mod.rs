@@ -2,6 +2,8 @@
 //!
 //! They advise; whether a session is valid, suspect or rejected is said by a person.
 
+mod force;
+
 use crate::analysed_session;
 use crate::catalog_search::session_folders;
 use crate::fidelity;
@@ -19,6 +21,8 @@ use palpate_sessions::checks::read_checks;
 use palpate_sessions::{SampleRow, Session};
 use serde::Serialize;
 use std::path::Path;
+
+use force::{base, force_drop};
 
 palpate_model::named! {
     /// How a run stands in one respect, from best to worst.
@@ -112,26 +116,6 @@ const NOISE_RATIO: f64 = 2.0;
 const SATURATED_SHARE: f64 = 0.01;
 /// More missing samples than this share are bad.
 const MISSING_SHARE: f64 = 0.001;
-/// Forces are averaged over so long before a drop is looked for, in s: a slip takes a few hundredths of a second.
-const DROP_SECS: f64 = 0.02;
-/// A drop is one beyond so many standard uncertainties and this share of the highest force so far ...
-const DROP_SIGMAS: f64 = 8.0;
-const DROP_SHARE: f64 = 0.02;
-/// ... and so many times that of the time before: relaxation slows down, it never speeds up.
-const DROP_RATIO: f64 = 2.0;
-/// The probe goes on as it did if its way over the same time differs by no more than this share and this length in mm, which
-/// the steps of a slider make.
-const STEADY_SHARE: f64 = 0.2;
-const STEADY_MM: f64 = 2e-3;
-/// Tissue pressed by more than this share of its thickness feels the base: a common rule is 10 %, and the model has no base;
-/// here only what nearly touches it is doubted.
-const THICKNESS_SHARE: f64 = 0.9;
-/// The stiffness over the last part of a ramp may be so many times that over the part before. A cubic spring has 1.3.
-const STIFFENING: f64 = 3.0;
-/// The last part of a ramp, and the part before, as shares of its way.
-const LAST_WAY: f64 = 0.03;
-const WAY_BEFORE: f64 = 0.15;
-
 /// The checks of a session in a folder, fitted with the default model; `library` knows the daily checks of its rig.
 pub fn of_folder(path: &Path, library: Option<&Path>) -> Result<RunQuality, SourceError> {
     let opened = analysed_session::open(path, None)?;
@@ -300,122 +284,6 @@ fn saturation(session: &Session) -> QualityCheck {
     of(rank_of(share, 0.0, SATURATED_SHARE), words).at(first, last)
 }
 
-/// A sudden loss of force while the probe presses or rests: it slipped, or the tissue tore.
-fn force_drop(samples: &[FitSample], start: f64) -> QualityCheck {
-    let means = means(samples);
-    let mut highest = f64::NEG_INFINITY;
-    // A drop within the fourth mean shows whole between the third and the fifth.
-    for five in means.windows(5) {
-        let [first, _, one, _, next] = five else { continue };
-        highest = highest.max(one.force);
-        let (drop, usual) = (one.force - next.force, first.force - one.force);
-        let is_drop = drop > DROP_SIGMAS * one.sigma.hypot(next.sigma)
-            && drop > DROP_SHARE * highest
-            && drop > DROP_RATIO * usual
-            && is_steady(first, one, next);
-        if is_drop {
-            let words = format!(
-                "the force fell from {:.2} to {:.2} N within {:.0} ms; the probe slipped or the tissue tore",
-                one.force,
-                next.force,
-                1e3 * (next.t - one.t)
-            );
-            let check = QualityCheck::new("force drop", QualityRank::Bad, words);
-            return check.at(start + one.t, start + next.t);
-        }
-    }
-    QualityCheck::new("force drop", QualityRank::Good, "the force never fell suddenly")
-}
-
-/// The mean over a short time.
-#[derive(Clone, Copy, Debug, Default)]
-struct ShortMean {
-    t: f64,
-    depth: f64,
-    force: f64,
-    sigma: f64,
-}
-
-/// Whether the probe goes on as it did and no time is missing: where a ramp ends, tissue relaxes at once.
-fn is_steady(first: &ShortMean, one: &ShortMean, next: &ShortMean) -> bool {
-    let [before, after] = [one.depth - first.depth, next.depth - one.depth];
-    let is_alike = (after - before).abs() < STEADY_SHARE * before.abs() + STEADY_MM;
-    is_alike && next.t - first.t < 6.0 * DROP_SECS
-}
-
-fn means(samples: &[FitSample]) -> Vec<ShortMean> {
-    let first = samples.first().map_or(0.0, |one| one.t.0);
-    let block = |one: &FitSample| ((one.t.0 - first) / DROP_SECS) as u64;
-    let blocks = samples.chunk_by(|one, next| block(one) == block(next));
-    let mean = |block: &[FitSample]| {
-        let over = 1.0 / block.len() as f64;
-        let of = |value: fn(&FitSample) -> f64| over * block.iter().map(value).sum::<f64>();
-        ShortMean {
-            t: of(|one| one.t.0),
-            depth: of(|one| one.depth.0),
-            force: of(|one| one.force.0),
-            sigma: over.sqrt() * of(|one| one.sigma.0),
-        }
-    };
-    blocks.map(mean).collect()
-}
-
-/// Whether the probe met what lies under the tissue.
-fn base(samples: &[FitSample], start: f64, thickness_mm: Option<f64>) -> QualityCheck {
-    let of = |rank, words: String| QualityCheck::new("base", rank, words);
-    let Some(deepest) = samples.iter().max_by(|a, b| a.depth.0.total_cmp(&b.depth.0)) else {
-        return of(QualityRank::NotJudged, "no force is known in this run".into());
-    };
-    let (deep, at) = (deepest.depth.0, start + deepest.t.0);
-    if let Some(thickness) = thickness_mm {
-        let share = deep / thickness;
-        let words = format!(
-            "the probe went to {deep:.1} mm, {:.0} % of the thickness of {thickness:.1} mm",
-            100.0 * share
-        );
-        return of(rank_of(share, THICKNESS_SHARE, 1.0), words).at(at, at);
-    }
-    let way = |from: f64, to: f64| slope(samples, deep * from, deep * to);
-    let last = way(1.0 - LAST_WAY, 1.0);
-    let before = way(1.0 - LAST_WAY - WAY_BEFORE, 1.0 - LAST_WAY);
-    match (last, before) {
-        (Some(last), Some(before)) if last > STIFFENING * before && before > 0.0 => {
-            let from = samples.iter().find(|one| one.depth.0 > (1.0 - LAST_WAY) * deep);
-            let words = format!(
-                "over the last {:.1} mm the force rises {:.1} times as steeply as before; the probe may have met what is under the tissue",
-                LAST_WAY * deep,
-                last / before
-            );
-            let check = of(QualityRank::Doubtful, words);
-            check.at(from.map_or(at, |one| start + one.t.0), at)
-        }
-        (Some(_), Some(_)) => of(
-            QualityRank::Good,
-            "the force does not stiffen suddenly at the end of the ramp".into(),
-        ),
-        _ => {
-            of(QualityRank::NotJudged, "the ramp is too short to tell whether it met a base".into())
-        }
-    }
-}
-
-/// Mean rise of the force in N/mm between two depths on the way to the deepest sample; `None` where few samples lie there.
-fn slope(samples: &[FitSample], from: f64, to: f64) -> Option<f64> {
-    let deepest =
-        samples.iter().position(|one| one.depth.0 >= to - 1e-9).unwrap_or(samples.len() - 1);
-    let near = samples[..=deepest].iter().filter(|one| (from..=to).contains(&one.depth.0));
-    let (mut count, mut depth, mut force, mut both, mut square) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for one in near {
-        count += 1.0;
-        depth += one.depth.0;
-        force += one.force.0;
-        both += one.depth.0 * one.force.0;
-        square += one.depth.0.powi(2);
-    }
-    let spread = square - depth * depth / count;
-    (count > 20.0 && spread > 0.0).then(|| (both - depth * force / count) / spread)
-}
-
 /// How far the zero moved from before the run to after it.
 fn drift(fitted: &SourceFit) -> QualityCheck {
     let of = |rank, words: String| QualityCheck::new("drift", rank, words);
@@ -477,128 +345,4 @@ fn lack_of_fit(fitted: &SourceFit) -> QualityCheck {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn recorded() -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
-        Session::open(&sessions.join("ramp-hold-lab")).unwrap()
-    }
-
-    fn assess(session: &Session, usual_noise: Option<Volts>) -> RunQuality {
-        let source = source::of_session(session.clone(), RecordStretch::RampHold, &[]).unwrap();
-        let fitted = SourceFit::of(source, &FitOptions::default());
-        of_session(session, Some(&fitted), usual_noise).unwrap()
-    }
-
-    fn check(quality: &RunQuality, name: &str) -> QualityCheck {
-        let found = quality.checks.iter().find(|one| one.name == name);
-        found.unwrap_or_else(|| panic!("{name}: {quality:?}")).clone()
-    }
-
-    /// What becomes of one check by a change of the session: it is good before and has this rank after.
-    fn becomes(name: &str, wanted: QualityRank, change: impl FnOnce(&mut Session)) -> QualityCheck {
-        let mut session = recorded();
-        let usual = Some(Volts(0.001));
-        assert_eq!(check(&assess(&session, usual), name).rank, QualityRank::Good);
-        change(&mut session);
-        let found = assess(&session, usual);
-        let one = check(&found, name);
-        assert_eq!(one.rank, wanted, "{one:?}");
-        assert!(found.rank() >= wanted && !found.doubts().is_empty());
-        println!("{}", one.sentence);
-        one
-    }
-
-    fn is_in(phase: Phase) -> impl Fn(&&mut SampleRow) -> bool {
-        move |row| row.phase == phase
-    }
-
-    fn deepest(session: &Session) -> f64 {
-        session.rows.iter().filter_map(|row| row.depth).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn a_sound_run_is_good_in_every_respect() {
-        let quality = assess(&recorded(), Some(Volts(0.001)));
-        println!("{}", quality.text());
-        assert_eq!(quality.rank(), QualityRank::Good, "{quality:?}");
-        assert_eq!(quality.checks.len(), 9);
-        // Without a daily check the noise has nothing to be judged by.
-        let alone = assess(&recorded(), None);
-        assert_eq!(check(&alone, "noise").rank, QualityRank::NotJudged);
-        assert_eq!(alone.rank(), QualityRank::Good);
-    }
-
-    #[test]
-    fn a_slip_is_found_where_it_is() {
-        for phase in [Phase::Ramp, Phase::Hold] {
-            let mut at = 0.0;
-            let found = becomes("force drop", QualityRank::Bad, |session| {
-                let deepest = deepest(session);
-                let pressed = session.rows.iter_mut().filter(is_in(phase));
-                let deep =
-                    pressed.filter(|row| row.depth.is_some_and(|depth| depth > 0.8 * deepest));
-                let mut later: Vec<_> = deep.skip(400).collect();
-                at = later[0].host.seconds().0;
-                later.iter_mut().for_each(|row| row.force = row.force.map(|force| 0.9 * force));
-            });
-            let [from, to] = found.at_s.unwrap();
-            assert!(from < at + DROP_SECS && at < to + DROP_SECS, "{from} {to} {at}");
-        }
-    }
-
-    #[test]
-    fn a_base_under_the_tissue_is_found_by_its_stiffness() {
-        let found = becomes("base", QualityRank::Doubtful, |session| {
-            let base = 0.975 * deepest(session);
-            for row in session.rows.iter_mut().filter(is_in(Phase::Ramp)) {
-                let into_base = row.depth.map_or(0.0, |depth| (depth - base).max(0.0));
-                row.force = row.force.map(|force| force + 5.0 * into_base);
-            }
-        });
-        assert!(found.at_s.is_some_and(|[from, to]| to > from));
-    }
-
-    #[test]
-    fn a_known_thickness_bounds_the_depth() {
-        let samples = source::fit_samples(&recorded(), RecordStretch::RampHold).unwrap();
-        let deepest = deepest(&recorded());
-        let rank = |share| base(&samples, 0.0, Some(deepest / share)).rank;
-        assert_eq!(
-            [0.5, 0.95, 1.01].map(rank),
-            [QualityRank::Good, QualityRank::Doubtful, QualityRank::Bad]
-        );
-    }
-
-    #[test]
-    fn what_went_wrong_has_its_own_check() {
-        becomes("ending", QualityRank::Bad, |session| session.end = None);
-        becomes("saturation", QualityRank::Bad, |session| {
-            let most = session.manifest.rig.as_ref().unwrap().adc.unwrap().counts_max;
-            let hold = session.rows.iter_mut().filter(is_in(Phase::Hold));
-            hold.step_by(3).for_each(|row| row.counts = Some(most));
-        });
-        becomes("samples", QualityRank::Doubtful, |session| {
-            let hold = session.rows.iter().position(|row| row.phase == Phase::Hold).unwrap();
-            for entry in &mut session.entries {
-                entry.after_sample -= 3 * u64::from(entry.after_sample > hold as u64 + 503);
-            }
-            session.rows.drain(hold + 500..hold + 503);
-        });
-        becomes("contact", QualityRank::Doubtful, |session| {
-            let search = session.rows.iter_mut().filter(is_in(Phase::Contact));
-            search.skip(5000).take(3).for_each(|row| row.force = Some(0.8));
-        });
-        becomes("drift", QualityRank::Doubtful, |session| {
-            let slope = source::curve_of(session).unwrap().sensitivity_at(Newtons(0.0));
-            let retract = session.rows.iter().rposition(|row| row.phase == Phase::Hold).unwrap();
-            // 0.05 N of the 1.8 N of this run.
-            for row in &mut session.rows[retract..] {
-                row.volts = row.volts.map(|volts| volts + 0.05 * slope);
-            }
-        });
-        let quiet = assess(&recorded(), Some(Volts(1e-4)));
-        assert_eq!(check(&quiet, "noise").rank, QualityRank::Doubtful);
-    }
-}
+mod tests;
