@@ -14,7 +14,9 @@ use palpate_model::rig::{
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
-use palpate_rheology::fit::{FitSample, PressedSignal, UnloadedMean, compliance_in_volts, zero_at};
+use palpate_rheology::fit::{
+    FitSample, PressedSignal, UnloadedMean, estimate_zero, fit_compliance_to_signal,
+};
 use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
 use palpate_sessions::{LibraryError, SampleRow, Session};
 use palpate_tables::export::ExtraColumns;
@@ -67,7 +69,7 @@ pub fn compliance_from_session(
     let seated = signal.into_iter().filter(|one| one.position.0 >= seated_from);
     let seated: Vec<PressedSignal> = seated.collect();
     let curve = curve_of(session)?;
-    let found = match compliance_in_volts(&line, &seated, &unloaded, &curve) {
+    let found = match fit_compliance_to_signal(&line, &seated, &unloaded, &curve) {
         Some(line) => by_force.improved(&line),
         None => by_force,
     };
@@ -114,7 +116,7 @@ impl StiffPresses {
         let pressed: Vec<(u32, Newtons, PressedSignal)> = pressed.collect();
         let unloaded = unloaded_off_surface(session, after, surface)?;
         let times: Vec<Seconds> = pressed.iter().map(|(.., signal)| signal.t).collect();
-        let zero = zero_at(&unloaded, &times);
+        let zero = estimate_zero(&unloaded, &times);
         let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
         for (k, (press, above_tare, signal)) in pressed.iter().enumerate() {
             let zero = zero.as_ref().map(|zero| zero[k]);

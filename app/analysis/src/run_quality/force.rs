@@ -10,14 +10,15 @@ const DROP_SIGMAS: f64 = 8.0;
 const DROP_SHARE: f64 = 0.02;
 /// ... and so many times that of the time before: relaxation slows down, it never speeds up.
 const DROP_RATIO: f64 = 2.0;
-/// The probe goes on as it did if its way over the same time differs by no more than this share and this length in mm, which
-/// the steps of a slider make.
+/// The probe goes on as it did if its way over so many means before and after differs by no more than this share and this
+/// length in mm: two pulses of the source's slider.
+const STEADY_MEANS: usize = 10;
 const STEADY_SHARE: f64 = 0.2;
-const STEADY_MM: f64 = 2e-3;
-/// Tissue pressed by more than this share of its thickness feels the base: a common rule is 10 %, and the model has no base;
-/// here only what nearly touches it is doubted.
+const STEADY_MM: f64 = 0.03;
+/// A probe that is so near the base, as a share of the thickness, presses what it pushed aside against the base; the model has
+/// no base.
 const THICKNESS_SHARE: f64 = 0.9;
-/// The stiffness over the last part of a ramp may be so many times that over the part before. A cubic spring has 1.3.
+/// The stiffness over the last part of a ramp may be so many times that over the part before. A cubic spring has 1.2.
 const STIFFENING: f64 = 3.0;
 /// The last part of a ramp, and the part before, as shares of its way.
 const LAST_WAY: f64 = 0.03;
@@ -28,14 +29,14 @@ pub(super) fn force_drop(samples: &[FitSample], start: f64) -> QualityCheck {
     let means = means(samples);
     let mut highest = f64::NEG_INFINITY;
     // A drop within the fourth mean shows whole between the third and the fifth.
-    for five in means.windows(5) {
+    for (k, five) in means.windows(5).enumerate() {
         let [first, _, one, _, next] = five else { continue };
         highest = highest.max(one.force);
         let (drop, usual) = (one.force - next.force, first.force - one.force);
         let is_drop = drop > DROP_SIGMAS * one.sigma.hypot(next.sigma)
             && drop > DROP_SHARE * highest
             && drop > DROP_RATIO * usual
-            && is_steady(first, one, next);
+            && is_steady(&means, k + 2);
         if is_drop {
             let words = format!(
                 "the force fell from {:.2} to {:.2} N within {:.0} ms; the probe slipped or the tissue tore",
@@ -59,11 +60,13 @@ struct ShortMean {
     sigma: f64,
 }
 
-/// Whether the probe goes on as it did and no time is missing: where a ramp ends, tissue relaxes at once.
-fn is_steady(first: &ShortMean, one: &ShortMean, next: &ShortMean) -> bool {
+/// Whether the probe goes on at a mean as it did and no time is missing near it: where a ramp ends, tissue relaxes at once.
+fn is_steady(means: &[ShortMean], at: usize) -> bool {
+    let near = STEADY_MEANS.min(at).min(means.len() - 1 - at);
+    let [first, one, next] = [at - near, at, at + near].map(|k| means[k]);
     let [before, after] = [one.depth - first.depth, next.depth - one.depth];
     let is_alike = (after - before).abs() < STEADY_SHARE * before.abs() + STEADY_MM;
-    is_alike && next.t - first.t < 6.0 * DROP_SECS
+    is_alike && next.t - first.t < 3.0 * near as f64 * DROP_SECS
 }
 
 fn means(samples: &[FitSample]) -> Vec<ShortMean> {

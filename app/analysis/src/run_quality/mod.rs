@@ -9,13 +9,11 @@ use crate::catalog_search::session_folders;
 use crate::fidelity;
 use crate::fit::{FitRecipe, SourceFit};
 use crate::progress::NoProgress;
-use crate::source::{
-    self, RecordStretch, SourceError, SourceSelection, decisions, is_saturated, noise_of, records,
-};
+use crate::source::{self, RecordStretch, SourceError, decisions, is_saturated, noise_of, records};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Newtons, Volts};
 use palpate_protocols::engine::{EndingKind, Record};
-use palpate_rheology::fit::{FitOptions, FitSample, UnloadedMean};
+use palpate_rheology::fit::{FitSample, UnloadedMean};
 use palpate_runner::base::FoundBase;
 use palpate_sessions::checks::read_checks;
 use palpate_sessions::{SampleRow, Session};
@@ -116,25 +114,27 @@ const NOISE_RATIO: f64 = 2.0;
 const SATURATED_SHARE: f64 = 0.01;
 /// More missing samples than this share are bad.
 const MISSING_SHARE: f64 = 0.001;
-/// The checks of a session in a folder, fitted with the default model; `library` knows the daily checks of its rig.
-pub fn of_folder(path: &Path, library: Option<&Path>) -> Result<RunQuality, SourceError> {
+/// A run that was read, fitted and checked.
+#[derive(Debug)]
+pub struct AssessedRun {
+    pub operator: String,
+    pub quality: RunQuality,
+    pub fitted: Result<SourceFit, SourceError>,
+}
+
+/// Reads the session in a folder, fits it by the recipe's model and checks it; `library` knows the daily checks of its rig.
+pub fn assess_folder(
+    path: &Path,
+    library: Option<&Path>,
+    recipe: &FitRecipe,
+) -> Result<AssessedRun, SourceError> {
     let opened = analysed_session::open(path, None)?;
     let session = opened.edited.session;
+    let source = source::of_session(session.clone(), RecordStretch::RampHold, &opened.left_out_s);
+    let fitted = source.and_then(|source| recipe.fit_read(source));
     let usual = usual_noise(&session, library);
-    if session.manifest.imported.is_some() {
-        return of_session(&session, None, usual);
-    }
-    let read = source::of_session(session.clone(), RecordStretch::RampHold, &opened.left_out_s);
-    let fitted = match read {
-        Ok(source) => {
-            let mut recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
-            recipe.is_systematic = false;
-            Some(recipe.fit_read(source)?)
-        }
-        Err(SourceError::Empty) => None,
-        Err(error) => return Err(error),
-    };
-    of_session(&session, fitted.as_ref(), usual)
+    let quality = of_session(&session, fitted.as_ref().ok(), usual)?;
+    Ok(AssessedRun { operator: session.manifest.operator, quality, fitted })
 }
 
 /// The checks of a session and its fit; none of it where it pressed nothing. `usual_noise` is that of the rig's daily check.

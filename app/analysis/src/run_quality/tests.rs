@@ -2,6 +2,7 @@
 
 use super::force::DROP_SECS;
 use super::*;
+use palpate_rheology::fit::FitOptions;
 
 fn recorded() -> Session {
     let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
@@ -122,4 +123,22 @@ fn what_went_wrong_has_its_own_check() {
     });
     let quiet = assess(&recorded(), Some(Volts(1e-4)));
     assert_eq!(check(&quiet, "noise").rank, QualityRank::Doubtful);
+}
+
+#[test]
+fn fast_relaxation_after_a_ramp_is_no_slip() {
+    // Half of 6 N relaxes with 0.1 s from the end of a ramp of 2 s: 1 N within 40 ms.
+    let sample = |k: u32| {
+        let t = 1e-3 * f64::from(k);
+        let force = if t < 2.0 { 3.0 * t } else { 3.0 + 3.0 * (-(t - 2.0) / 0.1).exp() };
+        FitSample {
+            t: palpate_model::units::Seconds(t),
+            depth: palpate_model::units::Depth(t.min(2.0)),
+            force: Newtons(force),
+            sigma: Newtons(1e-3),
+        }
+    };
+    let samples: Vec<FitSample> = (0..5000).map(sample).collect();
+    let found = force_drop(&samples, 0.0);
+    assert_eq!(found.rank, QualityRank::Good, "{found:?}");
 }

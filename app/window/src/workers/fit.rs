@@ -3,11 +3,10 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
-use palpate_analysis::analysed_session;
 use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
-use palpate_analysis::run_quality::{self, RunQuality, usual_noise};
-use palpate_analysis::source::{RecordStretch, SourceSelection, of_session};
+use palpate_analysis::run_quality::{RunQuality, assess_folder};
+use palpate_analysis::source::SourceSelection;
 use palpate_figures::figure::{Ink, SeriesShape};
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
@@ -112,16 +111,10 @@ fn has_ramp(run: &RunView) -> bool {
 }
 
 fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {
-    let opened = analysed_session::open(folder, None).map_err(|err| err.to_string())?;
-    let session = opened.edited.session;
     let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
-    let source = of_session(session.clone(), RecordStretch::RampHold, &opened.left_out_s);
-    let fitted = source.and_then(|source| recipe.fit_read(source));
-    let usual = usual_noise(&session, library);
-    let quality = run_quality::of_session(&session, fitted.as_ref().ok(), usual);
-    let quality = quality.map_err(|err| err.to_string())?;
-    let fit = fitted.map_err(|err| err.to_string()).and_then(exact_fit);
-    Ok(RunAnswer { operator: session.manifest.operator, quality, fit })
+    let found = assess_folder(folder, library, &recipe).map_err(|err| err.to_string())?;
+    let fit = found.fitted.map_err(|err| err.to_string()).and_then(exact_fit);
+    Ok(RunAnswer { operator: found.operator, quality: found.quality, fit })
 }
 
 fn exact_fit(fitted: SourceFit) -> Result<ExactFit, String> {

@@ -45,7 +45,8 @@ pub use report::{
 };
 pub use sample::{FitError, FitSample};
 pub use signal::{
-    ExpectedSignal, PressedSignal, Signal, SignalRecord, UnloadedMean, compliance_in_volts, zero_at,
+    ExpectedSignal, PressedSignal, Signal, SignalRecord, UnloadedMean, estimate_zero,
+    fit_compliance_to_signal,
 };
 pub use solve::{FitSolution, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{

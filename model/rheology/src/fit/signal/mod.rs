@@ -7,18 +7,18 @@
 //! Gaussian problem. The zero is eliminated record by record, so that what is left has the columns of any other
 //! record, and search, steps, sharing and profiles are the same.
 
+mod compliance;
 mod drift;
 mod expected;
 mod lag;
 mod pass;
-mod spring;
 mod zero;
 
+pub use compliance::{PressedSignal, estimate_zero, fit_compliance_to_signal};
 pub(super) use drift::{Drift, DriftSizes};
 pub use expected::ExpectedSignal;
 use palpate_model::calibration::{CalibrationCurve, HysteresisLoop};
 use palpate_model::units::{Newtons, Seconds, Volts};
-pub use spring::{PressedSignal, compliance_in_volts, zero_at};
 
 use super::sample::FitSample;
 use std::ops::Range;

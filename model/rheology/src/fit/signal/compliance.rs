@@ -25,7 +25,7 @@ const STEPS: usize = 4;
 
 /// The zero at times, found from the signal out of contact alone. `None` where there is too little of it.
 #[must_use]
-pub fn zero_at(unloaded: &[UnloadedMean], times: &[Seconds]) -> Option<Vec<Volts>> {
+pub fn estimate_zero(unloaded: &[UnloadedMean], times: &[Seconds]) -> Option<Vec<Volts>> {
     let all = || unloaded.iter().map(|one| one.t.0).chain(times.iter().map(|t| t.0));
     let (first, last) = (all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max));
     let drift = DriftSizes::of(unloaded, first, last)?.mean()?;
@@ -41,7 +41,7 @@ pub fn zero_at(unloaded: &[UnloadedMean], times: &[Seconds]) -> Option<Vec<Volts
 /// noise`. Samples and means are in the order of time, on one clock. `None` where too little of the signal is out of contact
 /// to know the zero, or where the signal does not tell compliance and surface apart.
 #[must_use]
-pub fn compliance_in_volts(
+pub fn fit_compliance_to_signal(
     start: &Compliance,
     samples: &[PressedSignal],
     unloaded: &[UnloadedMean],
