@@ -121,10 +121,10 @@ fn joint_answer(
         let source = FitSource { samples, ..FitSource::default() };
         Recording::of(format!("record {number}"), source, None)
     });
-    let records = Recordings { all: records.collect(), notes: Vec::new() };
+    let mut records = Recordings { all: records.collect(), notes: Vec::new() };
     let shared = shared.iter().map(String::as_str).collect();
     let request = JointFitRequest { options, shared, is_systematic: true, intervals };
-    let fitted = fit_together(&records, &request, |_, _| ()).map_err(refused)?;
+    let fitted = fit_together(&mut records, &request, |_, _| ()).map_err(refused)?;
     let details = fitted.details(&records);
     let report = serde_json::to_string(&fitted.object(options, &details)).map_err(refused)?;
     let pairs = records.all.iter().zip(&fitted.overlays);

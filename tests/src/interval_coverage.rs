@@ -204,7 +204,7 @@ pub fn draw(case: &CoverageCase) -> SeedDraws {
     }
     let options = FitOptions::default();
     let shared = if all.len() > 1 { vec!["body"] } else { Vec::new() };
-    let records = Recordings { all, notes: Vec::new() };
+    let mut records = Recordings { all, notes: Vec::new() };
     let borrowed = records.borrowed();
     let body = if shared.is_empty() { Vec::new() } else { options.body_names() };
     let force = fit_joint(&borrowed, &options, &body).expect("a fit");
@@ -214,7 +214,7 @@ pub fn draw(case: &CoverageCase) -> SeedDraws {
         is_systematic: true,
         intervals: IntervalRequest::default(),
     };
-    let signal = fit_together(&records, &request, |_, _| ()).expect("a fit");
+    let signal = fit_together(&mut records, &request, |_, _| ()).expect("a fit");
     let of = |report: &JointReport| draws_of(&report.records[0].report.parameters, &truth);
     let mut live = LiveFit::new(RampHold::default().depth);
     for sample in &records.all[0].samples {

@@ -236,7 +236,9 @@ impl ComplianceCorrections {
         if is_applied {
             let curve = source.calibration.as_ref().and_then(|one| one.curve().ok());
             let compliance = stored.document.compliance();
+            let depths = source.samples.iter().map(|sample| sample.depth).collect();
             correct_samples(&mut source.samples, &compliance, curve.as_ref());
+            source.raw = Some(RawDepths { depths, compliance });
             source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
             if let CorrectionChoice::InForce = self.choice {
@@ -345,6 +347,27 @@ fn correct_samples(
         .collect();
     for (sample, force) in samples.iter_mut().zip(bends) {
         sample.depth = compliance.correct(sample.depth, force, Newtons(0.0)).depth;
+    }
+}
+
+/// The depths of a record before they were corrected, and what corrects them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawDepths {
+    depths: Vec<Depth>,
+    compliance: Compliance,
+}
+
+impl RawDepths {
+    /// Corrects the depths by these forces, one for each sample, and tells by how much the most changed depth changes, in mm.
+    #[must_use]
+    pub fn correct_by(&self, forces: &[Newtons], samples: &mut [FitSample]) -> f64 {
+        let mut largest = 0.0f64;
+        for ((sample, raw), force) in samples.iter_mut().zip(&self.depths).zip(forces) {
+            let depth = self.compliance.correct(*raw, *force, Newtons(0.0)).depth;
+            largest = largest.max((depth.0 - sample.depth.0).abs());
+            sample.depth = depth;
+        }
+        largest
     }
 }
 

@@ -4,7 +4,7 @@
 //! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
 //! refused; a rejected session is left out with a note.
 
-use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
+use crate::compliance::{ComplianceCorrection, ComplianceCorrections, RawDepths};
 use crate::exports::remove_recovered_originals;
 use crate::fit::Origin;
 use crate::source::{self, FitSource, SourceError, SourceSelection};
@@ -183,6 +183,8 @@ pub struct Recording {
     pub calibration: Option<Calibration>,
     /// What the load cell reported, where it was recorded.
     pub signal: Option<Signal>,
+    /// Its depths before they were corrected for machine compliance; `None` where they were not.
+    pub raw: Option<RawDepths>,
 }
 
 impl Recording {
@@ -194,6 +196,7 @@ impl Recording {
             specimen: source.specimen,
             calibration: source.calibration,
             signal: source.signal,
+            raw: source.raw,
             compliance,
         }
     }

@@ -138,6 +138,7 @@ fn source(session: &Session) -> FitSource {
         specimen: None,
         rig: session.manifest.rig.as_ref().map(|rig| rig.name.clone()),
         calibration: None,
+        raw: None,
     }
 }
 

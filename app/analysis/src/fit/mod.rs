@@ -1,6 +1,7 @@
 //! From recordings on disk to fits: one, many each by itself, several together, or those of a lake.
 
 mod choice;
+mod depths;
 mod lake;
 pub(crate) mod last;
 mod together;
@@ -14,6 +15,7 @@ use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
 use crate::pool::{WorkEvent, WorkFailure, in_order};
 use crate::report::fit_json::{FitDetails, FitOverlay};
 use crate::source::{self, FitSource, SourceError, SourceSelection};
+use depths::{CorrectedRecord, settle};
 use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty};
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
@@ -145,8 +147,16 @@ impl SourceFit {
         options: &FitOptions,
         is_systematic: bool,
     ) -> Self {
-        let FitSource { samples, signal, calibration, start, offset, mut notes, .. } = source;
+        let FitSource { mut samples, signal, calibration, start, offset, mut notes, raw, .. } =
+            source;
         let watch = Stopwatch::start();
+        let corrected = CorrectedRecord { samples: &mut samples, raw: raw.as_ref() };
+        settle(&mut [corrected], |samples| {
+            let record =
+                SignalRecord { name: "the record", samples: samples[0], signal: signal.as_ref() };
+            let solution = FitSolution::fit_signals(&[record], options, &[])?;
+            Ok(vec![solution.report()])
+        });
         let record =
             SignalRecord { name: "the record", samples: &samples, signal: signal.as_ref() };
         let solution = FitSolution::fit_signals(&[record], options, &[]);

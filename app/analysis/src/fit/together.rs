@@ -1,5 +1,6 @@
 //! Several recordings fitted together, with some parameters the same in all.
 
+use super::depths::{CorrectedRecord, settle};
 use super::{FitIntervals, IntervalRequest, no_systematic};
 use crate::recordings::Recordings;
 use crate::report::fit_json::{FitDetails, FitOverlay, JointObject};
@@ -39,9 +40,9 @@ pub struct JointFit {
     pub notes: Vec<String>,
 }
 
-/// Fits recordings together. `progress` hears for which recording how many fits of the bootstrap are done.
+/// Fits recordings together, and corrects their depths by the modelled force where they were corrected. `progress` hears for which recording how many fits of the bootstrap are done.
 pub fn fit_together(
-    records: &Recordings,
+    records: &mut Recordings,
     request: &JointFitRequest<'_>,
     mut progress: impl FnMut(usize, usize),
 ) -> Result<JointFit, FitError> {
@@ -51,8 +52,9 @@ pub fn fit_together(
         name => vec![name],
     });
     let shared: Vec<&str> = names.collect();
-    let borrowed = records.borrowed();
     let watch = Stopwatch::start();
+    settle_together(records, request.options, &shared);
+    let borrowed = records.borrowed();
     let signals: Vec<SignalRecord<'_>> = records.signals();
     let fitted = FitSolution::fit_signals(&signals, request.options, &shared)?;
     let mut report = fitted.joint_report();
@@ -81,6 +83,24 @@ pub fn fit_together(
         notes,
         report,
     })
+}
+
+fn settle_together(records: &mut Recordings, options: &FitOptions, shared: &[&str]) {
+    let known: Vec<_> =
+        records.all.iter().map(|one| (one.name.clone(), one.signal.clone())).collect();
+    let corrected = records.all.iter_mut();
+    let corrected =
+        corrected.map(|one| CorrectedRecord { samples: &mut one.samples, raw: one.raw.as_ref() });
+    settle(&mut corrected.collect::<Vec<_>>(), |samples| {
+        let signals = known.iter().zip(samples).map(|((name, signal), samples)| SignalRecord {
+            name,
+            samples,
+            signal: signal.as_ref(),
+        });
+        let signals: Vec<SignalRecord<'_>> = signals.collect();
+        let report = FitSolution::fit_signals(&signals, options, shared)?.joint_report();
+        Ok(report.records.into_iter().map(|one| one.report).collect())
+    });
 }
 
 impl JointFit {

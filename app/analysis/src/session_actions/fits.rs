@@ -109,8 +109,8 @@ impl SessionFitRequest {
             let source = self.read(&one.session, one.analysis.as_deref())?;
             all.push(Recording::of(name, source, None));
         }
-        let records = Recordings { all, notes: Vec::new() };
-        self.joint(&records, &options, progress)
+        let mut records = Recordings { all, notes: Vec::new() };
+        self.joint(&mut records, &options, progress)
     }
 
     fn intervals(&self) -> IntervalRequest {
@@ -140,7 +140,7 @@ impl SessionFitRequest {
     /// The first of several recordings, fitted with the others as one body.
     fn joint(
         &self,
-        records: &Recordings,
+        records: &mut Recordings,
         options: &FitOptions,
         progress: &dyn Progress,
     ) -> Result<Value, String> {

@@ -15,6 +15,7 @@ use palpate_tables::import::{ColumnNames, MeasurementTable, read_table};
 use std::path::Path;
 
 use crate::analysed_session::{self, AnalysedSession};
+use crate::compliance::RawDepths;
 use crate::recordings::is_session;
 use palpate_protocols::engine::{Effect, Record};
 
@@ -37,6 +38,8 @@ pub struct FitSource {
     pub calibration: Option<Calibration>,
     /// What the load cell reported; `None` where it was not recorded or the zero was not seen.
     pub signal: Option<Signal>,
+    /// Depths before they were corrected for machine compliance; `None` where they were not.
+    pub raw: Option<RawDepths>,
 }
 
 /// Part of an indentation that is read.
@@ -166,7 +169,7 @@ pub fn of_session(
         ));
     }
     let rig = session.manifest.rig.map(|rig| rig.name);
-    Ok(FitSource { samples, start, offset, notes, specimen, rig, calibration, signal })
+    Ok(FitSource { samples, start, offset, notes, specimen, rig, calibration, signal, raw: None })
 }
 
 /// The samples of an imported session, its time from the first one.

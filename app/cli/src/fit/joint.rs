@@ -27,7 +27,7 @@ pub(super) fn run(
         corrections: &recipe.corrections,
         naming: RecordingNames::Path,
     };
-    let records = recordings::read(&found.paths, reading).map_err(sources_failure)?;
+    let mut records = recordings::read(&found.paths, reading).map_err(sources_failure)?;
     records.notes.iter().for_each(|note| output.note(note));
     let request = JointFitRequest {
         options: &recipe.options,
@@ -36,7 +36,7 @@ pub(super) fn run(
         intervals: intervals::wanted(args),
     };
     let bar = intervals::bar(args, output);
-    let fitted = fit_together(&records, &request, |_, done| intervals::show(&bar, done));
+    let fitted = fit_together(&mut records, &request, |_, done| intervals::show(&bar, done));
     drop(bar);
     let fitted = fitted.map_err(|err| match err {
         FitError::NotShareable { .. } | FitError::UnknownParameter { .. } => Failure::usage(err),
