@@ -9,6 +9,7 @@
 //! Start reading at [`units`], then [`rig`] for the words every crate shares.
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+pub mod assessment;
 pub mod calibration;
 pub mod estimate;
 pub mod linalg;

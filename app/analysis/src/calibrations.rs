@@ -3,6 +3,7 @@
 use crate::report::calibration::{CalibrationDetails, CalibrationEntry};
 use crate::report::calibration_plot::plots;
 use palpate_figures::figure::Plot;
+use palpate_model::assessment::QualityRank;
 use palpate_model::calibration::{Calibration, CalibrationUse};
 use palpate_runner::programme::calibration_from_session;
 use palpate_runner::wall_now;
@@ -78,10 +79,33 @@ pub fn read(
     }
 }
 
+/// The calibration that is kept: itself if its checks are good enough, and with the reason among its sources if
+/// somebody keeps it despite them.
+pub fn accepted(calibration: Calibration, despite: Option<&str>) -> Result<Calibration, String> {
+    let assessed = calibration.assess(None).map_err(|err| err.to_string())?;
+    let doubts = assessed.doubts().into_iter();
+    let bad: Vec<_> = doubts
+        .filter(|check| check.rank == QualityRank::Bad)
+        .map(|check| check.sentence.clone())
+        .collect();
+    match (bad.is_empty(), despite.map(str::trim).filter(|reason| !reason.is_empty())) {
+        (true, _) => Ok(calibration),
+        (false, Some(reason)) => Ok(Calibration {
+            source: format!("{}; kept despite its checks: {reason}", calibration.source),
+            ..calibration
+        }),
+        (false, None) => Err(format!(
+            "this calibration is not good enough to be kept: {}; to keep it all the same, give a reason with 'palpate calibration import --despite'",
+            bad.join("; ")
+        )),
+    }
+}
+
 /// Stores the calibration a session measured, in the place of the one in force for its rig; tells its id.
 pub fn store_calibration(library: &Path, session: &Path, name: &str) -> Result<String, String> {
     let session = Session::open(session).map_err(|err| err.to_string())?;
     let calibration = calibration_from_session(&session, name).map_err(|err| err.to_string())?;
+    let calibration = accepted(calibration, None)?;
     let shelf = CalibrationStore::open(library);
     let stored = match shelf.in_force(&calibration.rig) {
         Some(old) => supersede_document(library, &old.id, &calibration),

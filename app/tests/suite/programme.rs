@@ -2,7 +2,8 @@
 
 use crate::protocol::with_mine;
 use crate::support::{
-    assert_prints, assert_refused, json, palpate, split_words, stderr, stdout, succeeded, typed,
+    answer, assert_prints, assert_refused, json, palpate, split_words, stderr, stdout, succeeded,
+    typed,
 };
 use std::fs;
 
@@ -61,30 +62,32 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
 fn weights_read_on_the_rig_become_a_document() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let masses = r#"masses="340 g, 640 g, 840 g""#;
-    let weigh = [
-        "run",
-        "load-cell-calibration",
-        "--set",
-        masses,
-        "--set",
-        "repeats=1",
-        "--operator",
-        "Ada",
-        "--time-scale",
-        "max",
-        "--out",
-        "weights",
-    ];
-    // The shell would have taken the quotes away.
-    let weigh = weigh.map(|word| word.replace('"', ""));
-    let weigh: Vec<&str> = weigh.iter().map(String::as_str).collect();
-    succeeded(&palpate(at, &weigh));
-    let import = ["calibration", "import", "weights", "--name", "bench"];
-    succeeded(&palpate(at, &import));
-    let shown = palpate(at, &["calibration", "show", "bench"]);
+    let weigh = |masses: &[&str], out: &str| {
+        let common = split_words(
+            "run load-cell-calibration --set repeats=1 --operator Ada --time-scale max --out",
+        );
+        succeeded(&palpate(at, &[&common[..], &[out], masses].concat()));
+    };
+    weigh(&[], "weights");
+    let import = |session: &'static str| ["calibration", "import", session, "--name", session];
+    succeeded(&palpate(at, &import("weights")));
+    let shown = palpate(at, &["calibration", "show", "weights"]);
     succeeded(&shown);
     assert_prints(&shown, "840.0");
+
+    // Three weights do not tell the curve of this cell.
+    weigh(&["--set", "masses=340 g, 840 g"], "few");
+    let checked = json(&palpate(at, &["quality", "few", "--json"]));
+    let rank = |name: &str| {
+        let mut checks = checked["checks"].as_array().unwrap().iter();
+        checks.find(|one| one["name"] == name).unwrap()["rank"].clone()
+    };
+    assert_eq!((rank("curve"), rank("range")), ("bad".into(), "good".into()), "{checked}");
+    assert_refused(&palpate(at, &import("few")), 1, "more weights around that force");
+    let despite = [&import("few")[..], &["--despite", "only to look at", "--json"]].concat();
+    let kept = answer(&palpate(at, &despite));
+    let source = kept["document"]["source"].as_str().unwrap();
+    assert!(source.ends_with("kept despite its checks: only to look at"), "{source}");
 }
 
 const ASKING: &str = r#"palpate-programme = 1

@@ -2,6 +2,7 @@
 //!
 //! Start at [`Calibration`], the document. Its [`Calibration::curve`] turns volts into newtons.
 
+mod assessment;
 mod choice;
 mod curve;
 mod document;

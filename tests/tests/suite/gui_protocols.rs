@@ -156,24 +156,13 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
     assert_eq!(run.plan_name, "own");
 }
 
-#[test]
-fn a_calibration_is_measured_by_prompts_kept_and_used() {
-    let mut flow = WindowFlow::open(TimeScale::Factor(30.0));
-    flow.click("Calibration");
-    flow.wait_for_words("(built in)");
-    flow.window.check_accessibility();
-    assert!(!flow.is_enabled("Use calibration  F6") && flow.says("it is in use"));
-    assert!(!flow.is_enabled("Save calibration of last run"));
-    flow.click("Measure...");
-    for (name, text) in
-        [("operator", "Ada"), ("masses", "240, 540 g"), ("heaviest", "1040"), ("repeats", "1")]
-    {
-        flow.type_into(name, text);
-    }
+/// Answers so many questions for weights, to the end of the run.
+fn weigh(flow: &mut WindowFlow, rounds: usize) {
     flow.click("Start  F5");
-    // None, two up, the heaviest, two down, none.
-    for round in 0..7 {
-        wait_for(&mut flow, "a question or the end", |run| {
+    // The run before stays on the screen until this one has its folder.
+    wait_for(flow, "the new run", |run| run.outcome.is_none());
+    for round in 0..rounds {
+        wait_for(flow, "a question or the end", |run| {
             run.prompt.is_some() || run.outcome.is_some()
         });
         assert!(flow.says("State: YOUR TURN"), "round {round}");
@@ -189,11 +178,31 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
             flow.window.run_steps(2);
         }
         // On a busy machine the next question may be there before a frame shows the reading.
-        wait_for(&mut flow, "the reading", |run| question(run) != asked);
+        wait_for(flow, "the reading", |run| question(run) != asked);
     }
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
-    flow.window.run_steps(2);
+}
+
+#[test]
+fn a_calibration_is_measured_by_prompts_judged_kept_and_used() {
+    let mut flow = WindowFlow::open(TimeScale::Factor(30.0));
+    flow.click("Calibration");
+    flow.wait_for_words("(built in)");
+    flow.window.check_accessibility();
+    assert!(!flow.is_enabled("Use calibration  F6") && flow.says("it is in use"));
+    assert!(!flow.is_enabled("Save calibration of last run"));
+    flow.click("Measure...");
+    for (name, text) in [("operator", "Ada"), ("masses", "540 g"), ("repeats", "1")] {
+        flow.type_into(name, text);
+    }
+    // None, one up, the heaviest, one down, none.
+    weigh(&mut flow, 5);
+    flow.wait_for_words("too few weights to tell how far the curve is off");
+    assert!(!flow.is_enabled("Save this calibration") && flow.says("a check below is bad"));
+    flow.type_into("masses", "140, 240, 340, 440, 540, 640, 740, 840, 940 g");
+    weigh(&mut flow, 21);
+    flow.wait_for_words("between its 10 weights");
     flow.click("Save this calibration");
     flow.wait_for_words("saved as ");
     flow.window.run_steps(2);

@@ -1,6 +1,6 @@
 //! What the course of the force says: a slip or a tear, and a base under the tissue.
 
-use super::{QualityCheck, QualityRank, rank_of};
+use palpate_model::assessment::{QualityCheck, QualityRank, rank_of};
 use palpate_rheology::fit::FitSample;
 
 /// Forces are averaged over so long before a drop is looked for, in s: a slip takes a few hundredths of a second.

@@ -2,6 +2,7 @@
 //!
 //! They advise; whether a session is valid, suspect or rejected is said by a person.
 
+mod calibration;
 mod force;
 
 use crate::analysed_session;
@@ -10,6 +11,7 @@ use crate::fidelity;
 use crate::fit::{FitRecipe, SourceFit};
 use crate::progress::NoProgress;
 use crate::source::{self, RecordStretch, SourceError, decisions, is_saturated, noise_of, records};
+use palpate_model::assessment::{Assessment, QualityCheck, QualityRank, rank_of};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Newtons, Volts};
 use palpate_protocols::engine::{EndingKind, Record};
@@ -17,88 +19,10 @@ use palpate_rheology::fit::{FitSample, UnloadedMean};
 use palpate_runner::base::FoundBase;
 use palpate_sessions::checks::read_checks;
 use palpate_sessions::{SampleRow, Session};
-use serde::Serialize;
 use std::path::Path;
 
+use calibration::calibration_checks;
 use force::{base, force_drop};
-
-palpate_model::named! {
-    /// How a run stands in one respect, from best to worst.
-    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-    pub enum QualityRank {
-        /// What the check needs was not recorded.
-        NotJudged = "not judged",
-        Good = "good",
-        /// Worth a look before the result is used.
-        Doubtful = "doubtful",
-        Bad = "bad",
-    }
-}
-
-impl Serialize for QualityRank {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
-
-/// One check of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct QualityCheck {
-    pub name: &'static str,
-    pub rank: QualityRank,
-    pub sentence: String,
-    /// Where it shows, from and to in s of session time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub at_s: Option<[f64; 2]>,
-}
-
-impl QualityCheck {
-    fn new(name: &'static str, rank: QualityRank, sentence: impl Into<String>) -> Self {
-        Self { name, rank, sentence: sentence.into(), at_s: None }
-    }
-
-    fn at(mut self, from: f64, to: f64) -> Self {
-        self.at_s = Some([from, to]);
-        self
-    }
-}
-
-/// All checks of a run, in the order of the run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct RunQuality {
-    pub checks: Vec<QualityCheck>,
-}
-
-impl RunQuality {
-    /// The worst rank of all checks.
-    #[must_use]
-    pub fn rank(&self) -> QualityRank {
-        self.checks.iter().map(|one| one.rank).max().unwrap_or(QualityRank::NotJudged)
-    }
-
-    /// The worst rank, then a line for each check.
-    #[must_use]
-    pub fn text(&self) -> String {
-        let lines = self.checks.iter().map(|one| {
-            let place = one.at_s.map_or_else(String::new, |[from, to]| match to - from < 0.1 {
-                true => format!(" (at {from:.2} s)"),
-                false => format!(" (from {from:.2} to {to:.2} s)"),
-            });
-            format!("{:<11} {:<10}  {}{place}", one.name, one.rank.name(), one.sentence)
-        });
-        let first = format!("{:<11} {}", "quality", self.rank());
-        std::iter::once(first).chain(lines).collect::<Vec<_>>().join("\n")
-    }
-
-    /// The checks that somebody should look at, the worst first.
-    #[must_use]
-    pub fn doubts(&self) -> Vec<&QualityCheck> {
-        let is_doubt = |one: &&QualityCheck| one.rank >= QualityRank::Doubtful;
-        let mut doubts: Vec<&QualityCheck> = self.checks.iter().filter(is_doubt).collect();
-        doubts.sort_by_key(|one| std::cmp::Reverse(one.rank));
-        doubts
-    }
-}
 
 /// The search for contact presses tissue with no more than this, in N; more has preconditioned it.
 const SEARCH_FORCE_MAX_N: f64 = 0.5;
@@ -118,7 +42,7 @@ const MISSING_SHARE: f64 = 0.001;
 #[derive(Debug)]
 pub struct AssessedRun {
     pub operator: String,
-    pub quality: RunQuality,
+    pub quality: Assessment,
     pub fitted: Result<SourceFit, SourceError>,
 }
 
@@ -142,7 +66,7 @@ pub fn of_session(
     session: &Session,
     fitted: Option<&SourceFit>,
     usual_noise: Option<Volts>,
-) -> Result<RunQuality, SourceError> {
+) -> Result<Assessment, SourceError> {
     let found = fidelity::of_session(session)?;
     let decisions = decisions(session)?;
     let records: Vec<(usize, &Record)> =
@@ -161,7 +85,8 @@ pub fn of_session(
         checks.push(drift(fitted));
         checks.push(lack_of_fit(fitted));
     }
-    Ok(RunQuality { checks })
+    checks.extend(calibration_checks(session));
+    Ok(Assessment { checks })
 }
 
 /// The noise of the empty load cell in the last daily check of a session's rig, where the library has that check's session.
@@ -208,15 +133,6 @@ fn noise(found: Option<Volts>, usual: Option<Volts>) -> QualityCheck {
     };
     let usual = 1e3 * usual.0;
     of(rank, format!("the noise is {mv:.2} mV, and {usual:.2} mV in the last daily check{advice}"))
-}
-
-/// Good up to one limit, bad beyond the other.
-fn rank_of(value: f64, doubtful: f64, bad: f64) -> QualityRank {
-    match value {
-        value if value > bad => QualityRank::Bad,
-        value if value > doubtful => QualityRank::Doubtful,
-        _ => QualityRank::Good,
-    }
 }
 
 fn missing(samples: u64, missing: u64) -> QualityCheck {

@@ -9,13 +9,13 @@ fn recorded() -> Session {
     Session::open(&sessions.join("ramp-hold-lab")).unwrap()
 }
 
-fn assess(session: &Session, usual_noise: Option<Volts>) -> RunQuality {
+fn assess(session: &Session, usual_noise: Option<Volts>) -> Assessment {
     let source = source::of_session(session.clone(), RecordStretch::RampHold, &[]).unwrap();
     let fitted = SourceFit::of(source, &FitOptions::default());
     of_session(session, Some(&fitted), usual_noise).unwrap()
 }
 
-fn check(quality: &RunQuality, name: &str) -> QualityCheck {
+fn check(quality: &Assessment, name: &str) -> QualityCheck {
     let found = quality.checks.iter().find(|one| one.name == name);
     found.unwrap_or_else(|| panic!("{name}: {quality:?}")).clone()
 }

@@ -6,6 +6,7 @@ use super::super::output::Output;
 use super::source::{CalibrationSource, failure};
 use chrono::{DateTime, SecondsFormat, Utc};
 use clap::Args;
+use palpate_analysis::calibrations::accepted;
 use palpate_model::calibration::{Calibration, CurveKind};
 use palpate_model::units::Volts;
 use palpate_runner::programme::calibration_from_session;
@@ -59,6 +60,9 @@ pub struct CalibrationImportArgs {
     /// Curve: best (predicts weights left out best), monotone, segments=N or polynomial=N; best for a table
     #[arg(long, value_name = "KIND")]
     curve: Option<CurveChoice>,
+    /// Reason to keep a calibration whose checks are bad; it is added to the source
+    #[arg(long, value_name = "REASON")]
+    despite: Option<String>,
     /// Source in words: who measured it on what
     #[arg(long, value_name = "WORDS")]
     source: Option<String>,
@@ -167,7 +171,7 @@ fn document(args: &CalibrationImportArgs) -> Result<Calibration, Failure> {
     if let Some(choice) = args.curve.or(default) {
         new.curve = choose_curve(&new, choice)?;
     }
-    Ok(new)
+    accepted(new, args.despite.as_deref()).map_err(Failure::failed)
 }
 
 fn choose_curve(calibration: &Calibration, choice: CurveChoice) -> Result<CurveKind, Failure> {

@@ -5,8 +5,8 @@ use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
 use eframe::egui::{RichText, Ui, vec2};
 use palpate_analysis::report::live::{LiveCycle, RunPlots, set_course};
-use palpate_analysis::run_quality::{QualityCheck, RunQuality};
 use palpate_figures::figure::{Ink, PlotLevel};
+use palpate_model::assessment::{Assessment, QualityCheck};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::Newtons;
@@ -53,8 +53,8 @@ impl PlotCache {
     }
 
     /// Marks where somebody should look.
-    pub fn mark(&mut self, quality: Option<&RunQuality>) {
-        let doubts = quality.map(RunQuality::doubts).unwrap_or_default();
+    pub fn mark(&mut self, quality: Option<&Assessment>) {
+        let doubts = quality.map(Assessment::doubts).unwrap_or_default();
         let place = |check: &QualityCheck| {
             let [at, _] = check.at_s?;
             Some(PlotLevel { name: check.name.to_owned(), at, ink: Ink::Limit, is_dashed: true })

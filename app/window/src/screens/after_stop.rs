@@ -3,18 +3,28 @@
 use super::calibration::calibration_session;
 use crate::command::{Commands, UiCommand};
 use crate::shell::activity::is_planned;
-use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, section_ui, tokens_of};
+use crate::widgets::{
+    alarm_ui, placeholder_ui, quiet_ui, reason_button, require, section_ui, tokens_of,
+};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
+use palpate_model::assessment::{Assessment, QualityRank};
 use palpate_protocols::engine::RunOutcome;
 use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
-pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+pub fn after_stop_ui(
+    ui: &mut Ui,
+    run: &RunView,
+    quality: Option<&Assessment>,
+    commands: &mut Commands,
+) {
     if let Some(outcome) = &run.outcome {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
-        if calibration_session(Some(run)).is_ok() && ui.button("Save this calibration").clicked() {
+        if calibration_session(Some(run)).is_ok()
+            && reason_button(ui, "Save this calibration", vec2(190.0, 28.0), &keepable(quality))
+        {
             commands.push(UiCommand::KeepCalibration);
         }
     } else if let Some(ending) = &run.holding {
@@ -22,6 +32,12 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
         outcome_ui(ui, ending);
         choices_ui(ui, run, commands);
     }
+}
+
+/// A calibration is judged before it can be kept.
+fn keepable(quality: Option<&Assessment>) -> Result<(), String> {
+    let quality = quality.ok_or("the calibration is being checked")?;
+    require(quality.rank() != QualityRank::Bad, "a check below is bad; measure again")
 }
 
 /// The two ways on, with the reason if one of them is closed.

@@ -2,9 +2,9 @@
 
 use crate::widgets::{GLYPH_RADIUS, GLYPH_WIDTH, Glyph, glyph_at, section_ui, tokens_of};
 use eframe::egui::{Align, CollapsingHeader, Label, Layout, RichText, Sense, Ui, vec2};
-use palpate_analysis::run_quality::{QualityCheck, QualityRank, RunQuality};
+use palpate_model::assessment::{Assessment, QualityCheck, QualityRank};
 
-pub fn quality_ui(ui: &mut Ui, quality: &RunQuality) {
+pub fn quality_ui(ui: &mut Ui, quality: &Assessment) {
     section_ui(ui, "Quality");
     let doubts = quality.doubts();
     doubts.iter().for_each(|check| check_ui(ui, check));

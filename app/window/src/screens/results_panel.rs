@@ -9,7 +9,7 @@ use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, sec
 use crate::workers::fit::Refit;
 use eframe::egui::Ui;
 use palpate_analysis::report::live::LiveCycle;
-use palpate_analysis::run_quality::RunQuality;
+use palpate_model::assessment::Assessment;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, RunnerSnapshot};
 
@@ -20,14 +20,14 @@ pub fn results_ui(
     ui: &mut Ui,
     snapshot: &RunnerSnapshot,
     refit: Refit<'_>,
-    quality: Option<&RunQuality>,
+    quality: Option<&Assessment>,
     cycles: &[LiveCycle],
     commands: &mut Commands,
     verdict_ui: impl FnOnce(&mut Ui, &mut Commands),
 ) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {
-        after_stop_ui(ui, run, commands);
+        after_stop_ui(ui, run, quality, commands);
     }
     if let Some(quality) = quality {
         quality_ui(ui, quality);

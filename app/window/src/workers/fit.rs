@@ -5,9 +5,10 @@ use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
 use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
-use palpate_analysis::run_quality::{RunQuality, assess_folder};
+use palpate_analysis::run_quality::assess_folder;
 use palpate_analysis::source::SourceSelection;
 use palpate_figures::figure::{Ink, SeriesShape};
+use palpate_model::assessment::Assessment;
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::RunView;
@@ -29,7 +30,7 @@ pub struct ExactFit {
 /// What becomes of a run that has ended.
 struct RunAnswer {
     operator: String,
-    quality: RunQuality,
+    quality: Assessment,
     fit: Result<ExactFit, String>,
 }
 
@@ -45,7 +46,7 @@ pub enum Refit<'a> {
     Refused(&'a str),
 }
 
-/// Fits every run exactly when it has ended.
+/// Checks every run when it has ended, and fits it exactly where it pressed.
 #[derive(Default)]
 pub struct Refitter {
     answer: BackgroundTask<RunAnswer>,
@@ -57,7 +58,7 @@ impl Refitter {
     /// Fetches an answer, and starts when a run has ended. `library` has the daily checks of the rig.
     pub fn update(&mut self, ctx: &Context, run: Option<&RunView>, library: Option<&PathBuf>) {
         self.answer.poll();
-        let ended = run.filter(|run| run.outcome.is_some() && has_ramp(run));
+        let ended = run.filter(|run| run.outcome.is_some() && (has_ramp(run) || has_weighed(run)));
         let folder = ended.map(|run| &run.folder);
         if self.answer.is_busy() || self.session.as_ref() == folder {
             return;
@@ -78,7 +79,7 @@ impl Refitter {
     /// How far the fit of this run is.
     pub fn of(&self, run: Option<&RunView>) -> Refit<'_> {
         match (self.answer.state(), self.answer.answer()) {
-            _ if !self.is_of(run) => Refit::NotYet,
+            _ if !self.is_of(run) || !run.is_some_and(has_ramp) => Refit::NotYet,
             (Some(state), _) => Refit::Busy(state.seconds),
             (None, None) => Refit::Busy(0.0),
             (None, Some(Ok(RunAnswer { fit: Ok(exact), .. }))) => Refit::Done(exact),
@@ -93,7 +94,7 @@ impl Refitter {
     }
 
     /// The checks of this run, once they are made.
-    pub fn quality(&self, run: Option<&RunView>) -> Option<&RunQuality> {
+    pub fn quality(&self, run: Option<&RunView>) -> Option<&Assessment> {
         self.answer_of(run).map(|answer| &answer.quality)
     }
 
@@ -108,6 +109,11 @@ impl Refitter {
 /// Whether a run indented anything: nothing else can be fitted.
 fn has_ramp(run: &RunView) -> bool {
     run.phases.iter().any(|(_, phase)| *phase == Phase::Ramp)
+}
+
+/// Whether a run weighed anything: it may have measured a calibration.
+fn has_weighed(run: &RunView) -> bool {
+    run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh)
 }
 
 fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {

@@ -9,6 +9,7 @@ use super::progress::{
 use crate::{
     AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, StartError, wall_now,
 };
+use palpate_model::assessment::QualityRank;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
@@ -75,6 +76,10 @@ pub enum ProgrammeRunError {
     Ended { task: String, repeat: u32, ending: String, reason: String },
     #[error("task '{task}': {source}")]
     Calibrating { task: String, source: CalibrationSessionError },
+    #[error(
+        "task '{task}' measured a calibration that is not good enough: {reason}; change its weights and start the programme in a new folder"
+    )]
+    PoorCalibration { task: String, reason: String },
     #[error(transparent)]
     Session(#[from] ReadError),
     #[error(
@@ -300,6 +305,14 @@ impl ProgrammeRun<'_> {
         let session = Session::open(folder)?;
         let calibration = calibration_from_session(&session, &task.name)
             .map_err(|source| ProgrammeRunError::Calibrating { task: task.name.clone(), source })?;
+        let assessed = calibration.assess(None).map_err(|err| ProgrammeRunError::Calibrating {
+            task: task.name.clone(),
+            source: err.into(),
+        })?;
+        if let Some(check) = assessed.worst().filter(|one| one.rank == QualityRank::Bad) {
+            let (task, reason) = (task.name.clone(), check.sentence.clone());
+            return Err(ProgrammeRunError::PoorCalibration { task, reason });
+        }
         (self.tell)(ProgrammeEvent::Calibrated(&calibration));
         self.laboratory.calibration = calibration;
         Ok(())
