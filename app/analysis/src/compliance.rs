@@ -4,18 +4,19 @@
 
 use crate::analysed_session::time_between;
 use crate::source::{
-    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, records, trusted_samples,
-    unloaded_off_surface,
+    FitSource, SourceError, TouchPoint, curve_of, decisions, is_saturated, noise_of, records,
+    trusted_samples, unloaded_off_surface,
 };
 use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
+use palpate_model::signal::{ContactSearchPoint, fit_touch};
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::FindBase;
 use palpate_rheology::fit::{
-    FitSample, PressedSignal, UnloadedMean, estimate_zero, fit_compliance_to_signal,
+    FitSample, PressedSignal, Signal, UnloadedMean, estimate_zero, fit_compliance_to_signal,
 };
 use palpate_sessions::compliances::{ComplianceStore, StoredCompliance};
 use palpate_sessions::{LibraryError, SampleRow, Session};
@@ -239,6 +240,9 @@ impl ComplianceCorrections {
             let depths = source.samples.iter().map(|sample| sample.depth).collect();
             correct_samples(&mut source.samples, &compliance, curve.as_ref());
             source.raw = Some(RawDepths { depths, compliance });
+            if let Some(signal) = &mut source.signal {
+                correct_contact(signal, &source.touches, &compliance);
+            }
             source.notes.extend(correction.doubt.clone());
             // One that cannot be read might be the one in force.
             if let CorrectionChoice::InForce = self.choice {
@@ -347,6 +351,24 @@ fn correct_samples(
         .collect();
     for (sample, force) in samples.iter_mut().zip(bends) {
         sample.depth = compliance.correct(sample.depth, force, Newtons(0.0)).depth;
+    }
+}
+
+/// Moves the contact position to where the touches find it once the rig no longer gives way: the search took every depth for
+/// the probe's own. Both are fits of the same points, so their difference has neither noise nor drift. Touches that are not
+/// known leave it.
+fn correct_contact(signal: &mut Signal, touches: &[TouchPoint], compliance: &Compliance) {
+    let raw: Vec<ContactSearchPoint> = touches.iter().map(|one| one.fitted).collect();
+    let corrected = touches.iter().map(|one| {
+        let depth = Depth(one.fitted.position.0);
+        let depth = compliance.correct(depth, one.force, Newtons(0.0)).depth;
+        ContactSearchPoint { position: Position(depth.0), ..one.fitted }
+    });
+    let corrected: Vec<ContactSearchPoint> = corrected.collect();
+    if let (Ok(raw), Ok(corrected)) = (fit_touch(&raw), fit_touch(&corrected)) {
+        let (raw, corrected) = (raw.contact, corrected.contact);
+        signal.contact_shift_mm = corrected.position.distance_from(raw.position);
+        signal.contact_error_mm = corrected.std_error_mm;
     }
 }
 

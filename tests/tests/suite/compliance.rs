@@ -139,6 +139,7 @@ fn source(session: &Session) -> FitSource {
         rig: session.manifest.rig.as_ref().map(|rig| rig.name.clone()),
         calibration: None,
         raw: None,
+        touches: Vec::new(),
     }
 }
 

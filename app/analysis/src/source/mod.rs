@@ -2,9 +2,11 @@
 
 mod error;
 mod signal;
+mod touches;
 
 pub use error::SourceError;
 pub(crate) use signal::unloaded_off_surface;
+pub use touches::TouchPoint;
 
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::rig::Phase;
@@ -40,6 +42,8 @@ pub struct FitSource {
     pub signal: Option<Signal>,
     /// Depths before they were corrected for machine compliance; `None` where they were not.
     pub raw: Option<RawDepths>,
+    /// The touches that found the contact position; empty where they are not known.
+    pub touches: Vec<TouchPoint>,
 }
 
 /// Part of an indentation that is read.
@@ -156,7 +160,7 @@ pub fn of_session(
         return Ok(FitSource { samples, specimen, notes: session.notes, ..FitSource::default() });
     }
     let (rows, mut samples) = fitted_rows(&session, stretch)?;
-    let signal = signal::of_session(&session, &rows, left_out_s)?;
+    let (signal, touches) = signal::of_session(&session, &rows, left_out_s)?.unzip();
     let offset = since_first(&session, stretch);
     leave_out(left_out_s, offset, &mut samples);
     let start = start_of(&session);
@@ -169,7 +173,18 @@ pub fn of_session(
         ));
     }
     let rig = session.manifest.rig.map(|rig| rig.name);
-    Ok(FitSource { samples, start, offset, notes, specimen, rig, calibration, signal, raw: None })
+    Ok(FitSource {
+        samples,
+        start,
+        offset,
+        notes,
+        specimen,
+        rig,
+        calibration,
+        signal,
+        raw: None,
+        touches: touches.unwrap_or_default(),
+    })
 }
 
 /// The samples of an imported session, its time from the first one.

@@ -2,7 +2,7 @@
 
 use crate::analysed_session;
 
-use super::{SourceError, calibration_of, curve_of, decisions, records};
+use super::{SourceError, TouchPoint, calibration_of, curve_of, decisions, records, touches};
 use palpate_model::calibration::HysteresisLoop;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Position, Seconds, Volts};
@@ -19,13 +19,13 @@ const MEAN_SECS: f64 = 0.25;
 const AROUND_SECS: f64 = 120.0;
 const AROUND_LENGTHS: f64 = 2.0;
 
-/// The signal at these rows of a session. Neither does it count out of contact in the intervals left out, in s since the
+/// The signal at these rows of a session, and the touches that found its contact position. Neither does it count out of contact in the intervals left out, in s since the
 /// session's first sample. `None` where a tare or a contact position is missing before them.
 pub(super) fn of_session(
     session: &Session,
     rows: &[usize],
     left_out_s: &[[f64; 2]],
-) -> Result<Option<Signal>, SourceError> {
+) -> Result<Option<(Signal, Vec<TouchPoint>)>, SourceError> {
     let (Some(&first), Some(&last)) = (rows.first(), rows.last()) else { return Ok(None) };
     let volts: Option<Vec<f64>> = rows.iter().map(|&row| session.rows[row].volts).collect();
     let decisions = decisions(session)?;
@@ -48,14 +48,16 @@ pub(super) fn of_session(
     let unloaded = unloaded.filter(|row| span.is_unloaded(row) && !is_left_out(row));
     let unloaded = unloaded.filter_map(|row| Some((at(row), row.volts?)));
     let near = unloaded.filter(|(t, _)| (-around..=length + around).contains(t));
-    Ok(Some(Signal {
+    let signal = Signal {
         volts,
         unloaded: means(near),
         curve: curve_of(session)?,
         hysteresis: HysteresisLoop::of(&calibration_of(session)?),
         contact_error_mm: span.contact_error_mm,
+        contact_shift_mm: 0.0,
         search_secs: span.search_secs(session),
-    }))
+    };
+    Ok(Some((signal, touches::of_search(session, span.search.clone()))))
 }
 
 /// The signal out of contact around presses onto a surface that was found after so many samples; times count from the session's

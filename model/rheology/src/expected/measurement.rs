@@ -143,6 +143,7 @@ mod tests {
             unloaded,
             curve,
             hysteresis: None,
+            contact_shift_mm: 0.0,
             contact_error_mm: 1e-3,
             search_secs: 20.0,
         };

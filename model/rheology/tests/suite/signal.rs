@@ -58,6 +58,7 @@ fn record_read_with(seed: u64, document: &Calibration) -> (Vec<FitSample>, Signa
             unloaded,
             curve,
             hysteresis: None,
+            contact_shift_mm: 0.0,
             contact_error_mm: 1e-3,
             search_secs: 20.0,
         },

@@ -47,6 +47,8 @@ pub struct Signal {
     pub curve: CalibrationCurve,
     /// How far the load cell lags behind its force; `None` where its calibration does not tell.
     pub hysteresis: Option<HysteresisLoop>,
+    /// Where the contact position is now known to lie, in mm from where depths count from.
+    pub contact_shift_mm: f64,
     /// Standard uncertainty in mm of the contact position, from which depths count, if the zero did nothing but
     /// drift steadily while it was searched.
     pub contact_error_mm: f64,
@@ -111,7 +113,7 @@ impl<'a> SignalTerm<'a> {
             sizes,
             drift,
             contact_error_mm: contact_mm,
-            contact_mm: contact_mm.unwrap_or(0.0),
+            contact_mm: contact_mm.unwrap_or(0.0) + signal.contact_shift_mm,
         };
         whole.take(drift, record.samples);
         (signal.volts.len() == record.samples.len()).then_some(whole)
