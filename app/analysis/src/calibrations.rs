@@ -4,11 +4,12 @@ use crate::report::calibration::{CalibrationDetails, CalibrationEntry};
 use crate::report::calibration_plot::plots;
 use palpate_figures::figure::Plot;
 use palpate_model::assessment::QualityRank;
-use palpate_model::calibration::{Calibration, CalibrationUse};
+use palpate_model::calibration::{Calibration, CalibrationError, CalibrationUse};
 use palpate_runner::programme::calibration_from_session;
 use palpate_runner::wall_now;
 use palpate_sessions::{CalibrationStore, Session, age_days, save_document, supersede_document};
 use std::path::Path;
+use thiserror::Error;
 
 /// Calibrations of the library with their assessment, and the one just stored.
 pub struct CalibrationOverview {
@@ -79,25 +80,35 @@ pub fn read(
     }
 }
 
-/// The calibration that is kept: itself if its checks are good enough, and with the reason among its sources if
-/// somebody keeps it despite them.
-pub fn accepted(calibration: Calibration, despite: Option<&str>) -> Result<Calibration, String> {
-    let assessed = calibration.assess(None).map_err(|err| err.to_string())?;
-    let doubts = assessed.doubts().into_iter();
-    let bad: Vec<_> = doubts
-        .filter(|check| check.rank == QualityRank::Bad)
-        .map(|check| check.sentence.clone())
-        .collect();
+/// A calibration cannot be kept.
+#[derive(Debug, Error)]
+pub enum UnacceptedCalibration {
+    #[error(transparent)]
+    Unreadable(#[from] CalibrationError),
+    #[error(
+        "this calibration is not good enough to be kept: {}; to keep it all the same, give a reason with 'palpate calibration import --despite'",
+        .0.join("; ")
+    )]
+    Bad(Vec<String>),
+}
+
+/// The calibration that is kept: itself if no check of it is bad, and with the reason among its sources if somebody keeps it
+/// despite its checks.
+pub fn accepted(
+    calibration: Calibration,
+    despite: Option<&str>,
+) -> Result<Calibration, UnacceptedCalibration> {
+    calibration.check_rise()?;
+    let assessed = calibration.assess(None)?;
+    let bad = assessed.checks.iter().filter(|check| check.rank == QualityRank::Bad);
+    let bad: Vec<String> = bad.map(|check| check.sentence.clone()).collect();
     match (bad.is_empty(), despite.map(str::trim).filter(|reason| !reason.is_empty())) {
         (true, _) => Ok(calibration),
-        (false, Some(reason)) => Ok(Calibration {
-            source: format!("{}; kept despite its checks: {reason}", calibration.source),
-            ..calibration
-        }),
-        (false, None) => Err(format!(
-            "this calibration is not good enough to be kept: {}; to keep it all the same, give a reason with 'palpate calibration import --despite'",
-            bad.join("; ")
-        )),
+        (false, Some(reason)) => {
+            let source = format!("{}; kept despite its checks: {reason}", calibration.source);
+            Ok(Calibration { source, ..calibration })
+        }
+        (false, None) => Err(UnacceptedCalibration::Bad(bad)),
     }
 }
 
@@ -105,7 +116,7 @@ pub fn accepted(calibration: Calibration, despite: Option<&str>) -> Result<Calib
 pub fn store_calibration(library: &Path, session: &Path, name: &str) -> Result<String, String> {
     let session = Session::open(session).map_err(|err| err.to_string())?;
     let calibration = calibration_from_session(&session, name).map_err(|err| err.to_string())?;
-    let calibration = accepted(calibration, None)?;
+    let calibration = accepted(calibration, None).map_err(|err| err.to_string())?;
     let shelf = CalibrationStore::open(library);
     let stored = match shelf.in_force(&calibration.rig) {
         Some(old) => supersede_document(library, &old.id, &calibration),

@@ -159,10 +159,12 @@ fn a_table_is_read_whole_or_refused_and_a_falling_signal_is_none() {
         assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
     }
     assert!(!at.join("library/calibrations").exists());
-    let read = import("0,\"1,280\"\n140,\"1,600\"\n240,\"2,730\"\n340,\"3,78\"\n");
+    let read = import(
+        "0,\"1,280\"\n140,\"1,600\"\n240,\"1,830\"\n340,\"2,06\"\n440,\"2,29\"\n540,\"2,52\"\n",
+    );
     succeeded(&read);
     let read = json(&read);
     let points = read["quality"]["points"].as_array().unwrap();
     let volts: Vec<f64> = points.iter().map(|one| one["signal_v"].as_f64().unwrap()).collect();
-    assert_eq!(volts, [1.28, 1.6, 2.73, 3.78]);
+    assert_eq!(volts, [1.28, 1.6, 1.83, 2.06, 2.29, 2.52]);
 }

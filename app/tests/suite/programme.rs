@@ -82,8 +82,8 @@ fn weights_read_on_the_rig_become_a_document() {
         let mut checks = checked["checks"].as_array().unwrap().iter();
         checks.find(|one| one["name"] == name).unwrap()["rank"].clone()
     };
-    assert_eq!((rank("curve"), rank("range")), ("bad".into(), "good".into()), "{checked}");
-    assert_refused(&palpate(at, &import("few")), 1, "more weights around that force");
+    assert_eq!((rank("weights"), rank("range")), ("bad".into(), "good".into()), "{checked}");
+    assert_refused(&palpate(at, &import("few")), 1, "too few to tell the curve");
     let despite = [&import("few")[..], &["--despite", "only to look at", "--json"]].concat();
     let kept = answer(&palpate(at, &despite));
     let source = kept["document"]["source"].as_str().unwrap();

@@ -13,6 +13,11 @@ const CURVE_SHARE: f64 = 0.01;
 /// Beyond this the coverage interval of a force (twice its standard uncertainty) is a tenth of the range: that is no
 /// measurement. The nine weights of the thesis leave 3.5 % in the flat stretch of its cell, two weights 14 %.
 const CURVE_SHARE_MAX: f64 = 0.05;
+/// Fewer weights tell no curve: ASTM E4 (10.2) verifies a range of forces with five at least. Leaving one out of fewer tells
+/// little either: two left out may be met by chance.
+const WEIGHTS_MIN: usize = 5;
+/// Weights may be so far apart, as a share of the highest force (ASTM E4, 10.2).
+const GAP_SHARE: f64 = 1.0 / 3.0;
 /// A curve may miss the mean of a weight's readings by so many standard uncertainties of a force there, and one more is bad.
 const RESIDUAL_SIGMAS: f64 = 2.0;
 /// The empty cell may have moved by so much of the highest force: the zero error of class 2 of ISO 376. Ten times as much,
@@ -28,6 +33,7 @@ impl Calibration {
         let quality = self.quality()?;
         let uncertainty = ForceUncertainty::of(self)?;
         let mut checks = vec![
+            weights(&quality.points),
             curve(&quality.points, &uncertainty),
             residuals(&quality.points),
             zero(quality.zero_shift_n, quality.force_max_n),
@@ -38,7 +44,28 @@ impl Calibration {
     }
 }
 
-/// Whether there are enough weights for the curve.
+/// Whether there are enough weights for any curve, and near enough to each other.
+fn weights(points: &[PointQuality]) -> QualityCheck {
+    let of = |rank, words: String| QualityCheck::new("weights", rank, words);
+    let count = points.iter().filter(|point| point.mass_g > 0.0).count();
+    let highest = points.last().map_or(0.0, |point| point.force_n);
+    if count < WEIGHTS_MIN {
+        let words = format!(
+            "{count} weights are too few to tell the curve of a load cell; calibrate with {WEIGHTS_MIN} and more"
+        );
+        return of(QualityRank::Bad, words);
+    }
+    let gap = points.windows(2).map(|pair| pair[1].force_n - pair[0].force_n).fold(0.0, f64::max);
+    let share = gap / highest;
+    let advice = if share > GAP_SHARE { "; put another weight between them" } else { "" };
+    let words = format!(
+        "{count} weights, the furthest two apart by {:.0} % of the highest force{advice}",
+        100.0 * share
+    );
+    of(rank_of(share, GAP_SHARE, f64::INFINITY), words)
+}
+
+/// Whether the curve is known between the weights.
 fn curve(points: &[PointQuality], uncertainty: &ForceUncertainty) -> QualityCheck {
     let of = |rank, words: String| QualityCheck::new("curve", rank, words);
     let highest = points.last().map_or(0.0, |point| point.force_n);
@@ -48,11 +75,8 @@ fn curve(points: &[PointQuality], uncertainty: &ForceUncertainty) -> QualityChec
         Some((force, sigma.0))
     });
     let Some((at, worst)) = errors.max_by(|one, other| one.1.total_cmp(&other.1)) else {
-        return of(
-            QualityRank::Bad,
-            "too few weights to tell how far the curve is off between them; calibrate with three and more between the empty cell and the heaviest"
-                .into(),
-        );
+        let words = "no weight can be left out to tell how far the curve is off between them";
+        return of(QualityRank::NotJudged, words.into());
     };
     let share = worst / highest;
     let rank = rank_of(share, CURVE_SHARE, CURVE_SHARE_MAX);
@@ -63,8 +87,7 @@ fn curve(points: &[PointQuality], uncertainty: &ForceUncertainty) -> QualityChec
     of(
         rank,
         format!(
-            "between its {} weights, at {at:.2} N, the curve has a standard uncertainty of {worst:.2} N, {:.1} % of the highest force{advice}",
-            points.iter().filter(|point| point.mass_g > 0.0).count(),
+            "between two weights, at {at:.2} N, the curve has a standard uncertainty of {worst:.2} N, {:.1} % of the highest force{advice}",
             100.0 * share
         ),
     )
@@ -171,10 +194,15 @@ mod tests {
         // The flat stretch is known to 3.5 % of the range.
         assert_eq!(rank(&all, "curve"), QualityRank::Doubtful, "{}", all.text());
         assert_eq!(rank(&all, "range"), QualityRank::Good);
+        assert_eq!(rank(&all, "weights"), QualityRank::Good);
         let two = thesis_with(&[0.0, 240.0, 540.0, 1040.0]).assess(Some(Newtons(10.5))).unwrap();
         assert_eq!(rank(&two, "curve"), QualityRank::Bad, "{}", two.text());
         assert_eq!(rank(&two, "range"), QualityRank::Doubtful);
-        let one = thesis_with(&[0.0, 540.0, 1040.0]).assess(None).unwrap();
-        assert_eq!(rank(&one, "curve"), QualityRank::Bad, "{}", one.text());
+        // These two lie on one line with the ends by chance.
+        let lucky = thesis_with(&[0.0, 340.0, 840.0, 1040.0]).assess(None).unwrap();
+        assert_eq!(rank(&lucky, "curve"), QualityRank::Good, "{}", lucky.text());
+        assert_eq!(rank(&lucky, "weights"), QualityRank::Bad, "{}", lucky.text());
+        let apart = thesis_with(&[0.0, 140.0, 240.0, 740.0, 840.0, 1040.0]).assess(None).unwrap();
+        assert_eq!(rank(&apart, "weights"), QualityRank::Doubtful, "{}", apart.text());
     }
 }

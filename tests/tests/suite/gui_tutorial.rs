@@ -108,7 +108,7 @@ fn carry_out(flow: &mut WindowFlow, deed: &TutorialStep) {
             flow.window.run_steps(4);
         }
         TutorialStep::KeyUntil(key, words) => {
-            for _ in 0..20 {
+            for _ in 0..40 {
                 flow.wait("a question or the end", |window| {
                     let run = window.state().snapshot().run.as_ref();
                     run.is_some_and(|run| run.prompt.is_some() || run.outcome.is_some())

@@ -6,7 +6,7 @@ use super::super::output::Output;
 use super::source::{CalibrationSource, failure};
 use chrono::{DateTime, SecondsFormat, Utc};
 use clap::Args;
-use palpate_analysis::calibrations::accepted;
+use palpate_analysis::calibrations::{UnacceptedCalibration, accepted};
 use palpate_model::calibration::{Calibration, CurveKind};
 use palpate_model::units::Volts;
 use palpate_runner::programme::calibration_from_session;
@@ -171,7 +171,10 @@ fn document(args: &CalibrationImportArgs) -> Result<Calibration, Failure> {
     if let Some(choice) = args.curve.or(default) {
         new.curve = choose_curve(&new, choice)?;
     }
-    accepted(new, args.despite.as_deref()).map_err(Failure::failed)
+    accepted(new, args.despite.as_deref()).map_err(|err| match err {
+        UnacceptedCalibration::Unreadable(_) => Failure::usage(err),
+        UnacceptedCalibration::Bad(_) => Failure::failed(err),
+    })
 }
 
 fn choose_curve(calibration: &Calibration, choice: CurveChoice) -> Result<CurveKind, Failure> {
