@@ -44,8 +44,21 @@ struct SignalMeans {
 struct ClosedMean {
     t: f64,
     volts: f64,
+    /// Variance of the modelled force within it, in N^2.
+    force_variance: f64,
     count: usize,
     columns: Vec<f64>,
+}
+
+/// What a curve makes of forces that scatter about their mean beyond what it makes of that mean, in V: half its second
+/// derivative times their variance. Forces that rise evenly reach the root of three standard deviations to either side.
+fn bent_volts(curve: &CalibrationCurve, mean: Newtons, variance: f64) -> f64 {
+    let reach = (3.0 * variance).sqrt();
+    if reach == 0.0 {
+        return 0.0;
+    }
+    let slope = |side: f64| curve.sensitivity_at(Newtons(mean.0 + side * reach));
+    0.5 * variance * (slope(1.0) - slope(-1.0)) / (2.0 * reach)
 }
 
 /// Sums of the samples so far of a mean.
@@ -60,6 +73,9 @@ struct OpenMean {
     first: [f64; 4],
     time: f64,
     volts: f64,
+    /// The modelled force and its square.
+    force: f64,
+    force_square: f64,
     /// The signal with what the modelled force makes of it subtracted.
     noise: f64,
     square: f64,
@@ -74,7 +90,10 @@ impl OpenMean {
         self.count += 1;
         self.time += t - first_t;
         self.volts += volts - first_volts;
-        let noise = volts - first_volts - slope * (force - first_force);
+        let risen = force - first_force;
+        self.force += risen;
+        self.force_square += risen * risen;
+        let noise = volts - first_volts - slope * risen;
         self.noise += noise;
         self.square += noise * noise;
     }
@@ -104,10 +123,12 @@ impl OpenMean {
         let count = self.count;
         let over = 1.0 / count as f64;
         let next = Self { sums: vec![0.0; self.sums.len()], ..Self::default() };
-        let Self { sums, first, time, volts, .. } = std::mem::replace(self, next);
+        let Self { sums, first, time, volts, force, force_square, .. } =
+            std::mem::replace(self, next);
         (count > 0).then(|| ClosedMean {
             t: first[0] + over * time,
             volts: first[1] + over * volts,
+            force_variance: (over * force_square - (over * force).powi(2)).max(0.0),
             count,
             columns: sums.into_iter().map(|sum| over * sum).collect(),
         })
@@ -337,7 +358,8 @@ impl System<'_> {
             let slope = curve.sensitivity_at(felt);
             let all = mean.columns.iter().chain(changes.into_iter().flatten());
             let mut columns: Vec<f64> = all.map(|column| slope * column).collect();
-            columns.push(mean.volts - curve.volts_from_newtons(felt).0);
+            let bent = bent_volts(curve, felt, mean.force_variance);
+            columns.push(mean.volts - curve.volts_from_newtons(felt).0 - bent);
             let place = ErrorPlace { record, samples, force, lag };
             SampleMean { t: mean.t, count: mean.count, place, columns }
         }
