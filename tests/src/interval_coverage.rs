@@ -152,7 +152,11 @@ fn measured_compliance(settings: SimSettings) -> ComplianceCorrections {
 }
 
 /// One ramp and hold as a recording, and what was true.
-pub(crate) fn recorded(
+///
+/// # Panics
+/// If the run fails or its compliance cannot be measured.
+#[must_use]
+pub fn recorded(
     case: &CoverageCase,
     calibration: &Calibration,
     speed: Option<f64>,

@@ -10,6 +10,7 @@ use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{FitOptions, FitReport, fit};
 use palpate_sessions::Session;
 use palpate_sessions::document_store::save_document;
+use palpate_tests::interval_coverage::{CoverageCase, recorded};
 use palpate_tests::recorded_runs;
 use std::collections::BTreeMap;
 
@@ -119,6 +120,27 @@ fn a_drifting_zero_and_a_curved_cell_leave_the_compliance_exact() {
     }
     // The root mean square of 60 seeds is 0.022 um/N, and of lines through forces above the tare 0.3.
     assert!((squares / count).sqrt() < 6e-5, "{squares}");
+}
+
+/// The search takes every depth for the probe's own and meets a surface that the rig gives way from too early.
+#[test]
+fn contact_of_a_rig_that_gives_way_moves_to_the_surface() {
+    let case = CoverageCase::named("soft");
+    let (mut found, mut corrected) = (0.0f64, 0.0f64);
+    for seed in 1..=4 {
+        let settings = SimSettings { seed, ..case.settings };
+        let case = CoverageCase { settings, ..case };
+        let calibration = SimRig::new(settings).calibration();
+        let (recording, truth) = recorded(&case, &calibration, None);
+        let signal = recording.signal.unwrap();
+        let [.., surface] = truth;
+        println!("{seed}: surface {surface:.5} mm, contact {:.5} mm", signal.contact_shift_mm);
+        let left = surface - signal.contact_shift_mm;
+        assert!(left.abs() < 3.5 * signal.contact_error_mm, "seed {seed}: {left}");
+        (found, corrected) = (found + surface.powi(2), corrected + left.powi(2));
+    }
+    // 60 um/N times a tenth of a newton is 6 um; touches are good to 1.5 um.
+    assert!(corrected < 0.2 * found, "{corrected} {found}");
 }
 
 /// A ramp and hold on such a rig.
