@@ -103,7 +103,11 @@ fn newer_library(at: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let newer = SessionFolder::create(&session("log")).unwrap();
     drop(SessionWriter::start(newer, None, &manifest, RecordingPace::Virtual).unwrap());
     // Every file is made by the program itself and then raised.
-    fs::write(at.join("weights.csv"), "mass_g,volts\n0,1.28\n240,1.6\n440,1.87\n640,2.13\n840,2.4\n1040,2.67\n").unwrap();
+    fs::write(
+        at.join("weights.csv"),
+        "mass_g,volts\n0,1.28\n240,1.6\n440,1.87\n640,2.13\n840,2.4\n1040,2.67\n",
+    )
+    .unwrap();
     for line in [
         "tag library/sessions/edits +old",
         "mask library/sessions/analyses --name old --leave-out 95..96",
