@@ -12,6 +12,10 @@ const SETTLED_MM: f64 = 1e-5;
 /// worth the name. More rounds than these mean a rig that gives way as much as the tissue.
 const ROUNDS: usize = 10;
 
+/// Why depths stay corrected by the measured force.
+const NOT_DESCRIBED: &str = "depths are corrected for machine compliance by the measured force, because the model does not describe the record";
+const NOT_SETTLED: &str = "depths are corrected for machine compliance by the measured force, because the rig gives way about as much as the tissue; measure on a stiffer rig";
+
 /// One record of a fit, whose depths move where they were corrected.
 pub(super) struct CorrectedRecord<'a> {
     pub samples: &'a mut Vec<FitSample>,
@@ -19,38 +23,52 @@ pub(super) struct CorrectedRecord<'a> {
 }
 
 /// Corrects depths by the forces of the reports that `fit` gives, one for each record. They stay corrected by the measured
-/// force where the model does not describe a record, where there is no fit, and where the depths do not settle.
+/// force where the model does not describe a record, where there is no fit, and where the depths do not settle: then it
+/// tells why.
 pub(super) fn settle(
     records: &mut [CorrectedRecord<'_>],
     fit: impl Fn(&[&[FitSample]]) -> Result<Vec<FitReport>, FitError>,
-) {
+) -> Option<&'static str> {
     if records.iter().all(|one| one.raw.is_none()) {
-        return;
+        return None;
     }
     let measured: Vec<Vec<FitSample>> = records.iter().map(|one| one.samples.clone()).collect();
+    let reason = settle_or_tell(records, fit).err();
+    if reason.is_some() {
+        for (record, measured) in records.iter_mut().zip(measured) {
+            *record.samples = measured;
+        }
+    }
+    reason
+}
+
+fn settle_or_tell(
+    records: &mut [CorrectedRecord<'_>],
+    fit: impl Fn(&[&[FitSample]]) -> Result<Vec<FitReport>, FitError>,
+) -> Result<(), &'static str> {
     let mut before = f64::INFINITY;
     for _ in 0..ROUNDS {
         let samples: Vec<&[FitSample]> = records.iter().map(|one| one.samples.as_slice()).collect();
-        let Ok(reports) = fit(&samples) else { break };
+        let reports = fit(&samples).map_err(|_| NOT_DESCRIBED)?;
+        if reports.iter().any(|report| report.lack_of_fit().is_some()) {
+            return Err(NOT_DESCRIBED);
+        }
         let pairs = records.iter().zip(&reports);
         let forces: Vec<_> = pairs.map(|(one, report)| report.predict(one.samples)).collect();
-        let is_described = reports.iter().all(|report| report.lack_of_fit().is_none());
-        if !is_described || forces.iter().flatten().any(|force| !force.0.is_finite()) {
-            break;
+        if forces.iter().flatten().any(|force| !force.0.is_finite()) {
+            return Err(NOT_SETTLED);
         }
         let changes = records.iter_mut().zip(&forces).filter_map(|(record, forces)| {
             record.raw.map(|raw| raw.correct_by(forces, record.samples))
         });
         let change = changes.fold(0.0, f64::max);
         if change < SETTLED_MM {
-            return;
+            return Ok(());
         }
         if change >= before {
             break;
         }
         before = change;
     }
-    for (record, measured) in records.iter_mut().zip(measured) {
-        *record.samples = measured;
-    }
+    Err(NOT_SETTLED)
 }

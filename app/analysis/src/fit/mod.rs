@@ -151,12 +151,13 @@ impl SourceFit {
             source;
         let watch = Stopwatch::start();
         let corrected = CorrectedRecord { samples: &mut samples, raw: raw.as_ref() };
-        settle(&mut [corrected], |samples| {
+        let kept = settle(&mut [corrected], |samples| {
             let record =
                 SignalRecord { name: "the record", samples: samples[0], signal: signal.as_ref() };
             let solution = FitSolution::fit_signals(&[record], options, &[])?;
             Ok(vec![solution.report()])
         });
+        notes.extend(kept.map(str::to_owned));
         let record =
             SignalRecord { name: "the record", samples: &samples, signal: signal.as_ref() };
         let solution = FitSolution::fit_signals(&[record], options, &[]);

@@ -40,7 +40,8 @@ pub struct JointFit {
     pub notes: Vec<String>,
 }
 
-/// Fits recordings together, and corrects their depths by the modelled force where they were corrected. `progress` hears for which recording how many fits of the bootstrap are done.
+/// Fits recordings together, and corrects their depths by the modelled force where they were corrected. `progress` hears for
+/// which recording how many fits of the bootstrap are done.
 pub fn fit_together(
     records: &mut Recordings,
     request: &JointFitRequest<'_>,
@@ -53,13 +54,13 @@ pub fn fit_together(
     });
     let shared: Vec<&str> = names.collect();
     let watch = Stopwatch::start();
-    settle_together(records, request.options, &shared);
+    let kept = settle_together(records, request.options, &shared);
     let borrowed = records.borrowed();
     let signals: Vec<SignalRecord<'_>> = records.signals();
     let fitted = FitSolution::fit_signals(&signals, request.options, &shared)?;
     let mut report = fitted.joint_report();
     let seconds = watch.seconds();
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = kept.map(str::to_owned).into_iter().collect();
     let find = |traced: &[TracedRecord<'_>]| fitted.systematic(traced);
     let found = request.is_systematic.then(|| records.systematic(find));
     let systematic = found.and_then(|found| {
@@ -85,7 +86,11 @@ pub fn fit_together(
     })
 }
 
-fn settle_together(records: &mut Recordings, options: &FitOptions, shared: &[&str]) {
+fn settle_together(
+    records: &mut Recordings,
+    options: &FitOptions,
+    shared: &[&str],
+) -> Option<&'static str> {
     let known: Vec<_> =
         records.all.iter().map(|one| (one.name.clone(), one.signal.clone())).collect();
     let corrected = records.all.iter_mut();
@@ -100,7 +105,7 @@ fn settle_together(records: &mut Recordings, options: &FitOptions, shared: &[&st
         let signals: Vec<SignalRecord<'_>> = signals.collect();
         let report = FitSolution::fit_signals(&signals, options, shared)?.joint_report();
         Ok(report.records.into_iter().map(|one| one.report).collect())
-    });
+    })
 }
 
 impl JointFit {

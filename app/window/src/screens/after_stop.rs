@@ -3,11 +3,9 @@
 use super::calibration::calibration_session;
 use crate::command::{Commands, UiCommand};
 use crate::shell::activity::is_planned;
-use crate::widgets::{
-    alarm_ui, placeholder_ui, quiet_ui, reason_button, require, section_ui, tokens_of,
-};
+use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, reason_button, section_ui, tokens_of};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
-use palpate_model::assessment::{Assessment, QualityRank};
+use palpate_model::assessment::Assessment;
 use palpate_protocols::engine::RunOutcome;
 use palpate_runner::RunView;
 
@@ -23,7 +21,7 @@ pub fn after_stop_ui(
         outcome_ui(ui, outcome);
         log_ui(ui, run);
         if calibration_session(Some(run)).is_ok()
-            && reason_button(ui, "Save this calibration", vec2(190.0, 28.0), &keepable(quality))
+            && reason_button(ui, "Save this calibration", vec2(190.0, 28.0), &checked(quality))
         {
             commands.push(UiCommand::KeepCalibration);
         }
@@ -34,10 +32,9 @@ pub fn after_stop_ui(
     }
 }
 
-/// A calibration is judged before it can be kept.
-fn keepable(quality: Option<&Assessment>) -> Result<(), String> {
-    let quality = quality.ok_or("the calibration is being checked")?;
-    require(quality.rank() != QualityRank::Bad, "a check below is bad; measure again")
+/// A calibration is judged before it can be kept; saving refuses a bad one and says why.
+fn checked(quality: Option<&Assessment>) -> Result<(), String> {
+    quality.map(|_| ()).ok_or_else(|| "the calibration is being checked".into())
 }
 
 /// The two ways on, with the reason if one of them is closed.
