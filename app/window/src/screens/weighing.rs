@@ -93,6 +93,7 @@ fn now_ui(
         ui.add_space(12.0);
         match &run.settling {
             Some(settling) => steady_ui(ui, settling),
+            None if next.is_none() => {}
             None => {
                 let words = "Put the weight on the load cell and press Done F2; the signal is then checked.";
                 ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
