@@ -1,5 +1,5 @@
-//! A programme's journal: one JSON line per entry, each on the disk before the programme continues, so that an interrupted
-//! programme resumes at the right place.
+//! Journal of a programme or a queue: one JSON line per entry, each on the disk before the work continues, so that
+//! interrupted work resumes at the right place.
 
 use crate::chain::{self, ChainError, ChainHead, bytes_or_none, complete_length};
 use crate::folder::create_folder;
@@ -20,7 +20,7 @@ pub enum JournalError {
     #[error("the journal {} cannot be {what} ({source}); check its permissions and the disk", path.display())]
     Io { what: &'static str, path: PathBuf, source: io::Error },
     #[error(
-        "line {line} of the journal {} is damaged ({reason}); restore the journal from a backup, or start the programme in a new folder",
+        "line {line} of the journal {} is damaged ({reason}); restore the journal from a backup, or move its folder elsewhere to begin anew",
         path.display()
     )]
     Line {

@@ -34,6 +34,7 @@ pub mod raw;
 pub mod record;
 pub mod recover;
 pub mod schema;
+pub mod specimen_queue;
 pub mod text;
 pub mod ticks;
 
