@@ -45,6 +45,7 @@ pub mod scene_bench;
 pub mod select;
 pub mod session_actions;
 pub mod source;
+pub mod specimen_queue;
 pub mod support_bundle;
 pub mod tick_replay;
 pub mod trade;

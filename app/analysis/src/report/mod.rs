@@ -18,6 +18,7 @@ pub mod picture;
 pub mod plan_picture;
 pub mod plan_plot;
 pub mod programme;
+pub mod queue;
 pub mod scatter;
 #[cfg(feature = "haptics")]
 pub mod scene;

@@ -1,7 +1,7 @@
 //! Splitting of a line of delimited text into cells (RFC 4180, section 2). A quoted cell must end on its line.
 
 /// Detects the delimiter from the first line.
-pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
+pub fn delimiter_of(first: &str) -> Result<char, String> {
     let mut is_quoted = false;
     let bare: String = first
         .chars()
@@ -16,7 +16,7 @@ pub(super) fn delimiter_of(first: &str) -> Result<char, String> {
 }
 
 /// The cells of line `number`, without quotes and surrounding spaces.
-pub(super) fn split(line: &str, delimiter: char, number: usize) -> Result<Vec<String>, String> {
+pub fn split(line: &str, delimiter: char, number: usize) -> Result<Vec<String>, String> {
     let mut cells = Vec::new();
     let mut cell = String::new();
     let mut characters = line.chars().peekable();

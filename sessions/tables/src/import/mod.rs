@@ -1,6 +1,6 @@
 //! Foreign tables: one format per file.
 
-mod cells;
+pub mod cells;
 mod foreign;
 mod header;
 mod table;
