@@ -169,18 +169,23 @@ pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc
     library.join(PROGRAMMES_FOLDER).join(format!("{name}-{begun}"))
 }
 
-/// Refuses a disk with less than twice the space that a session needs.
-///
-/// If `path` does not exist yet, its nearest existing parent is checked.
-pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderError> {
+/// Free space on the disk of a path, or of its nearest existing parent.
+pub fn free_bytes(path: &Path) -> Result<u64, FolderError> {
     let existing = path
         .ancestors()
         .find(|one| !one.as_os_str().is_empty() && one.exists())
         .unwrap_or(Path::new("."));
-    let free_bytes = fs4::available_space(existing)
-        .map_err(|source| FolderError::Io { path: existing.into(), source })?;
+    fs4::available_space(existing)
+        .map_err(|source| FolderError::Io { path: existing.into(), source })
+}
+
+/// Refuses a disk with less than twice the space that a session needs.
+///
+/// If `path` does not exist yet, its nearest existing parent is checked.
+pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderError> {
+    let free_bytes = free_bytes(path)?;
     if free_bytes < needed_bytes.saturating_mul(2) {
-        return Err(FolderError::NoSpace { path: existing.into(), free_bytes, needed_bytes });
+        return Err(FolderError::NoSpace { path: path.into(), free_bytes, needed_bytes });
     }
     Ok(())
 }

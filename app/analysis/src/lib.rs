@@ -48,5 +48,6 @@ pub mod source;
 pub mod specimen_queue;
 pub mod support_bundle;
 pub mod tick_replay;
+pub mod today;
 pub mod trade;
 pub mod window_requests;

@@ -65,7 +65,8 @@ fn parse_specimens(
         let labels = labels.map(|(name, text)| (name.clone(), text.clone()));
         let one = QueuedSpecimen {
             specimen: cells[place].clone(),
-            protocol: protocol_of(cell(PROTOCOL).unwrap_or(protocol), folder),
+            protocol: protocol_of(cell(PROTOCOL).unwrap_or(protocol), folder)
+                .map_err(|reason| format!("line {number}: {reason}"))?,
             labels: labels.collect(),
         };
         labels_of(&one).map_err(|err| format!("line {number}: {err}"))?;
@@ -78,25 +79,28 @@ fn parse_specimens(
 }
 
 /// A built-in name as it is, a file by its whole path.
-fn protocol_of(name: &str, folder: &Path) -> String {
+fn protocol_of(name: &str, folder: &Path) -> Result<String, String> {
+    if BUILT_IN.iter().any(|(known, _)| *known == name) {
+        return Ok(name.to_owned());
+    }
     let file = folder.join(name);
-    let is_built_in = BUILT_IN.iter().any(|(known, _)| *known == name);
-    match !is_built_in && file.is_file() {
-        true => std::path::absolute(&file).unwrap_or(file).display().to_string(),
-        false => name.to_owned(),
+    match file.is_file() {
+        true => Ok(std::path::absolute(&file).unwrap_or(file).display().to_string()),
+        false => Err(format!(
+            "'{name}' is neither a built-in protocol nor a file; give the name of one or the path of the other"
+        )),
     }
 }
 
 /// Specimens by their names alone.
-#[must_use]
-pub fn named_specimens(names: &[String], protocol: &str) -> Vec<QueuedSpecimen> {
-    let protocol = protocol_of(protocol, Path::new("."));
+pub fn named_specimens(names: &[String], protocol: &str) -> Result<Vec<QueuedSpecimen>, String> {
+    let protocol = protocol_of(protocol, Path::new("."))?;
     let one = |name: &String| QueuedSpecimen {
         specimen: name.trim().to_owned(),
         protocol: protocol.clone(),
         labels: BTreeMap::new(),
     };
-    names.iter().map(one).collect()
+    Ok(names.iter().map(one).collect())
 }
 
 /// The labels of a specimen's sessions.
@@ -130,33 +134,61 @@ pub fn visible_items(queue: &SpecimenQueue) -> Vec<QueueItem> {
     items
 }
 
-/// Judges the run of a specimen: the verdict becomes the data quality of its session, then the queue goes on.
+/// Judges the run of the queue that has no verdict: the verdict becomes the data quality of its session, then the queue
+/// goes on.
 pub fn judge_run(
     library: &Path,
-    number: u32,
     verdict: QueueVerdict,
     who: &Attribution,
 ) -> Result<SpecimenQueue, String> {
-    let queue = SpecimenQueue::read(library).map_err(|err| err.to_string())?;
-    let item = queue.open_run().filter(|item| item.number == number);
-    let session = item.and_then(|item| item.sessions.last()).map(|last| library.join(last));
+    let queue = read(library)?;
+    let open = queue.open_run().ok_or("no run waits for a verdict")?;
+    let session = open.sessions.last().map(|last| library.join(last));
     // A crash may have come before the folder; then only the queue goes on.
     if let Some(session) = session.filter(|session| session.exists()) {
-        let quality = match verdict {
-            QueueVerdict::Accept => DataQuality::Valid,
-            QueueVerdict::Reject | QueueVerdict::Repeat => DataQuality::Rejected,
-        };
-        if who.reason.trim().is_empty() && quality == DataQuality::Rejected {
-            return Err("give a reason in a few words; the session keeps it".into());
-        }
-        let reason = match who.reason.trim() {
-            "" => "accepted after the run".to_owned(),
-            reason => reason.to_owned(),
-        };
-        set_data_quality(&session, quality, &Attribution { by: who.by.clone(), reason })
-            .map_err(|err| err.to_string())?;
+        judge_data(&session, verdict, who)?;
     }
-    change(library, who, QueueChange::Judged { number, verdict })
+    change(library, who, QueueChange::Judged { number: open.number, verdict })
+}
+
+/// Judges a session, and its run where that is the one of the queue without a verdict.
+pub fn judge_session(
+    library: Option<&Path>,
+    session: &Path,
+    verdict: QueueVerdict,
+    who: &Attribution,
+) -> Result<SpecimenQueue, String> {
+    let Some(library) = library else {
+        judge_data(session, verdict, who)?;
+        return Ok(SpecimenQueue::default());
+    };
+    let queue = read(library)?;
+    if queue.open_run_of(library, session).is_some() {
+        return judge_run(library, verdict, who);
+    }
+    judge_data(session, verdict, who)?;
+    Ok(queue)
+}
+
+fn judge_data(session: &Path, verdict: QueueVerdict, who: &Attribution) -> Result<(), String> {
+    let (quality, usual) = match verdict {
+        QueueVerdict::Accept => (DataQuality::Valid, "accepted after the run"),
+        QueueVerdict::Reject | QueueVerdict::Repeat => (DataQuality::Rejected, ""),
+    };
+    let reason = if who.reason.trim().is_empty() { usual } else { &who.reason };
+    let who = Attribution { by: who.by.clone(), reason: reason.to_owned() };
+    set_data_quality(session, quality, &who).map(|_| ()).map_err(|err| err.to_string())
+}
+
+fn read(library: &Path) -> Result<SpecimenQueue, String> {
+    SpecimenQueue::read(library).map_err(|err| err.to_string())
+}
+
+/// Seed of the present moment, which no one chose.
+#[must_use]
+pub fn drawn_seed() -> u64 {
+    let since = wall_now().duration_since(std::time::UNIX_EPOCH);
+    since.map_or(0, |since| u64::from(since.subsec_nanos()))
 }
 
 /// Changes the queue of a library now.
@@ -198,7 +230,8 @@ mod tests {
                 "specimen,specimen.thickness_mm\na,0\n",
                 "line 2: specimen.thickness_mm cannot be '0'",
             ),
-            ("specimen,protocol\na,b\nc\n", "line 3 has 1 cells"),
+            ("specimen,protocol\na,ramp-hold\nc\n", "line 3 has 1 cells"),
+            ("specimen,protocol\na,b\n", "line 2: 'b' is neither a built-in protocol nor a file"),
             ("specimen,protocol\n\"a,b\n", "line 2: a quote is not closed"),
         ] {
             let refusal = read(text).unwrap_err();
@@ -213,7 +246,8 @@ mod tests {
         let who = Attribution { by: "Ada".into(), reason: "a reason".into() };
         let started = palpate_sessions::specimen_queue::start("pilot", true);
         change(library, &who, started).unwrap();
-        let mut specimens = named_specimens(&["a", "b", "c"].map(str::to_owned), "ramp-hold");
+        let mut specimens =
+            named_specimens(&["a", "b", "c"].map(str::to_owned), "ramp-hold").unwrap();
         for one in &mut specimens {
             one.labels.insert("series.id".into(), "treated".into());
         }

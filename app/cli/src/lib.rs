@@ -37,6 +37,7 @@ mod programme;
 mod prompts;
 mod protocol;
 mod quality;
+mod queue;
 mod recalibrate;
 mod recover;
 mod replay;
@@ -111,6 +112,7 @@ macro_rules! commands {
 commands! { windows;
     Window(window::WindowArgs) => window::run [windows];
     Run(run::RunArgs) => run::run;
+    #[command(subcommand)] Queue(queue::QueueCommand) => queue::run;
     #[command(subcommand)] Protocol(protocol::ProtocolCommand) => protocol::run;
     DailyCheck(daily_check::DailyCheckArgs) => daily_check::run;
     Demo(demo::DemoArgs) => demo::run;

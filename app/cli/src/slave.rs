@@ -3,7 +3,7 @@
 use super::arguments::{above_zero, parse_number};
 use super::haptics::body;
 use super::output::Output;
-use super::run::{RunLeader, SessionArgs, labels, run_plan};
+use super::run::{RunCompanions, RunLeader, SessionArgs, labels, run_plan};
 use super::{Failure, recover, rig};
 use clap::Args;
 use palpate_analysis::haptics::HapticSettings;
@@ -93,5 +93,6 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
             Some((serde_json::to_value(&slaved).ok()?, slave_text(&slaved)))
         }),
     };
-    run_plan(follow.plan(), bench, &args.session, labels, Some(run_leader), output)
+    let companions = RunCompanions { leader: Some(run_leader), ..RunCompanions::default() };
+    run_plan(follow.plan(), bench, &args.session, labels, companions, output)
 }

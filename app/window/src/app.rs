@@ -308,7 +308,7 @@ impl eframe::App for WorkbenchApp {
         if !std::mem::replace(&mut self.is_zoom_set, true) {
             ctx.set_zoom_factor(self.settings.now.zoom);
         }
-        self.workbench.poll();
+        self.workbench.poll(ctx);
         if let Some((ask, path)) = self.workbench.dialog.poll() {
             commands.push(match ask {
                 PathPurpose::Opened => UiCommand::Review(vec![path]),

@@ -4,11 +4,12 @@ use crate::screens::run_panes::RunPane;
 use crate::shell::run_strip::RunControl;
 use crate::shell::sizes::PanelEdge;
 use crate::workers::PathPurpose;
+use crate::workers::queue_desk::QueueWork;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum UiCommand {
     Start,
     /// Controlled stop: the axis brakes.
@@ -36,6 +37,10 @@ pub enum UiCommand {
     View(RunPane),
     /// Takes a built-in protocol into the form.
     TakeProtocol(&'static str),
+    /// Takes protocol and labels of the specimen with this number in the queue into the form.
+    TakeSpecimen(u32),
+    /// Has the queue of specimens changed, with a reason where one is needed.
+    Queue(QueueWork, String),
     /// Reads the protocol file whose path is typed.
     OpenProtocol,
     /// Writes the text of the note field into the run in progress, or a mark where it is empty.

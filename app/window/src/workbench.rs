@@ -5,6 +5,7 @@ use crate::screens::form::{ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
+use crate::workers::queue_desk::QueueDesk;
 use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
 use eframe::egui::Context;
 use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
@@ -71,6 +72,8 @@ pub struct Workbench {
     pub refusal: Option<String>,
     pub front: ScreenOffers,
     pub occupation: Occupation,
+    /// The queue of specimens.
+    pub queue: QueueDesk,
     start: Start,
     starts: u64,
     /// The run that begins once every loop of the window has stopped.
@@ -114,6 +117,7 @@ impl Workbench {
                 to_acknowledge: request.to_acknowledge,
             },
             form,
+            queue: QueueDesk::new(library.clone()),
             library,
             ports: BackgroundTask::default(),
             list_ports,
@@ -240,6 +244,10 @@ impl Workbench {
                 let opened = self.dialog.open(ctx, move |dialog| pick(ask, dialog));
                 self.keep_refusal(opened);
             }
+            UiCommand::Queue(work, reason) => {
+                let by = self.form.label_text("operator").to_owned();
+                self.queue.ask(work.clone(), &by, reason);
+            }
             _ => return false,
         }
         true
@@ -301,9 +309,14 @@ impl Workbench {
     }
 
     /// Takes the runner's snapshot and its answer to a start.
-    pub fn poll(&mut self) {
+    pub fn poll(&mut self, ctx: &Context) {
         self.snapshot = self.runner.snapshot();
         self.ports.poll();
+        self.poll_start();
+        self.queue.poll(ctx);
+    }
+
+    fn poll_start(&mut self) {
         match &self.start {
             Start::None => {}
             Start::Sent(answer) => match answer.try_recv() {
@@ -313,6 +326,7 @@ impl Workbench {
                 }
                 Ok(Err(reason)) => {
                     self.refusal = Some(reason.to_string());
+                    self.queue.cancel_start();
                     self.start = Start::None;
                 }
                 Err(TryRecvError::Empty) => {}
@@ -327,6 +341,10 @@ impl Workbench {
             Start::Granted { seen } => {
                 if self.snapshot.sequence > *seen {
                     self.start = Start::None;
+                    if let Some(run) = &self.snapshot.run {
+                        let by = self.form.label_text("operator");
+                        self.queue.begun(&run.folder, by);
+                    }
                 }
             }
         }

@@ -101,8 +101,8 @@ impl RunArgs {
     }
 }
 
-#[derive(Debug, Args)]
-pub(super) struct SessionArgs {
+#[derive(Clone, Debug, Args)]
+pub struct SessionArgs {
     #[command(flatten)]
     pub(super) rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
@@ -137,7 +137,18 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
         return programme::run(Path::new(name), options, &values, output);
     }
     let (plan, bench, labels) = read(name, &values, options, output)?;
-    run_plan(plan, bench, options, labels, None, output)
+    run_plan(plan, bench, options, labels, RunCompanions::default(), output)
+}
+
+/// Runs a protocol for the queue; `begun` is called once the run has begun.
+pub(super) fn run_queued(
+    protocol: &str,
+    options: &SessionArgs,
+    begun: &dyn Fn(),
+    output: &Output,
+) -> Result<(), Failure> {
+    let (plan, bench, labels) = read(protocol, &BTreeMap::new(), options, output)?;
+    run_plan(plan, bench, options, labels, RunCompanions { begun, leader: None }, output)
 }
 
 /// The plan of a protocol, the rig that it was checked for, and the labels of its session.
@@ -175,6 +186,19 @@ pub(super) struct RunLeader {
     pub report: LeaderReport,
 }
 
+/// What takes part in a run beside rig and operator.
+pub(super) struct RunCompanions<'a> {
+    /// Called once the run has begun.
+    pub begun: &'a dyn Fn(),
+    pub leader: Option<RunLeader>,
+}
+
+impl Default for RunCompanions<'_> {
+    fn default() -> Self {
+        Self { begun: &|| (), leader: None }
+    }
+}
+
 /// Reports on the leader after the run, as an object and as text.
 type LeaderReport = Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>;
 
@@ -183,7 +207,7 @@ pub(super) fn run_plan(
     bench: OpenRig,
     options: &SessionArgs,
     labels: SessionLabels,
-    leader: Option<RunLeader>,
+    RunCompanions { begun, leader }: RunCompanions<'_>,
     output: &Output,
 ) -> Result<(), Failure> {
     let (request, preview, gate) = request(plan, &bench, options, labels, output)?;
@@ -196,7 +220,7 @@ pub(super) fn run_plan(
         };
     }
     check_start(&preview, &gate, options.acknowledge, output)?;
-    let snapshot = execute(bench.rig, options.rig.time_scale, request, output)?;
+    let snapshot = execute(bench.rig, options.rig.time_scale, request, begun, output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed(
             "the thread that runs protocols ended without a run; start the run again",
@@ -274,17 +298,19 @@ pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<DailyC
         .map_err(|err| err.to_string())
 }
 
-/// Runs a request with progress; the snapshot is that of the ended run.
+/// Runs a request with progress; `begun` is called once it has begun. The snapshot is that of the ended run.
 pub(super) fn execute(
     rig: Box<dyn Rig>,
     scale: TimeScale,
     request: RunRequest,
+    begun: &dyn Fn(),
     output: &Output,
 ) -> Result<Arc<RunnerSnapshot>, Failure> {
     let has_operator = request.answers == PromptResponder::Operator;
     let started = StartedRun::start(rig, scale, request).map_err(start_failure)?;
     let is_question_open = stop_on_signals(&started.runner)?;
     started.wait_for_start().map_err(start_failure)?;
+    begun();
     let requests = started.runner.requests();
     let prompts = has_operator.then(|| OperatorPrompts::start(requests, is_question_open));
     let mut prompts = prompts.transpose()?;

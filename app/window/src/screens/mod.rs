@@ -26,5 +26,6 @@ pub mod screen;
 pub mod start_page;
 pub mod table;
 mod tape;
+pub mod today;
 pub mod trade;
 pub mod weighing;

@@ -82,6 +82,23 @@ impl RunScreen {
         }
     }
 
+    /// Takes protocol and labels of a specimen in the queue into the form.
+    fn take_specimen(&mut self, number: u32, ctx: &Context, workbench: &mut Workbench) {
+        if workbench.is_busy() {
+            return;
+        }
+        let item = match workbench.queue.take_specimen(number) {
+            Ok(item) => item,
+            Err(reason) => return workbench.queue.refusal = Some(reason),
+        };
+        workbench.form.take_labels(&item.wanted);
+        let protocol = &item.wanted.protocol;
+        match BUILT_IN.iter().find(|(name, _)| name == protocol) {
+            Some((name, _)) => self.take_protocol(name, workbench),
+            None => self.read(Some(Path::new(protocol)), ctx, workbench),
+        }
+    }
+
     fn read(&mut self, path: Option<&Path>, ctx: &Context, workbench: &mut Workbench) {
         let begun = match path {
             Some(path) => self.chooser.read(path, ctx),
@@ -158,8 +175,8 @@ impl Screen for RunScreen {
         let (refitter, verdict) = (&self.refitter, &mut self.verdict);
         let (refit, quality) = (refitter.of(run), refitter.quality(run));
         let verdict_ui = |ui: &mut Ui, commands: &mut Commands| {
-            if let Some((session, operator)) = refitter.assessed(run) {
-                verdict.ui(ui, session, operator, &workbench.start_verdict(), commands);
+            if let Some(session) = refitter.assessed(run) {
+                verdict.ui(ui, session, &workbench.queue, &workbench.start_verdict(), commands);
             }
         };
         let (snapshot, cycles) = (&workbench.snapshot, self.plots.cycles());
@@ -197,8 +214,12 @@ impl Screen for RunScreen {
     fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
             UiCommand::Start => {
+                let specimen = workbench.form.specimen().to_owned();
                 let request = workbench.ready_run();
-                self.begin(request, workbench);
+                match request.map(|request| workbench.queue.start(&specimen).map(|()| request)) {
+                    Some(Err(reason)) => workbench.refusal = Some(reason),
+                    request => self.begin(request.and_then(Result::ok), workbench),
+                }
             }
             UiCommand::ManualMove(manual) => {
                 let request = workbench.manual_run(manual);
@@ -211,6 +232,14 @@ impl Screen for RunScreen {
             UiCommand::TakeProtocol(name) => {
                 self.take_protocol(name, workbench);
                 return Reaction::Show;
+            }
+            UiCommand::TakeSpecimen(number) => {
+                self.take_specimen(*number, ctx, workbench);
+                return if workbench.queue.refusal.is_none() {
+                    Reaction::Show
+                } else {
+                    Reaction::Done
+                };
             }
             UiCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);

@@ -1,13 +1,13 @@
-//! What an operator says of the run that has just ended: accept it, reject it, or reject and repeat it.
+//! What an operator says of the run that has just ended: accept it, reject it, or reject and repeat it. Then the next
+//! specimen of the queue.
 
 use crate::command::{Commands, UiCommand};
 use crate::widgets::{
     NamedControl, alarm_ui, quiet_ui, require, section_ui, sentence_ui, text_row,
 };
-use crate::workers::BackgroundTask;
-use eframe::egui::{Button, Context, Ui, Vec2, vec2};
-use palpate_analysis::session_actions::{Attribution, set_data_quality};
-use palpate_sessions::edits::DataQuality;
+use crate::workers::queue_desk::{QueueDesk, QueueWork};
+use eframe::egui::{Button, Ui, Vec2, vec2};
+use palpate_sessions::specimen_queue::QueueVerdict;
 use std::path::{Path, PathBuf};
 
 /// Large enough for a gloved finger, in points.
@@ -16,8 +16,7 @@ const BUTTON: Vec2 = vec2(86.0, 48.0);
 #[derive(Default)]
 pub struct RunVerdict {
     reason: String,
-    writing: BackgroundTask<String>,
-    /// The session that it is or was about.
+    /// The session that it is about.
     session: Option<PathBuf>,
 }
 
@@ -27,53 +26,64 @@ impl RunVerdict {
         &mut self,
         ui: &mut Ui,
         session: &Path,
-        operator: &str,
+        queue: &QueueDesk,
         may_start: &Result<(), String>,
         commands: &mut Commands,
     ) {
-        self.writing.poll();
-        if self.session.as_deref() != Some(session) && !self.writing.is_busy() {
-            *self = Self { session: Some(session.to_owned()), ..Self::default() };
+        if self.session.as_deref() != Some(session) {
+            *self = Self { session: Some(session.to_owned()), reason: String::new() };
         }
         section_ui(ui, "Verdict");
-        match self.writing.answer() {
-            Some(Ok(words)) => sentence_ui(ui, words),
+        match queue.verdict_of(session) {
+            Some(Ok(verdict)) => {
+                sentence_ui(ui, verdict_words(*verdict));
+                next_ui(ui, queue, commands);
+            }
             Some(Err(reason)) => alarm_ui(ui, format!("the verdict was not written: {reason}")),
             None => {}
         }
         text_row(ui, "reason", "for a rejection", &mut self.reason);
+        let is_free = require(!queue.is_busy(), "writing the verdict");
         let has_reason =
             require(!self.reason.trim().is_empty(), "to reject a run, give the reason");
-        let can_reject = require(!self.writing.is_busy(), "writing the verdict").and(has_reason);
+        let can_reject = is_free.clone().and(has_reason);
         let can_repeat = can_reject.clone().and_then(|()| may_start.clone());
         ui.horizontal(|ui| {
-            if button_ui(ui, "Accept", !self.writing.is_busy()) {
-                self.write(ui.ctx(), DataQuality::Valid, operator);
-            }
-            if button_ui(ui, "Reject", can_reject.is_ok()) {
-                self.write(ui.ctx(), DataQuality::Rejected, operator);
-            }
-            if button_ui(ui, "Repeat", can_repeat.is_ok()) {
-                self.write(ui.ctx(), DataQuality::Rejected, operator);
-                commands.push(UiCommand::Start);
+            for (name, verdict, can) in [
+                ("Accept", QueueVerdict::Accept, &is_free),
+                ("Reject", QueueVerdict::Reject, &can_reject),
+                ("Repeat", QueueVerdict::Repeat, &can_repeat),
+            ] {
+                if button_ui(ui, name, can.is_ok()) {
+                    let work = QueueWork::Judge(session.to_owned(), verdict);
+                    commands.push(UiCommand::Queue(work, self.reason.clone()));
+                    if verdict == QueueVerdict::Repeat {
+                        commands.push(UiCommand::Start);
+                    }
+                }
             }
         });
         if let Err(reason) = can_reject.and(can_repeat) {
             quiet_ui(ui, reason);
         }
     }
+}
 
-    fn write(&mut self, ctx: &Context, verdict: DataQuality, operator: &str) {
-        let Some(session) = self.session.clone() else { return };
-        let typed = self.reason.trim();
-        let reason = if typed.is_empty() { "looked at after the run" } else { typed };
-        let by = palpate_analysis::edits::author(Some(operator).filter(|name| !name.is_empty()));
-        let who = Attribution { by, reason: reason.to_owned() };
-        self.writing.start("verdict", ctx, move |_| {
-            let written = set_data_quality(&session, verdict, &who);
-            written.map_err(|err| err.to_string())?;
-            Ok(format!("{verdict}: {}", who.reason))
-        });
+const fn verdict_words(verdict: QueueVerdict) -> &'static str {
+    match verdict {
+        QueueVerdict::Accept => "Accepted.",
+        QueueVerdict::Reject => "Rejected.",
+        QueueVerdict::Repeat => "Rejected, to be repeated.",
+    }
+}
+
+/// The way on to the next specimen.
+fn next_ui(ui: &mut Ui, queue: &QueueDesk, commands: &mut Commands) {
+    let Some(next) = queue.queue().next() else { return };
+    let name = format!("Next: {}", next.wanted.specimen);
+    let size = vec2(ui.available_width(), BUTTON.y);
+    if ui.add(Button::new(&name).min_size(size).wrap()).named(&name).clicked() {
+        commands.push(UiCommand::TakeSpecimen(next.number));
     }
 }
 

@@ -3,14 +3,15 @@
 use super::screen::ScreenEntry;
 
 /// How many of the screens are a technician's, for a day at the rig; the others are a researcher's.
-pub const TECHNICIAN_SCREENS: usize = 4;
+pub const TECHNICIAN_SCREENS: usize = 5;
 
 /// The screens as they stand on the rail.
 pub const SCREENS: &[ScreenEntry] = &[
+    super::today::SCREEN,
+    super::run::SCREEN,
     super::rig::SCREEN,
     super::calibration::SCREEN,
     super::checks::SCREEN,
-    super::run::SCREEN,
     super::library::SCREEN,
     super::review::SCREEN,
     super::models::SCREEN,

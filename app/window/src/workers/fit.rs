@@ -29,7 +29,6 @@ pub struct ExactFit {
 
 /// What becomes of a run that has ended.
 struct RunAnswer {
-    operator: String,
     quality: Assessment,
     fit: Result<ExactFit, String>,
 }
@@ -98,11 +97,9 @@ impl Refitter {
         self.answer_of(run).map(|answer| &answer.quality)
     }
 
-    /// Session and operator of this run, once its checks are made.
-    pub fn assessed(&self, run: Option<&RunView>) -> Option<(&Path, &str)> {
-        self.answer_of(run)
-            .zip(self.session.as_deref())
-            .map(|(one, at)| (at, one.operator.as_str()))
+    /// Session of this run, once its checks are made.
+    pub fn assessed(&self, run: Option<&RunView>) -> Option<&Path> {
+        self.answer_of(run).and(self.session.as_deref())
     }
 }
 
@@ -120,7 +117,7 @@ fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {
     let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
     let found = assess_folder(folder, library, &recipe).map_err(|err| err.to_string())?;
     let fit = found.fitted.map_err(|err| err.to_string()).and_then(exact_fit);
-    Ok(RunAnswer { operator: found.operator, quality: found.quality, fit })
+    Ok(RunAnswer { quality: found.quality, fit })
 }
 
 fn exact_fit(fitted: SourceFit) -> Result<ExactFit, String> {

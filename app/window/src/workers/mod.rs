@@ -6,6 +6,7 @@ mod latest;
 pub mod live_scene;
 mod path_dialog;
 pub mod player;
+pub mod queue_desk;
 pub mod review;
 mod task;
 pub mod trail;

@@ -25,6 +25,8 @@ pub enum PathPurpose {
     Opened,
     /// A rig file to connect.
     Rig,
+    /// A table of specimens for the queue.
+    Specimens,
 }
 
 /// A dialog that may be open, and gives a `T`.
@@ -93,6 +95,7 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
         PathPurpose::Session | PathPurpose::Body | PathPurpose::Opened => {
             dialog.set_title("Folder of a session").pick_folder()
         }
+        PathPurpose::Specimens => of_kind("Table of specimens", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
         PathPurpose::Rig => of_kind("Rig file", "rig files", &["toml"]),

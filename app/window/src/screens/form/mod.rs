@@ -14,6 +14,7 @@ use palpate_protocols::file::{Protocol, ProtocolProblem, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
 use palpate_runner::{AfterStop, PromptResponder, RigView, RunRequest};
+use palpate_sessions::specimen_queue::QueuedSpecimen;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -172,6 +173,30 @@ impl ProtocolForm {
         let mut fields = self.label_fields.iter_mut();
         if let Some(field) = fields.find(|field| field.key.name == name) {
             text.clone_into(&mut field.text);
+        }
+    }
+
+    /// Takes the labels of a queued specimen; those of the specimen before do not stay, those of operator and probe do.
+    pub fn take_labels(&mut self, wanted: &QueuedSpecimen) {
+        for field in &mut self.label_fields {
+            let name = field.key.name;
+            if name == "specimen" {
+                field.text.clone_from(&wanted.specimen);
+            } else if let Some(text) = wanted.labels.get(name) {
+                field.text.clone_from(text);
+            } else if name.starts_with("specimen.") || name.starts_with("series.") {
+                field.text.clear();
+            }
+        }
+        self.read_labels();
+    }
+
+    /// Name or file of the protocol, as the queue has it.
+    pub fn source_name(&self) -> String {
+        match (&self.file, &self.protocol) {
+            (Some(file), _) => file.display().to_string(),
+            (None, Ok(protocol)) => protocol.name.clone(),
+            (None, Err(_)) => FIRST.to_owned(),
         }
     }
 
