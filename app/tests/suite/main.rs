@@ -20,6 +20,7 @@ mod newer;
 mod plan;
 mod programme;
 mod protocol;
+mod queue;
 mod rate;
 mod records;
 mod report;

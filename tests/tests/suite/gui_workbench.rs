@@ -11,8 +11,8 @@ use palpate_runner::replay::replay;
 use palpate_runner::{RunView, TimeScale};
 use palpate_sessions::log::Session;
 use palpate_tests::flow::WindowFlow;
-use palpate_window::screens::rig;
 use palpate_window::screens::table::SCREENS;
+use palpate_window::screens::{rig, run};
 use palpate_window::widgets::places::places;
 use palpate_window::window::WindowOptions;
 
@@ -42,7 +42,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
         !flow.says("a few letters of the command's name")
             && flow.window.query_by_label("command").is_none()
     );
-    let button = flow.window.get_by_label(SCREENS[3].name);
+    let button = flow.window.get_by_label(run::SCREEN.name);
     assert!(button.accesskit_node().toggled().is_some());
     // What cannot be asked for now stays where it is.
     flow.act_by_name("retract after");

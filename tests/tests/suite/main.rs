@@ -21,6 +21,7 @@ mod gui_review;
 mod gui_scene;
 mod gui_start;
 mod gui_tape;
+mod gui_today;
 mod gui_tutorial;
 mod gui_workbench;
 mod hold_until;

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Today",
     purpose: "the next specimen, the queue, and the state of the rig",
-    key: Some(Key::Num0),
+    key: Some(Key::T),
     open: |workbench| Box::new(TodayScreen::new(workbench)),
 };
 

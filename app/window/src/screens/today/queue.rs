@@ -190,10 +190,10 @@ impl QueueForm {
         section_ui(ui, "Scan or type a specimen");
         let is_taken = ui
             .horizontal(|ui| {
-                let label = form_label(ui, "specimen");
+                let label = form_label(ui, "scan here");
                 let input = TextEdit::singleline(&mut self.scanned).char_limit(200);
                 let input = input.desired_width(320.0).hint_text("name, then Enter");
-                let input = ui.add(input).labelled_by(label.id).named("specimen to measure");
+                let input = ui.add(input).labelled_by(label.id).named("scan here");
                 if std::mem::take(&mut self.is_to_focus) {
                     input.request_focus();
                 }
@@ -305,7 +305,7 @@ impl QueueForm {
             Column::words("protocol", 140.0),
             Column::words("state", 130.0),
             Column::numbers("runs", 40.0),
-            Column::words("reason", 220.0),
+            Column::words("remark", 220.0),
         ];
         let table = ChoiceTable {
             name: "queue",

@@ -1,0 +1,153 @@
+//! A day of specimens in the window: queue, verdicts, repeats, and what is left after a crash.
+
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use palpate_model::rig::Phase;
+use palpate_runner::TimeScale;
+use palpate_sessions::specimen_queue::{QueueCounts, SpecimenQueue, SpecimenState};
+use palpate_sessions::{DataQuality, Edits, SessionSummary};
+use palpate_tests::flow::WindowFlow;
+use palpate_window::screens::today;
+use std::path::Path;
+
+fn queue(flow: &WindowFlow) -> SpecimenQueue {
+    SpecimenQueue::read(flow.folder.path()).unwrap()
+}
+
+fn show_today(flow: &mut WindowFlow) {
+    flow.window.key_press_modifiers(Modifiers::COMMAND, today::SCREEN.key.unwrap());
+    flow.window.run_steps(3);
+}
+
+/// Types as a barcode scanner does: into whatever has the keys, then Enter.
+fn scan(flow: &mut WindowFlow, name: &str) {
+    flow.window.get_by_label("scan here").type_text(name);
+    flow.window.run_steps(2);
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(3);
+}
+
+/// A ramp and hold that is soon over.
+fn shorten(flow: &mut WindowFlow) {
+    for (name, text) in [("speed", "3"), ("depth", "6"), ("hold", "1")] {
+        flow.type_into(name, text);
+    }
+}
+
+fn start(flow: &mut WindowFlow) {
+    let before = flow.window.state().snapshot().run.as_ref().map(|run| run.folder.clone());
+    flow.window.key_press(Key::F5);
+    flow.wait("the end of the run and its checks", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.outcome.is_some() && Some(&run.folder) != before.as_ref())
+            && window.query_by_label("Accept").is_some()
+    });
+}
+
+fn quality(session: &Path) -> Option<DataQuality> {
+    let id = SessionSummary::read(session).unwrap().manifest.session_id;
+    Edits::read(session, &id).unwrap().verdict().map(|(verdict, _)| verdict)
+}
+
+#[test]
+fn a_day_of_specimens_is_measured_repeated_rejected_and_counted() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    show_today(&mut flow);
+    flow.window.check_accessibility();
+    flow.type_into("names", "pig 1, pig 2; pig 3");
+    flow.click("Add");
+    flow.wait_for_words("3 waiting");
+    flow.window.get_by_label("scan here").focus();
+    scan(&mut flow, "pig 9");
+    assert!(flow.says("'pig 9' is not in the queue"));
+    // Scanned: its protocol and labels are in the form of the run.
+    scan(&mut flow, "pig 1");
+    assert_eq!(flow.window.get_by_label("specimen").value().as_deref(), Some("pig 1"));
+    shorten(&mut flow);
+    start(&mut flow);
+    assert_eq!(queue(&flow).open_run().unwrap().wanted.specimen, "pig 1");
+    // The next one cannot begin before the verdict.
+    flow.window.key_press(Key::F5);
+    flow.window.run_steps(3);
+    assert!(flow.says("has no verdict yet"));
+    flow.click("Accept");
+    flow.wait_for_words("Accepted.");
+    flow.click("Next: pig 2");
+    shorten(&mut flow);
+    start(&mut flow);
+    assert!(!flow.is_enabled("Repeat"));
+    flow.type_into("reason", "the specimen slipped");
+    flow.click("Repeat");
+    flow.wait("the second run of pig 2", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.outcome.is_none())
+    });
+    flow.wait("its end and its checks", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.outcome.is_some()) && window.query_by_label("Accept").is_some()
+    });
+    flow.type_into("reason", "torn");
+    flow.click("Reject");
+    flow.wait_for_words("Rejected.");
+    show_today(&mut flow);
+    flow.wait_for_words("1 waiting, 1 accepted, 1 rejected");
+    // What has been measured is not measured again by a slip.
+    scan(&mut flow, "pig 1");
+    assert!(flow.says("pig 1 is accepted"));
+    let found = queue(&flow);
+    let counts = QueueCounts {
+        waiting: 1,
+        accepted: 1,
+        rejected: 1,
+        runs: 3,
+        rejected_runs: 2,
+        ..QueueCounts::default()
+    };
+    assert_eq!(found.counts(), counts);
+    let second = found.find("pig 2").unwrap();
+    assert_eq!((second.sessions.len(), second.reason.as_str()), (2, "torn"));
+    let library = flow.folder.path();
+    let said: Vec<_> = found.items.iter().flat_map(|item| &item.sessions).collect();
+    let said: Vec<_> = said.into_iter().map(|session| quality(&library.join(session))).collect();
+    let (valid, rejected) = (Some(DataQuality::Valid), Some(DataQuality::Rejected));
+    assert_eq!(said, [valid, rejected, rejected]);
+}
+
+#[test]
+fn a_window_that_ends_in_mid_run_leaves_the_specimen_to_be_judged() {
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
+    show_today(&mut flow);
+    flow.type_into("names", "pig 1, pig 2");
+    flow.click("Add");
+    flow.wait_for_words("2 waiting");
+    flow.click("Measure the next specimen");
+    flow.window.run_steps(3);
+    flow.window.key_press(Key::F5);
+    flow.wait_for_phase(Phase::Contact);
+    flow.wait("the line of the journal", |_| true);
+    let library = flow.folder.path().to_owned();
+    let end = palpate_test_support::wait::Deadline::new();
+    while SpecimenQueue::read(&library).unwrap().open_run().is_none() {
+        assert!(!end.is_over(), "the queue does not know of the run");
+        flow.window.step();
+    }
+    let WindowFlow { window, folder } = flow;
+    drop(window);
+    let mut flow = WindowFlow::open_in(folder, TimeScale::Max);
+    show_today(&mut flow);
+    flow.wait_for_words("Measured, without a verdict");
+    assert!(flow.window.query_by_label("Measure the next specimen").is_none());
+    flow.type_into("reason", "the computer was switched off");
+    flow.click("Repeat");
+    flow.wait_for_words("2 waiting");
+    let found = queue(&flow);
+    let next = found.next().unwrap();
+    assert_eq!((next.wanted.specimen.as_str(), next.rejected), ("pig 1", 1));
+    // The list says why a specimen is left out.
+    flow.type_into("why", "no tissue left");
+    flow.window.get_by_label("pig 2, waiting").click_accesskit();
+    flow.window.run_steps(2);
+    flow.click("Skip");
+    flow.wait_for_words("1 skipped");
+    assert_eq!(queue(&flow).find("pig 2").unwrap().state, SpecimenState::Skipped);
+}
