@@ -21,6 +21,7 @@ pub mod random;
 pub mod rig;
 pub mod signal;
 pub mod time;
+pub mod typed_number;
 pub mod units;
 pub mod viscoelastic;
 

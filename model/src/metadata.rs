@@ -3,6 +3,7 @@
 //! [`METADATA_KEYS`] is the one list of possible entries. The command line, protocol files that ask before a start
 //! and the manifest all use it.
 
+use crate::typed_number::plain_text;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -139,18 +140,21 @@ impl MetadataKey {
                 Ok(count) if count > 0 => Ok(count.into()),
                 _ => Err(refused("a whole number from 1".into())),
             },
-            MetadataKind::Number { unit, above, is_limit_allowed } => match value.parse::<f64>() {
-                Ok(number)
-                    if number.is_finite()
-                        && (number > above || is_limit_allowed && number >= above) =>
-                {
-                    Ok(number.into())
+            MetadataKind::Number { unit, above, is_limit_allowed } => {
+                let plain = plain_text(value).map_err(|err| refused(err.to_string()))?;
+                match plain.parse::<f64>() {
+                    Ok(number)
+                        if number.is_finite()
+                            && (number > above || is_limit_allowed && number >= above) =>
+                    {
+                        Ok(number.into())
+                    }
+                    _ => {
+                        let from = if is_limit_allowed { "from" } else { "above" };
+                        Err(refused(format!("a number of {unit} {from} {above}")))
+                    }
                 }
-                _ => {
-                    let from = if is_limit_allowed { "from" } else { "above" };
-                    Err(refused(format!("a number of {unit} {from} {above}")))
-                }
-            },
+            }
         }
     }
 }

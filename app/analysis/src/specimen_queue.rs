@@ -6,7 +6,8 @@ use palpate_protocols::file::BUILT_IN;
 use palpate_runner::wall_now;
 use palpate_sessions::DataQuality;
 use palpate_sessions::specimen_queue::{
-    QueueChange, QueueItem, QueueVerdict, QueuedSpecimen, SpecimenQueue, SpecimenState,
+    QueueChange, QueueItem, QueueRefusal, QueueVerdict, QueuedSpecimen, SpecimenQueue,
+    SpecimenState,
 };
 use palpate_tables::import::cells::{delimiter_of, split};
 use std::collections::BTreeMap;
@@ -176,6 +177,9 @@ fn judge_data(session: &Path, verdict: QueueVerdict, who: &Attribution) -> Resul
         QueueVerdict::Reject | QueueVerdict::Repeat => (DataQuality::Rejected, ""),
     };
     let reason = if who.reason.trim().is_empty() { usual } else { &who.reason };
+    if reason.is_empty() {
+        return Err(QueueRefusal::NoReason.to_string());
+    }
     let who = Attribution { by: who.by.clone(), reason: reason.to_owned() };
     set_data_quality(session, quality, &who).map(|_| ()).map_err(|err| err.to_string())
 }

@@ -1,6 +1,6 @@
 //! `palpate analyse`: loops, shift, decay and relaxation of cycles.
 
-use super::arguments::parse_columns;
+use super::arguments::{parse_columns, parse_number};
 use super::output::Output;
 use super::{Failure, known_fit_failure, new_file, source_failure};
 use clap::Args;
@@ -38,8 +38,8 @@ pub struct AnalyseArgs {
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+    match parse_number(text)? {
+        value if value > 0.0 => Ok(value),
         _ => Err("this is not a positive number; give a number such as 0.75".into()),
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use palpate_model::typed_number::plain_text;
 use std::str::FromStr;
 
 /// A word, the value it stands for, and its help.
@@ -20,7 +21,8 @@ pub(super) fn choice<T: Clone + Send + Sync + 'static>(
 
 /// A finite number, or one sentence.
 pub(super) fn parse_number(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
+    let plain = plain_text(text).map_err(|err| err.to_string())?;
+    match plain.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("this is not a finite number; give a number such as 0.75".into()),
     }

@@ -1,6 +1,7 @@
 //! `palpate mask`: excludes stretches of a session, as a named analysis.
 
 use super::Failure;
+use super::arguments::parse_number;
 use super::output::Output;
 use super::recalibrate::{AuthorArgs, analysis_edit_failure};
 use clap::Args;
@@ -32,7 +33,7 @@ impl FromStr for Span {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let number = |text: &str| text.trim().parse::<f64>().ok();
+        let number = |text: &str| parse_number(text.trim()).ok();
         let ends = text.split_once("..");
         match ends.map(|(from, to)| (number(from), number(to))) {
             Some((Some(from), Some(to))) if from.is_finite() && to.is_finite() && from <= to => {

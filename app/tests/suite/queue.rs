@@ -32,11 +32,11 @@ fn specimens_from_a_table_are_measured_in_a_recorded_order() {
         let name = next["specimen"].as_str().unwrap().to_owned();
         let run = typed(at, "queue run --time-scale max --json --operator Ada");
         let session = answer(&run);
-        assert_eq!(session["outcome"], "finish", "{place}");
+        assert_eq!(session["ending"], "finish", "{place}");
         assert_refused(&typed(at, "queue run"), 2, "has no verdict yet");
         let folder = session["session"].as_str().unwrap();
         let info = answer(&palpate(at, &["info", folder, "--json"]));
-        assert_eq!(info["manifest"]["specimen"], name.as_str());
+        assert_eq!(info["specimen"], name.as_str());
         if verdict == "repeat" {
             assert_refused(&typed(at, "queue judge repeat"), 2, "give a reason");
         }

@@ -4,7 +4,9 @@ use super::args::STEPS_HINT;
 use super::problem::{Problems, suggestion};
 use super::quantity::{ProtocolValue, QuantityKind, ValueContent};
 use super::tree::{DocumentEntry, DocumentTable, DocumentValue};
+use palpate_model::typed_number::plain_text;
 use serde::Serialize;
+use std::borrow::Cow;
 
 /// Something a technician may change at the start.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -28,10 +30,14 @@ pub struct ProtocolParameter {
 impl ProtocolParameter {
     /// Reads a value that was typed, or says what is wrong with it.
     pub fn read(&self, text: &str) -> Result<ProtocolValue, String> {
+        let text = match self.kind {
+            QuantityKind::Text | QuantityKind::Flag => Cow::Borrowed(text),
+            _ => plain_text(text).map_err(|err| err.to_string())?,
+        };
         let given = if self.is_list {
-            ProtocolValue::of_list(text.split(',').map(ProtocolValue::of_text).collect())
+            ProtocolValue::of_list(text.split([',', ';']).map(ProtocolValue::of_text).collect())
         } else {
-            ProtocolValue::of_text(text)
+            ProtocolValue::of_text(&text)
         };
         self.check(&given).map(|()| given)
     }

@@ -7,7 +7,7 @@ mod lake;
 mod saved;
 
 use super::Failure;
-use super::arguments::parse_columns;
+use super::arguments::{parse_columns, parse_number};
 use super::output::Output;
 use super::recalibrate::AuthorArgs;
 use super::{compliance, new_file, source_failure, sources_failure};
@@ -212,7 +212,7 @@ fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Re
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     let fixed = args.fixed.iter().map(|pair| {
         let (name, value) = pair.split_once('=')?;
-        let value = value.trim().parse::<f64>().ok().filter(|value| value.is_finite())?;
+        let value = parse_number(value.trim()).ok()?;
         Some((name.trim().to_owned(), value))
     });
     let fixed = fixed.zip(&args.fixed).map(|(read, pair)| {

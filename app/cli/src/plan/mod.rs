@@ -2,6 +2,7 @@
 
 mod text;
 
+use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::RigArgs;
 use super::{Failure, known_fit_failure};
@@ -108,7 +109,7 @@ fn targets(within: &[String]) -> Result<Vec<PrecisionTarget>, Failure> {
     for pair in within {
         let parsed = pair.split_once('=').and_then(|(name, value)| {
             let value = value.trim().trim_end_matches('%').trim_end();
-            Some((name.trim(), value.parse::<f64>().ok()?))
+            Some((name.trim(), parse_number(value).ok()?))
         });
         let Some((name, percent)) = parsed else {
             return Err(Failure::usage(format!(

@@ -7,6 +7,8 @@ use eframe::egui::{
     Align, Align2, ComboBox, Key, Label, Layout, Response, RichText, TextEdit, Ui, vec2,
 };
 use palpate_haptics::Period;
+use palpate_model::quantity::{in_base_unit, split, units_like};
+use palpate_model::typed_number::plain_text;
 use palpate_rheology::families;
 use palpate_rheology::tolerance::Tolerance;
 
@@ -14,6 +16,8 @@ use palpate_rheology::tolerance::Tolerance;
 #[derive(Clone, Debug, PartialEq)]
 pub struct QuantityField {
     pub text: String,
+    /// Of a number that is typed without one; as it was drawn last.
+    unit: String,
     /// The number, or what is wrong in one sentence.
     pub value: Result<f64, String>,
 }
@@ -28,7 +32,13 @@ impl QuantityField {
     /// A field that holds a number.
     #[must_use]
     pub fn new(value: f64) -> Self {
-        Self { text: value.to_string(), value: Ok(value) }
+        Self { text: value.to_string(), unit: String::new(), value: Ok(value) }
+    }
+
+    /// A field with a text that is not read yet.
+    #[must_use]
+    pub fn typed(text: String) -> Self {
+        Self { text, unit: String::new(), value: Err("not read yet".into()) }
     }
 
     /// The number, or its name and what is wrong.
@@ -38,7 +48,8 @@ impl QuantityField {
 
     /// Reads the text again and checks the number.
     pub fn check(&mut self, check: impl FnOnce(f64) -> Result<(), String>) {
-        self.value = parse(&self.text).and_then(|value| check(value).map(|()| value));
+        let value = parse(&self.text, &self.unit);
+        self.value = value.and_then(|value| check(value).map(|()| value));
     }
 }
 
@@ -47,19 +58,27 @@ pub fn check_rate(rate: f64) -> Result<(), String> {
     Period::of_rate(rate).map(|_| ()).map_err(|err| err.to_string())
 }
 
-/// A finite number, or one sentence.
-fn parse(text: &str) -> Result<f64, String> {
+/// A finite number in the unit of its field, or one sentence.
+fn parse(text: &str, unit: &str) -> Result<f64, String> {
     let text = text.trim();
     if text.is_empty() {
         return Err("type a number here, such as 0.75".into());
     }
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        _ if text.contains(',') => {
-            Err(format!("'{text}' is not a number; type a point instead of the comma, as in 0.75"))
-        }
-        _ => Err(format!("'{text}' is not a finite number; type a number such as 0.75")),
+    let plain = plain_text(text).map_err(|err| err.to_string())?;
+    let wrong = || format!("'{text}' is not a finite number; type a number such as 0.75");
+    let (number, own) = split(plain.trim()).ok_or_else(wrong)?;
+    if own.is_empty() || own == unit {
+        return Ok(number);
     }
+    // What is one of the field's unit in the base unit of its quantity.
+    let one = in_base_unit(1.0, unit).filter(|_| units_like(unit).contains(&own));
+    let (Some(one), Some(typed)) = (one, in_base_unit(number, own)) else {
+        return Err(match unit {
+            "" => wrong(),
+            unit => format!("'{own}' cannot be converted to {unit}; type the number in {unit}"),
+        });
+    };
+    Ok(typed / one)
 }
 
 /// Width in points of the labels in front of the inputs of a form.
@@ -68,6 +87,9 @@ const LABEL_WIDTH: f32 = 74.0;
 /// Draws a labelled input with its unit; true when the text changed.
 pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {
     let tokens = tokens_of(ui);
+    if field.unit != unit {
+        unit.clone_into(&mut field.unit);
+    }
     let row = |ui: &mut Ui| {
         let label = form_label(ui, name);
         let input = TextEdit::singleline(&mut field.text).desired_width(76.0).char_limit(24);
@@ -194,12 +216,17 @@ mod tests {
             (" 30 ", Ok(30.0)),
             ("1e1", Ok(10.0)),
             ("", Err("type a number here")),
-            ("0,75", Err("a point instead of the comma")),
+            ("0,75", Ok(0.75)),
+            ("7,5 mm", Ok(7.5)),
+            ("2 cm", Ok(20.0)),
+            ("30 \u{3bc}m", Ok(0.03)),
+            ("1,234", Err("could be 1.234 or 1234")),
+            ("3 N", Err("'N' cannot be converted to mm")),
             ("fast", Err("'fast' is not a finite number")),
             ("nan", Err("not a finite number")),
             ("inf", Err("not a finite number")),
         ] {
-            match (parse(text), wanted) {
+            match (parse(text, "mm"), wanted) {
                 (Ok(value), Ok(wanted)) => assert!((value - wanted).abs() < 1e-12),
                 (Err(reason), Err(words)) => assert!(reason.contains(words), "{reason}"),
                 (got, _) => panic!("'{text}' gave {got:?}"),

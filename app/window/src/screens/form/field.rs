@@ -2,6 +2,7 @@
 
 use palpate_model::metadata::MetadataKey;
 use palpate_model::rig::RigDescription;
+use palpate_model::typed_number::plain_text;
 use palpate_model::units::MmPerS;
 use palpate_protocols::file::{ProtocolParameter, ProtocolValue, QuantityKind, ValueContent};
 
@@ -48,13 +49,21 @@ impl ParamField {
                 _ => Err(format!("type a number here, such as {}", self.parameter.default.text)),
             };
         }
-        let value = match self.parameter.is_list {
-            true => text.split(',').map(|one| self.with_unit(one)).collect::<Vec<_>>().join(", "),
-            false => self.with_unit(text),
+        let value = match (self.parameter.kind, self.parameter.is_list) {
+            (QuantityKind::Text, _) => self.with_unit(text),
+            (_, true) => self.list(text)?,
+            (_, false) => self.with_unit(&plain_text(text).map_err(|err| err.to_string())?),
         };
         let given = self.parameter.read(&value)?;
         check_speeds(&given, rig)?;
         Ok(value)
+    }
+
+    /// Values between semicolons, or between commas where no comma is a decimal sign.
+    fn list(&self, text: &str) -> Result<String, String> {
+        let plain = plain_text(text).map_err(|err| err.to_string())?;
+        let values = plain.split([',', ';']).map(|one| self.with_unit(one));
+        Ok(values.collect::<Vec<_>>().join(", "))
     }
 
     /// A number without a unit gets the one of the field.
@@ -69,7 +78,7 @@ impl ParamField {
 
     /// The unit to show next to the field: none where the text has a unit of its own.
     pub fn shown_unit(&self) -> &'static str {
-        let text = self.text.trim();
+        let text = plain_text(self.text.trim()).unwrap_or_default();
         if text.is_empty() || text.parse::<f64>().is_ok() { self.unit } else { "" }
     }
 
@@ -152,11 +161,13 @@ mod tests {
         assert_eq!((rest.text.as_str(), rest.unit), ("3", "min"));
         assert_eq!(read(&rest, " 2 ").unwrap(), "2 min");
         assert_eq!(read(&rest, "5 s").unwrap(), "5 s");
+        assert_eq!(read(&rest, "0,5").unwrap(), "0.5 min");
         assert_eq!(rest.shown_unit(), "min");
         let own = ParamField { text: "5 s".into(), ..rest.clone() };
         assert_eq!(own.shown_unit(), "");
         let masses = of("load-cell-calibration", "masses");
         assert_eq!(read(&masses, "500, 0.6 kg").unwrap(), "500 g, 0.6 kg");
+        assert_eq!(read(&masses, "500; 0,6 kg").unwrap(), "500 g, 0.6 kg");
         let unload = of("ramp-hold", "unload");
         assert_eq!((unload.text.as_str(), unload.unit), ("", "mm/s"));
         assert_eq!(read(&unload, "").unwrap(), "none");
@@ -165,7 +176,8 @@ mod tests {
             (&speeds, "0.75, 900", "outside the range of rig sim"),
             (&rest, "", "type a number here"),
             (&rest, "soon", "\"soon\" is not a time"),
-            (&rest, "0,5", "write a point, not a comma"),
+            (&rest, "1,234", "could be 1.234 or 1234"),
+            (&masses, "500,600", "could be 500.600 or 500600"),
         ] {
             let reason = read(field, text).unwrap_err();
             assert!(reason.contains(words), "{text}: {reason}");

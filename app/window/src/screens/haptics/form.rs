@@ -34,7 +34,7 @@ impl Default for HapticsForm {
             body: THESIS.into(),
             is_current: false,
             damping: QuantityField::new(0.0),
-            friction: QuantityField { text: usual_friction(), value: Err("not read yet".into()) },
+            friction: QuantityField::typed(usual_friction()),
             rate: QuantityField::new(usual.period.hz()),
             delay: QuantityField::new(0.0),
             depth: QuantityField::new(usual.deepest.0),
