@@ -2,6 +2,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
+use palpate_analysis::report::session::session_name;
 use palpate_analysis::report::text::ParameterText;
 use palpate_runner::TimeScale;
 use palpate_sessions::Session;
@@ -27,8 +28,7 @@ fn show(flow: &mut WindowFlow, name: &str) -> PathBuf {
     }
     flow.type_into("session", &path.display().to_string());
     flow.click("Add to view");
-    let id = Session::open(&path).unwrap().manifest.session_id;
-    let words = format!("remove: {id}");
+    let words = format!("remove: {}", session_name(&Session::open(&path).unwrap().manifest));
     flow.wait("the session", |window| {
         let says = |words: &str| window.query_all_by_label_contains(words).next().is_some();
         says(&words) && !says("still reading") && !says("waiting to be read")
@@ -167,8 +167,8 @@ fn sessions_are_fitted_compared_and_predicted() {
     flow.window.run_steps(3);
     flow.window.check_accessibility();
     // The other one comes to the front, and the first is removed.
-    let id = |path: &PathBuf| Session::open(path).unwrap().manifest.session_id;
-    let (first, second) = (id(&path), id(&other));
+    let name = |path: &PathBuf| session_name(&Session::open(path).unwrap().manifest);
+    let (first, second) = (name(&path), name(&other));
     flow.click(&format!("front: {second}"));
     assert!(flow.says(&format!("front: {first}")));
     flow.click(&format!("remove: {first}"));

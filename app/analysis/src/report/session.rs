@@ -1,11 +1,29 @@
 //! A run as text: its ending, data quality, samples, time use and targets.
 
+use super::catalog::one_line;
 use super::text::table;
+use chrono::Local;
 use palpate_runner::fidelity::{Fidelity, TargetResult};
-use palpate_sessions::{DataQuality, EndRecord};
+use palpate_sessions::{DataQuality, EndRecord, Manifest};
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
+
+/// What a person calls a session: specimen, protocol and when it began by this computer's clock.
+#[must_use]
+pub fn session_name(manifest: &Manifest) -> String {
+    let specimen = match one_line(&manifest.specimen) {
+        text if text.is_empty() => "no specimen".to_owned(),
+        text => text,
+    };
+    let protocol = match (&manifest.imported, manifest.plan["name"].as_str()) {
+        (None, Some(name)) => one_line(name),
+        (Some(_), _) => "imported".to_owned(),
+        (None, None) => "no protocol".to_owned(),
+    };
+    let at = manifest.started_at.with_timezone(&Local).format("%Y-%m-%d %H:%M");
+    format!("{specimen}, {protocol}, {at}")
+}
 
 #[must_use]
 pub fn fidelity_text(

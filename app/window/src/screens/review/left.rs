@@ -9,7 +9,7 @@ use crate::widgets::{
     text_row, tick_box, tokens_of,
 };
 use crate::workers::review::{Quantity, Stage, TimeOrigin};
-use eframe::egui::{Button, Color32, Label, RichText, Sense, Ui, vec2};
+use eframe::egui::{Color32, Label, RichText, Sense, Ui, vec2};
 use std::path::PathBuf;
 
 /// A button of a session.
@@ -25,9 +25,10 @@ pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
     tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
 }
 
-/// A small button; a name too long for the panel is cut.
-fn small(text: &str) -> Button<'_> {
-    Button::new(text).small().truncate()
+/// A small button of one word, which says aloud of which session.
+fn action_ui(ui: &mut Ui, word: &str, session: &str) -> bool {
+    let name = format!("{word}: {session}");
+    ui.small_button(word).accessible_name(&name).named(&name).clicked()
 }
 
 /// Draws how far a session is read; returns the button that was pressed.
@@ -42,8 +43,7 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
             share_ui(ui, share);
             ui.horizontal(|ui| {
                 quiet_ui(ui, format!("still reading {:.0} %", 100.0 * share));
-                let cancel = format!("cancel: {}", subject.name);
-                if ui.add(small(&cancel)).clicked() {
+                if action_ui(ui, "cancel", &subject.name) {
                     pressed = Some(SessionAction::Cancel(index));
                 }
             });
@@ -55,8 +55,8 @@ fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<Sessio
         Stage::Failed(reason) => alarm_ui(ui, reason),
     }
     let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
-    let again = format!("read again: {}", subject.name);
-    (can_read && ui.small_button(again).clicked()).then_some(SessionAction::ReadAgain(index))
+    (can_read && action_ui(ui, "read again", &subject.name))
+        .then_some(SessionAction::ReadAgain(index))
 }
 
 impl ReviewScreen {
@@ -123,12 +123,10 @@ impl ReviewScreen {
             ui.horizontal(|ui| {
                 if index == 0 {
                     quiet_ui(ui, "in front");
-                } else if ui.add(small(&format!("front: {}", subject.name))).clicked() {
+                } else if action_ui(ui, "front", &subject.name) {
                     pressed = Some(SessionAction::Front(index));
                 }
-            });
-            ui.horizontal(|ui| {
-                if ui.add(small(&format!("remove: {}", subject.name))).clicked() {
+                if action_ui(ui, "remove", &subject.name) {
                     pressed = Some(SessionAction::Remove(index));
                 }
             });

@@ -155,6 +155,7 @@ impl ReviewScreen {
                 reading += 1;
             }
         }
+        distinguish(&mut self.subjects);
         self.set_wholes();
     }
 
@@ -217,6 +218,20 @@ impl ReviewScreen {
     /// The session in front.
     fn front(&self) -> Option<&ReviewSubject> {
         self.subjects.first()
+    }
+}
+
+/// Numbers the sessions that have one name.
+fn distinguish(subjects: &mut [ReviewSubject]) {
+    for index in 1..subjects.len() {
+        let (before, rest) = subjects.split_at_mut(index);
+        let own = &mut rest[0].name;
+        let first = own.clone();
+        let mut number = 2;
+        while before.iter().any(|one| one.name == *own) {
+            *own = format!("{first} ({number})");
+            number += 1;
+        }
     }
 }
 

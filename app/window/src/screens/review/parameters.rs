@@ -33,7 +33,7 @@ impl ReviewScreen {
             refusals_ui(ui, &self.subjects);
             return;
         };
-        let mut columns = vec![Column::words("specimen", 90.0), Column::words("session", 190.0)];
+        let mut columns = vec![Column::words("specimen", 90.0), Column::words("session", 270.0)];
         for parameter in &first.report.parameters {
             columns.push(Column::numbers(&text::parameter_head(parameter), 310.0));
         }

@@ -3,7 +3,7 @@
 use super::ReviewScreen;
 use super::subject::ReviewSubject;
 use crate::screens::exact_fit::exact_ui;
-use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, tokens_of};
+use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
@@ -23,8 +23,9 @@ impl ReviewScreen {
             return;
         };
         section_ui(ui, "Session in front");
-        fact_ui(ui, "id", front.name.as_str());
+        sentence_ui(ui, front.name.as_str());
         if let Some(head) = &front.recording.head {
+            fact_ui(ui, "id", head.manifest.session_id.as_str());
             let samples = format!(
                 "{} over {:.1} s, begun {}",
                 head.samples,

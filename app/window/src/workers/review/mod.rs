@@ -8,6 +8,7 @@ pub use facts::{SessionEvent, SessionFacts, TimeOrigin};
 pub use read::read;
 
 use eframe::egui::Context;
+use palpate_analysis::report::session::session_name;
 use palpate_model::rig::Phase;
 use palpate_model::signal::track::{SignalTrack, TrackSegment};
 use palpate_sessions::log::SessionSummary;
@@ -206,9 +207,9 @@ impl ReviewRecording {
         [own[0], own[1].max(expected)]
     }
 
-    /// Its session's identifier, or the name of its folder until that is read.
+    /// Specimen, protocol and time, or the name of its folder until that is read.
     pub fn name(&self) -> String {
-        let own = self.head.as_ref().map(|head| head.manifest.session_id.clone());
+        let own = self.head.as_ref().map(|head| session_name(&head.manifest));
         own.unwrap_or_else(|| {
             let name = self.path.file_name().unwrap_or(self.path.as_os_str());
             name.to_string_lossy().into_owned()
