@@ -8,6 +8,7 @@ use palpate_model::calibration::CALIBRATION_FORMAT;
 use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
 use palpate_rheology::trade::TRADE_FORMAT;
 use palpate_sessions::catalog::{CATALOG_FILE, CATALOG_VERSION};
+use palpate_sessions::specimen_queue::{QUEUE_FOLDER, QUEUE_VERSION};
 use palpate_sessions::{LINES_VERSION, RECORD_VERSION};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -57,6 +58,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             lines.clone(),
             "runs of programmes",
             "move a programme's folder elsewhere",
+        ),
+        (
+            "queue of specimens",
+            QUEUE_FOLDER,
+            format!("JSON lines, queue version {QUEUE_VERSION}"),
+            "'palpate queue' and the window",
+            "move the folder elsewhere",
         ),
         (
             "calibrations",

@@ -162,7 +162,7 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
     let mut flow = WindowFlow::open(TimeScale::Max);
     for (text, sentence) in [
         ("fast", "\"fast\" is not a speed"),
-        ("0,75", "write a point, not a comma"),
+        ("1,234", "could be 1.234 or 1234"),
         ("3 mm", "\"3 mm\" is a length"),
         ("0.7501", "cannot move at 0.7501 mm/s"),
         ("900", "outside the range of rig sim"),

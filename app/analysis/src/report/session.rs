@@ -2,14 +2,13 @@
 
 use super::catalog::one_line;
 use super::text::table;
-use chrono::Local;
 use palpate_runner::fidelity::{Fidelity, TargetResult};
 use palpate_sessions::{DataQuality, EndRecord, Manifest};
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
 
-/// What a person calls a session: specimen, protocol and when it began by this computer's clock.
+/// What a person calls a session: specimen, protocol and when it began.
 #[must_use]
 pub fn session_name(manifest: &Manifest) -> String {
     let specimen = match one_line(&manifest.specimen) {
@@ -21,7 +20,7 @@ pub fn session_name(manifest: &Manifest) -> String {
         (Some(_), _) => "imported".to_owned(),
         (None, None) => "no protocol".to_owned(),
     };
-    let at = manifest.started_at.with_timezone(&Local).format("%Y-%m-%d %H:%M");
+    let at = manifest.started_at.format("%Y-%m-%d %H:%M UTC");
     format!("{specimen}, {protocol}, {at}")
 }
 

@@ -6,7 +6,7 @@ use crate::widgets::quiet_ui;
 use eframe::egui::{Button, ScrollArea, Ui, vec2};
 
 /// Width of the rail in points.
-pub const WIDTH: f32 = 100.0;
+pub const WIDTH: f32 = 118.0;
 /// Height of an entry in points: large enough for a gloved finger.
 const ENTRY_HEIGHT: f32 = 48.0;
 

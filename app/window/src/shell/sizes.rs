@@ -18,8 +18,8 @@ impl PanelEdge {
     /// cuts them, and the plots of the smallest window are to stay wider than a panel.
     const fn sizes(self) -> [f32; 3] {
         match self {
-            Self::Left => [280.0, 304.0, 460.0],
-            Self::Right => [280.0, 318.0, 460.0],
+            Self::Left => [300.0, 330.0, 480.0],
+            Self::Right => [300.0, 340.0, 480.0],
             Self::Log => [70.0, 134.0, 320.0],
         }
     }
@@ -124,10 +124,10 @@ mod tests {
     #[test]
     fn sizes_stay_within_their_bounds_and_the_usual_ones_are_not_changes() {
         let mut sizes = Sizes::from_changes([None, Some(1.0), Some(f32::NAN)]);
-        assert_eq!(sizes.changes(), [None, Some(280.0), None]);
+        assert_eq!(sizes.changes(), [None, Some(300.0), None]);
         sizes.grow(PanelEdge::Left, 1e9);
         sizes.grow(PanelEdge::Log, -1e9);
-        assert_eq!(sizes.changes(), [Some(460.0), Some(280.0), Some(70.0)]);
+        assert_eq!(sizes.changes(), [Some(480.0), Some(300.0), Some(70.0)]);
         sizes.grow(PanelEdge::Left, -STEP);
         assert_eq!(Sizes::from_changes(sizes.changes()), sizes);
     }

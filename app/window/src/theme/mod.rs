@@ -69,17 +69,17 @@ fn visuals(theme: Theme, tokens: &Tokens) -> Visuals {
 fn set_type(style: &mut Style) {
     let size = |points: f32, family: FontFamily| FontId::new(points, family);
     style.text_styles = [
-        (TextStyle::Small, size(12.0, FontFamily::Proportional)),
-        (TextStyle::Body, size(13.5, FontFamily::Proportional)),
-        (TextStyle::Button, size(13.5, FontFamily::Proportional)),
-        (TextStyle::Heading, size(16.0, FontFamily::Proportional)),
-        (TextStyle::Monospace, size(12.5, FontFamily::Monospace)),
+        (TextStyle::Small, size(14.0, FontFamily::Proportional)),
+        (TextStyle::Body, size(15.0, FontFamily::Proportional)),
+        (TextStyle::Button, size(15.0, FontFamily::Proportional)),
+        (TextStyle::Heading, size(17.0, FontFamily::Proportional)),
+        (TextStyle::Monospace, size(14.0, FontFamily::Monospace)),
         (reading_style(), size(24.0, FontFamily::Monospace)),
     ]
     .into();
     style.spacing.item_spacing = vec2(6.0, 4.0);
     style.spacing.button_padding = vec2(8.0, 4.0);
-    style.spacing.interact_size.y = 22.0;
+    style.spacing.interact_size.y = 28.0;
     // Nothing slides or fades on an instrument; it also keeps an idle window from repainting.
     style.animation_time = 0.0;
 }

@@ -82,7 +82,7 @@ fn parse(text: &str, unit: &str) -> Result<f64, String> {
 }
 
 /// Width in points of the labels in front of the inputs of a form.
-const LABEL_WIDTH: f32 = 74.0;
+const LABEL_WIDTH: f32 = 84.0;
 
 /// Draws a labelled input with its unit; true when the text changed.
 pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {

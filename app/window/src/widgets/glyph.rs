@@ -146,11 +146,11 @@ pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
     };
     let at = |x: f32| pos2(rect.left() + x, rect.center().y);
     glyph_at(painter, glyph, at(8.0), 5.0, ink);
-    let font = FontId::proportional(13.5);
+    let font = FontId::proportional(15.0);
     painter.text(at(24.0), Align2::LEFT_CENTER, name, font.clone(), ink);
     painter.text(at(110.0), Align2::LEFT_CENTER, state.name(), font, ink);
     let (end, duration) = (at(rect.width() - 2.0), format!("{seconds:.1} s"));
-    painter.text(end, Align2::RIGHT_CENTER, duration, FontId::monospace(12.5), ink);
+    painter.text(end, Align2::RIGHT_CENTER, duration, FontId::monospace(14.0), ink);
 }
 
 #[cfg(test)]

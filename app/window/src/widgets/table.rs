@@ -8,7 +8,9 @@ use eframe::egui::{
 };
 
 /// Height of a row in points.
-pub(super) const ROW: f32 = 22.0;
+pub(super) const ROW: f32 = 26.0;
+/// Widths of columns are given for text of 13.5 points.
+const TEXT_SCALE: f32 = 15.0 / 13.5;
 /// Space between columns in points.
 pub(super) const GAP: f32 = 10.0;
 
@@ -16,7 +18,7 @@ pub(super) const GAP: f32 = 10.0;
 #[derive(Clone, Debug)]
 pub struct Column {
     pub head: String,
-    /// In points.
+    /// In points, scaled to the text.
     pub width: f32,
     /// Numbers stand on the right.
     pub is_number: bool,
@@ -25,12 +27,12 @@ pub struct Column {
 impl Column {
     #[must_use]
     pub fn words(head: &str, width: f32) -> Self {
-        Self { head: head.to_owned(), width, is_number: false }
+        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: false }
     }
 
     #[must_use]
     pub fn numbers(head: &str, width: f32) -> Self {
-        Self { head: head.to_owned(), width, is_number: true }
+        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: true }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::theme::Tokens;
 use eframe::egui::{Align, Color32, Label, Layout, RichText, Sense, Ui, vec2};
 
 /// Width of the names of facts in points.
-pub const NAME_WIDTH: f32 = 72.0;
+pub const NAME_WIDTH: f32 = 80.0;
 
 /// Colours of the theme that is shown.
 pub fn tokens_of(ui: &Ui) -> &'static Tokens {

@@ -7,7 +7,7 @@ use palpate_figures::figure::Plot;
 
 /// Draws all four in the space there is, two in a row.
 pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
-    let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 62.0) * 0.5);
+    let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 84.0) * 0.5);
     // Half as wide as the plots of a run.
     let steps = [Some(4.0), None];
     let look = PlotLook { steps, link: Some("calibration_force"), ..PlotLook::default() };

@@ -118,7 +118,7 @@ impl ReviewScreen {
                 if index == 0 {
                     name = name.strong();
                 }
-                ui.add(Label::new(name).truncate());
+                ui.add(Label::new(name).wrap());
             });
             ui.horizontal(|ui| {
                 if index == 0 {

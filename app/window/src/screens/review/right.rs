@@ -14,7 +14,7 @@ use palpate_sessions::edits::DataQuality;
 const HASH_SHOWN: usize = 12;
 /// Height of the list of events in points, and of one.
 const EVENTS_HEIGHT: f32 = 132.0;
-const EVENT_HEIGHT: f32 = 18.0;
+const EVENT_HEIGHT: f32 = 20.0;
 
 impl ReviewScreen {
     pub(super) fn draw_right(&mut self, ui: &mut Ui) {

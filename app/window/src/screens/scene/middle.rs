@@ -20,7 +20,7 @@ pub(super) enum PictureSource {
 /// Share of the height that the picture gets.
 const PICTURE_SHARE: f32 = 0.52;
 /// Room for a legend.
-const HEAD: f32 = 24.0;
+const HEAD: f32 = 32.0;
 
 struct ShownScene<'a> {
     instant: &'a SceneInstant,

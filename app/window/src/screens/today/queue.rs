@@ -300,12 +300,12 @@ impl QueueForm {
 
     fn table_ui(&mut self, ui: &mut Ui, items: &[QueueItem]) {
         let columns = [
-            Column::numbers("number", 52.0),
-            Column::words("specimen", 150.0),
-            Column::words("protocol", 140.0),
-            Column::words("state", 130.0),
-            Column::numbers("runs", 40.0),
-            Column::words("remark", 220.0),
+            Column::numbers("number", 46.0),
+            Column::words("specimen", 96.0),
+            Column::words("protocol", 84.0),
+            Column::words("state", 84.0),
+            Column::numbers("runs", 34.0),
+            Column::words("remark", 150.0),
         ];
         let table = ChoiceTable {
             name: "queue",
