@@ -37,6 +37,8 @@ pub enum UiCommand {
     View(RunPane),
     /// Takes a built-in protocol into the form.
     TakeProtocol(&'static str),
+    /// Accepts the run that has ended.
+    AcceptRun,
     /// Takes protocol and labels of the specimen with this number in the queue into the form.
     TakeSpecimen(u32),
     /// Has the queue of specimens changed, with a reason where one is needed.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 /// Sessions in the library of these tests.
-const SESSIONS: usize = 24;
+const SESSIONS: usize = 21;
 
 /// A library, the folder of each of its sessions, and the window on its library screen.
 fn opened() -> (WindowFlow, Vec<PathBuf>) {

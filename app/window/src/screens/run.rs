@@ -8,16 +8,19 @@ use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
 use super::run_verdict::RunVerdict;
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use super::today;
 use super::weighing::weighing_ui;
 use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
 use crate::widgets::require;
 use crate::workers::fit::{Refit, Refitter};
+use crate::workers::queue_desk::QueueWork;
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
 use palpate_runner::{RunRequest, RunView, wall_now};
 use palpate_sessions::recover::recover_library;
+use palpate_sessions::specimen_queue::QueueVerdict;
 use std::path::Path;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
@@ -96,6 +99,21 @@ impl RunScreen {
         match BUILT_IN.iter().find(|(name, _)| name == protocol) {
             Some((name, _)) => self.take_protocol(name, workbench),
             None => self.read(Some(Path::new(protocol)), ctx, workbench),
+        }
+    }
+
+    /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
+    fn accept(&mut self, workbench: &mut Workbench) -> Reaction {
+        let Some(session) = self.refitter.assessed(workbench.run()) else { return Reaction::Done };
+        if workbench.queue.is_busy() {
+            return Reaction::Done;
+        }
+        let work = QueueWork::Judge(session.to_owned(), QueueVerdict::Accept);
+        let by = workbench.form.label_text("operator").to_owned();
+        workbench.queue.ask(work, &by, self.verdict.reason());
+        match workbench.queue.queue().next() {
+            Some(_) => Reaction::ShowOther(today::SCREEN.name),
+            None => Reaction::Done,
         }
     }
 
@@ -233,6 +251,7 @@ impl Screen for RunScreen {
                 self.take_protocol(name, workbench);
                 return Reaction::Show;
             }
+            UiCommand::AcceptRun => return self.accept(workbench),
             UiCommand::TakeSpecimen(number) => {
                 self.take_specimen(*number, ctx, workbench);
                 return if workbench.queue.refusal.is_none() {
@@ -263,6 +282,8 @@ impl Screen for RunScreen {
             (RunPane::Weighing, "View: weights"),
             (RunPane::Approach, "View: surface search"),
         ];
+        let has_checks = self.refitter.assessed(workbench.run()).is_some();
+        let can_accept = require(has_checks, "no run has ended and been checked");
         let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
@@ -276,6 +297,10 @@ impl Screen for RunScreen {
             let words = format!("Protocol {name}");
             PaletteAction::new(words, "", UiCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
+        actions.push(
+            PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun)
+                .if_ok(can_accept),
+        );
         actions.push(PaletteAction::new(
             "Open a protocol file",
             "",

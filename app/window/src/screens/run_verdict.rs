@@ -21,6 +21,11 @@ pub struct RunVerdict {
 }
 
 impl RunVerdict {
+    /// The reason that is typed.
+    pub fn reason(&self) -> &str {
+        &self.reason
+    }
+
     /// Draws it for a run that has ended; `may_start` says why it cannot be repeated now.
     pub fn ui(
         &mut self,
@@ -49,8 +54,10 @@ impl RunVerdict {
         let can_reject = is_free.clone().and(has_reason);
         let can_repeat = can_reject.clone().and_then(|()| may_start.clone());
         ui.horizontal(|ui| {
+            if button_ui(ui, "Accept", is_free.is_ok()) {
+                commands.push(UiCommand::AcceptRun);
+            }
             for (name, verdict, can) in [
-                ("Accept", QueueVerdict::Accept, &is_free),
                 ("Reject", QueueVerdict::Reject, &can_reject),
                 ("Repeat", QueueVerdict::Repeat, &can_repeat),
             ] {

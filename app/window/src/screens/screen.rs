@@ -32,6 +32,8 @@ pub enum Reaction {
     Done,
     /// Done, and the screen is to be shown.
     Show,
+    /// Done, and the screen of this name is to be shown.
+    ShowOther(&'static str),
 }
 
 /// The part of the window between the top bar and the event log.
@@ -178,6 +180,7 @@ impl Screens {
                     self.shown = index;
                     return;
                 }
+                Reaction::ShowOther(name) => return self.show(name),
             }
         }
     }

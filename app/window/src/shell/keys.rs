@@ -74,8 +74,11 @@ impl KeyReader {
         }
         ctx.input(|input| {
             push_keys(&input.events, false, commands);
-            if is_pressed(&input.events, Key::K, true) {
-                commands.push(UiCommand::Palette);
+            for (key, command) in [(Key::K, UiCommand::Palette), (Key::Enter, UiCommand::AcceptRun)]
+            {
+                if is_pressed(&input.events, key, true) {
+                    commands.push(command);
+                }
             }
             for screen in SCREENS {
                 if screen.key.is_some_and(|key| is_pressed(&input.events, key, true)) {
