@@ -26,6 +26,7 @@ pub mod health;
 pub mod import_origin;
 pub mod journal;
 mod lock;
+pub mod locked_protocols;
 pub mod log;
 pub mod manifest;
 mod packed;

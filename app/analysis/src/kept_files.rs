@@ -8,6 +8,8 @@ use palpate_model::calibration::CALIBRATION_FORMAT;
 use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
 use palpate_rheology::trade::TRADE_FORMAT;
 use palpate_sessions::catalog::{CATALOG_FILE, CATALOG_VERSION};
+use palpate_sessions::document_store::Document;
+use palpate_sessions::locked_protocols::{LOCKED_PROTOCOL_FORMAT, LockedProtocol};
 use palpate_sessions::specimen_queue::{QUEUE_FOLDER, QUEUE_VERSION};
 use palpate_sessions::{LINES_VERSION, RECORD_VERSION};
 use serde::Serialize;
@@ -72,6 +74,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             format!("JSON, format {CALIBRATION_FORMAT}"),
             "'palpate calibration' and the window",
             "supersede the calibration by a newer one",
+        ),
+        (
+            "locked protocols",
+            LockedProtocol::FOLDER,
+            format!("JSON, format {LOCKED_PROTOCOL_FORMAT}"),
+            "'palpate protocol lock'",
+            "lock it again; the newest of a name counts",
         ),
         (
             "machine compliances",

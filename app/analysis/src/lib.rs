@@ -35,6 +35,7 @@ pub mod margin;
 pub mod plan;
 pub mod pool;
 pub mod progress;
+pub mod protocol_sources;
 pub mod recordings;
 pub mod report;
 pub mod run_quality;

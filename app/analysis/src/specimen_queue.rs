@@ -1,5 +1,6 @@
 //! The queue of specimens: read from a table, shown, and its runs judged together with their sessions.
 
+use crate::protocol_sources::find_protocol;
 use crate::session_actions::{Attribution, set_data_quality};
 use palpate_model::metadata::{MetadataError, SessionLabels, find_key};
 use palpate_protocols::file::BUILT_IN;
@@ -20,10 +21,14 @@ const PROTOCOL: &str = "protocol";
 /// comma, semicolon or tab. `protocol` is for rows that name none.
 ///
 /// Protocol files are sought from the folder of the table.
-pub fn read_specimens(file: &Path, protocol: &str) -> Result<Vec<QueuedSpecimen>, String> {
+pub fn read_specimens(
+    library: &Path,
+    file: &Path,
+    protocol: &str,
+) -> Result<Vec<QueuedSpecimen>, String> {
     let text = palpate_sessions::text::read(file)?;
     let folder = file.parent().unwrap_or(Path::new("."));
-    let found = parse_specimens(&text, protocol, folder);
+    let found = parse_specimens(&text, protocol, folder, library);
     found.map_err(|reason| format!("{}: {reason}", file.display()))
 }
 
@@ -31,6 +36,7 @@ fn parse_specimens(
     text: &str,
     protocol: &str,
     folder: &Path,
+    library: &Path,
 ) -> Result<Vec<QueuedSpecimen>, String> {
     // A byte order mark, as spreadsheets write it.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -66,7 +72,7 @@ fn parse_specimens(
         let labels = labels.map(|(name, text)| (name.clone(), text.clone()));
         let one = QueuedSpecimen {
             specimen: cells[place].clone(),
-            protocol: protocol_of(cell(PROTOCOL).unwrap_or(protocol), folder)
+            protocol: protocol_of(cell(PROTOCOL).unwrap_or(protocol), folder, library)
                 .map_err(|reason| format!("line {number}: {reason}"))?,
             labels: labels.collect(),
         };
@@ -79,23 +85,28 @@ fn parse_specimens(
     Ok(specimens)
 }
 
-/// A built-in name as it is, a file by its whole path.
-fn protocol_of(name: &str, folder: &Path) -> Result<String, String> {
-    if BUILT_IN.iter().any(|(known, _)| *known == name) {
-        return Ok(name.to_owned());
-    }
+/// A name as it is, a file by its whole path.
+fn protocol_of(name: &str, folder: &Path, library: &Path) -> Result<String, String> {
     let file = folder.join(name);
-    match file.is_file() {
-        true => Ok(std::path::absolute(&file).unwrap_or(file).display().to_string()),
-        false => Err(format!(
-            "'{name}' is neither a built-in protocol nor a file; give the name of one or the path of the other"
+    let is_file = file.is_file() && !BUILT_IN.iter().any(|(known, _)| *known == name);
+    if is_file {
+        return Ok(std::path::absolute(&file).unwrap_or(file).display().to_string());
+    }
+    match find_protocol(name, Some(library))? {
+        Some(_) => Ok(name.to_owned()),
+        None => Err(format!(
+            "'{name}' is neither a built-in protocol nor a file nor a locked protocol; give the name or the path of one"
         )),
     }
 }
 
 /// Specimens by their names alone.
-pub fn named_specimens(names: &[String], protocol: &str) -> Result<Vec<QueuedSpecimen>, String> {
-    let protocol = protocol_of(protocol, Path::new("."))?;
+pub fn named_specimens(
+    library: &Path,
+    names: &[String],
+    protocol: &str,
+) -> Result<Vec<QueuedSpecimen>, String> {
+    let protocol = protocol_of(protocol, Path::new("."), library)?;
     let one = |name: &String| QueuedSpecimen {
         specimen: name.trim().to_owned(),
         protocol: protocol.clone(),
@@ -213,7 +224,7 @@ mod tests {
     fn tables_of_spreadsheets_are_read_and_mistakes_name_their_line() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("own.toml"), "").unwrap();
-        let read = |text: &str| parse_specimens(text, "ramp-hold", folder.path());
+        let read = |text: &str| parse_specimens(text, "ramp-hold", folder.path(), folder.path());
         let found = read(
             "\u{feff}specimen;protocol;specimen.thickness_mm;specimen.source\r\n\"pig; 7\";;12;pig stomach\r\npig 8;own.toml;;\r\n\r\n",
         )
@@ -251,7 +262,7 @@ mod tests {
         let started = palpate_sessions::specimen_queue::start("pilot", true);
         change(library, &who, started).unwrap();
         let mut specimens =
-            named_specimens(&["a", "b", "c"].map(str::to_owned), "ramp-hold").unwrap();
+            named_specimens(library, &["a", "b", "c"].map(str::to_owned), "ramp-hold").unwrap();
         for one in &mut specimens {
             one.labels.insert("series.id".into(), "treated".into());
         }

@@ -140,8 +140,11 @@ pub(super) fn run(command: &QueueCommand, output: &Output) -> Result<(), Failure
         }
         QueueCommand::Add(args) => {
             let specimens = match &args.from {
-                Some(file) => read_specimens(file, &args.protocol).map_err(Failure::usage)?,
-                None => named_specimens(&args.names, &args.protocol).map_err(Failure::usage)?,
+                Some(file) => {
+                    read_specimens(&library, file, &args.protocol).map_err(Failure::usage)?
+                }
+                None => named_specimens(&library, &args.names, &args.protocol)
+                    .map_err(Failure::usage)?,
             };
             done("queue add", &by(args.by.as_deref()), QueueChange::Added { specimens })
         }

@@ -53,3 +53,31 @@ fn specimens_from_a_table_are_measured_in_a_recorded_order() {
     assert_refused(&twice, 2, "already has a specimen 'a'");
     assert_refused(&typed(at, "queue add d --protocol nothing"), 2, "neither a built-in protocol");
 }
+
+#[test]
+fn a_locked_protocol_is_run_as_it_is_and_nobody_sets_its_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let locked = ["protocol", "lock", "ramp-hold", "--as", "study 3", "--by", "Grace"];
+    let values = ["--set", "depth=6 mm", "--set", "hold=1 s", "--set", "speed=3,0 mm/s", "--json"];
+    let locked = answer(&palpate(at, &[&locked[..], &values[..]].concat()));
+    assert_eq!(locked["values"]["depth"], "6 mm");
+    let listed = answer(&typed(at, "protocol list --json"));
+    assert_eq!(listed["locked"][0]["name"], "study 3");
+    let wrong = palpate(at, &["run", "study 3", "--set", "depth=9 mm", "--preview"]);
+    assert_refused(&wrong, 2, "is locked, so its values cannot be changed");
+    succeeded(&palpate(at, &["queue", "add", "pig 1", "--protocol", "study 3"]));
+    let run = answer(&typed(at, "queue run --time-scale max --json"));
+    let info = answer(&palpate(at, &["info", run["session"].as_str().unwrap(), "--json"]));
+    let source = &info["plan"]["source"];
+    assert_eq!(source["values"]["depth"], "6 mm", "{info}");
+    // The session says which text it was.
+    let text = typed(at, "protocol show ramp-hold").stdout;
+    let text = String::from_utf8(text).unwrap();
+    assert_eq!(source["crc32"], format!("{:08x}", crc32fast::hash(text.as_bytes())));
+    assert_refused(
+        &palpate(at, &["protocol", "lock", "ramp-hold", "--as", "creep"]),
+        2,
+        "is a built-in protocol",
+    );
+}

@@ -4,11 +4,14 @@ use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_model::rig::Phase;
 use palpate_runner::TimeScale;
-use palpate_sessions::specimen_queue::{QueueCounts, SpecimenQueue, SpecimenState};
+use palpate_sessions::specimen_queue::{
+    QueueChange, QueueCounts, QueuedSpecimen, SpecimenQueue, SpecimenState,
+};
 use palpate_sessions::{DataQuality, Edits, SessionSummary};
 use palpate_tests::flow::WindowFlow;
-use palpate_window::screens::today;
+use palpate_window::screens::{run, today};
 use std::path::Path;
+use std::time::UNIX_EPOCH;
 
 fn queue(flow: &WindowFlow) -> SpecimenQueue {
     SpecimenQueue::read(flow.folder.path()).unwrap()
@@ -114,6 +117,24 @@ fn a_day_of_specimens_is_measured_repeated_rejected_and_counted() {
     let said: Vec<_> = said.into_iter().map(|session| quality(&library.join(session))).collect();
     let (valid, rejected) = (Some(DataQuality::Valid), Some(DataQuality::Rejected));
     assert_eq!(said, [valid, rejected, rejected]);
+}
+
+#[test]
+fn specimens_added_elsewhere_are_there_when_the_page_is_shown() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    show_today(&mut flow);
+    flow.wait_for_words("No specimen waits");
+    let specimen = QueuedSpecimen {
+        specimen: "pig 5".into(),
+        protocol: "ramp-hold".into(),
+        labels: Default::default(),
+    };
+    let added = QueueChange::Added { specimens: vec![specimen] };
+    SpecimenQueue::change(flow.folder.path(), UNIX_EPOCH, "Ada", "", added).unwrap();
+    flow.window.key_press_modifiers(Modifiers::COMMAND, run::SCREEN.key.unwrap());
+    flow.window.run_steps(3);
+    show_today(&mut flow);
+    flow.wait_for_words("1 waiting");
 }
 
 #[test]

@@ -6,6 +6,10 @@ use super::output::{Output, merged};
 use super::rig::{OpenRig, RigArgs};
 use super::{Failure, new_file, programme};
 use clap::{Args, Subcommand};
+use palpate_analysis::edits::author;
+use palpate_analysis::protocol_sources::{
+    ProtocolSource, find_protocol, lock_protocol, locked_protocols,
+};
 use palpate_analysis::report::plan_picture;
 use palpate_protocols::file::{
     BUILT_IN, Protocol, ProtocolCheck, ProtocolProblem, check, nearest_built_in, reference,
@@ -13,10 +17,9 @@ use palpate_protocols::file::{
 use palpate_protocols::plans::PlannedStep;
 use palpate_protocols::preview::{Preview, outline};
 use palpate_runner::Stopwatch;
-use palpate_sessions::text::read_if_present;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// List, check, show or preview protocols
 #[derive(Debug, Subcommand)]
@@ -29,8 +32,26 @@ pub enum ProtocolCommand {
     Show(ProtocolShowArgs),
     /// Preview a protocol step by step before anything moves
     Preview(ProtocolPreviewArgs),
+    /// Lock a protocol with its values under a name, for people who are to run it and change nothing
+    Lock(ProtocolLockArgs),
     /// Print the words of the protocol language
     Words,
+}
+
+/// Arguments of `palpate protocol lock`.
+#[derive(Debug, Args)]
+pub struct ProtocolLockArgs {
+    /// A built-in protocol, a file, or a locked protocol
+    #[arg(value_name = "NAME|FILE")]
+    protocol: String,
+    /// Name under which it is run; the one before of this name is superseded
+    #[arg(long = "as", value_name = "NAME")]
+    name: String,
+    #[command(flatten)]
+    values: ValueArgs,
+    /// Author; without it the login name
+    #[arg(long, value_name = "NAME")]
+    by: Option<String>,
 }
 
 /// Arguments of `palpate protocol check`.
@@ -77,6 +98,7 @@ pub(super) fn run(command: &ProtocolCommand, output: &Output) -> Result<(), Fail
         ProtocolCommand::Check(args) => run_check(args, output),
         ProtocolCommand::Show(args) => show(args, output),
         ProtocolCommand::Preview(args) => preview(args, output),
+        ProtocolCommand::Lock(args) => lock(args, output),
         ProtocolCommand::Words => {
             let text = reference();
             let object = serde_json::json!({ "text": text });
@@ -111,36 +133,36 @@ pub(super) fn parse_pair(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// The text of a built-in protocol or of a file.
-pub(super) fn read_text(name: &str) -> Result<String, Failure> {
-    if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
-        return Ok((*text).to_owned());
-    }
-    match read_if_present(Path::new(name)) {
-        Ok(Some(text)) => Ok(text),
-        Ok(None) => {
+/// A built-in protocol, a file, or a locked protocol of the library.
+fn read_source(name: &str) -> Result<ProtocolSource, Failure> {
+    let library = palpate_sessions::library_folder().ok();
+    match find_protocol(name, library.as_deref()).map_err(Failure::usage)? {
+        Some(source) => Ok(source),
+        None => {
             let hint = match nearest_built_in(name) {
                 Some(near) => format!("did you mean '{near}'?"),
-                None => "'palpate protocol list' lists the built-in protocols".into(),
+                None => "'palpate protocol list' lists the protocols".into(),
             };
             Err(Failure::usage(format!(
-                "'{name}' is neither a built-in protocol nor a file; {hint}"
+                "'{name}' is neither a built-in protocol nor a file nor a locked protocol; {hint}"
             )))
         }
-        Err(err) => Err(Failure::usage(format!(
-            "the protocol {name} cannot be read ({err}); give a text file"
-        ))),
     }
 }
 
+/// The text of a built-in protocol, of a file, or of a locked protocol.
+pub(super) fn read_text(name: &str) -> Result<String, Failure> {
+    Ok(read_source(name)?.text)
+}
+
 /// The same, unless it is a programme.
-fn read_protocol_text(name: &str) -> Result<String, Failure> {
+fn read_protocol(name: &str) -> Result<ProtocolSource, Failure> {
     if programme::is_programme(name) {
         return Err(Failure::usage(format!(
             "{name} is a programme, not a protocol; 'palpate run {name} --preview' shows its runs"
         )));
     }
-    read_text(name)
+    read_source(name)
 }
 
 /// A protocol expanded for a rig, or its first error; warnings become notes.
@@ -150,8 +172,9 @@ pub(super) fn load_checked(
     bench: &OpenRig,
     output: &Output,
 ) -> Result<(Protocol, palpate_protocols::file::ExpandedProtocol, Preview), Failure> {
-    let text = read_protocol_text(name)?;
-    let ProtocolCheck { plan, problems } = check_on(&text, values, bench)?;
+    let source = read_protocol(name)?;
+    let values = source.values(name, values).map_err(Failure::usage)?;
+    let ProtocolCheck { plan, problems } = check_on(&source.text, &values, bench)?;
     let errors: Vec<&ProtocolProblem> =
         problems.iter().filter(|problem| problem.is_error()).collect();
     if let Some(first) = errors.first() {
@@ -197,8 +220,33 @@ fn list(output: &Output) -> Result<(), Failure> {
         BUILT_IN.iter().map(|(name, text)| read(name, text)).collect();
     let protocols = protocols?;
     let heads: Vec<_> = protocols.iter().map(head).collect();
-    let object = serde_json::json!({ "protocols": heads });
-    output.answer("protocol list", &object, || text::list(&protocols));
+    let library = palpate_sessions::library_folder();
+    let (locked, unreadable) =
+        library.map_or_else(|_| Default::default(), |it| locked_protocols(&it));
+    unreadable.iter().for_each(|reason| output.note(reason));
+    let names = locked.iter().map(
+        |one| serde_json::json!({ "name": one.document.name, "by": one.document.by, "id": one.id }),
+    );
+    let object = serde_json::json!({ "protocols": heads, "locked": names.collect::<Vec<_>>() });
+    output.answer("protocol list", &object, || text::list(&protocols, &locked));
+    Ok(())
+}
+
+fn lock(args: &ProtocolLockArgs, output: &Output) -> Result<(), Failure> {
+    let library = palpate_sessions::library_folder().map_err(Failure::usage)?;
+    let (source, by) = (read_protocol(&args.protocol)?, author(args.by.as_deref()));
+    let stored = lock_protocol(&library, &args.name, &source, &args.values.values(), &by);
+    let stored = stored.map_err(Failure::usage)?;
+    let object = serde_json::json!({
+        "name": stored.document.name, "by": by, "id": stored.id, "values": stored.document.values,
+        "supersedes": stored.document.supersedes,
+    });
+    output.answer("protocol lock", &object, || {
+        format!(
+            "locked as {}: 'palpate run {}' runs it, and nobody can set its values",
+            stored.id, stored.document.name
+        )
+    });
     Ok(())
 }
 
@@ -264,7 +312,9 @@ fn show(args: &ProtocolShowArgs, output: &Output) -> Result<(), Failure> {
         output.answer("protocol show", &object, || file.trim_end().to_owned());
         return Ok(());
     }
-    let protocol = read(&args.protocol, &read_protocol_text(&args.protocol)?)?;
+    let source = read_protocol(&args.protocol)?;
+    let protocol = read(&args.protocol, &source.text)?;
+    let values = source.values(&args.protocol, &values).map_err(Failure::usage)?;
     let written = protocol
         .write_out(&values)
         .map_err(|problems| Failure::usage(text::sentences(&args.protocol, &problems)))?;

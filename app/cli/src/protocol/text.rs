@@ -4,13 +4,17 @@ use super::FileReport;
 use palpate_figures::uncertain::clock;
 use palpate_protocols::file::{ExpandedProtocol, Protocol, ProtocolParameter, ProtocolProblem};
 use palpate_protocols::preview::Preview;
+use palpate_sessions::locked_protocols::StoredLockedProtocol;
 
 /// Steps printed one by one; the totals follow in any case.
 const STEPS_MAX: usize = 200;
 
-pub(super) fn list(protocols: &[Protocol]) -> String {
+pub(super) fn list(protocols: &[Protocol], locked: &[StoredLockedProtocol]) -> String {
     let line = |protocol: &Protocol| format!("{:<22} {}", protocol.name, protocol.title);
-    let lines: Vec<String> = protocols.iter().map(line).collect();
+    let locked = locked
+        .iter()
+        .map(|one| format!("{:<22} locked by {}, {}", one.document.name, one.document.by, one.id));
+    let lines: Vec<String> = protocols.iter().map(line).chain(locked).collect();
     lines.join("\n")
 }
 

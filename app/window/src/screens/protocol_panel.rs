@@ -48,9 +48,14 @@ pub fn protocol_ui(
             for field in form.label_fields.iter_mut().filter(|one| is_shown(one)) {
                 label_ui(ui, field);
             }
-            for field in &mut form.fields {
-                parameter_ui(ui, field);
+            if form.is_locked {
+                quiet_ui(ui, "This protocol is locked: its values cannot be changed.");
             }
+            ui.add_enabled_ui(!form.is_locked, |ui| {
+                for field in &mut form.fields {
+                    parameter_ui(ui, field);
+                }
+            });
             more_labels_ui(ui, &mut form.label_fields);
             folder_ui(ui, &mut form.folder, facts, is_dialog_open, commands);
         });

@@ -118,9 +118,10 @@ impl RunScreen {
     }
 
     fn read(&mut self, path: Option<&Path>, ctx: &Context, workbench: &mut Workbench) {
+        let library = workbench.library.as_deref().ok();
         let begun = match path {
-            Some(path) => self.chooser.read(path, ctx),
-            None => self.chooser.read_typed(ctx),
+            Some(path) => self.chooser.read(path, library, ctx),
+            None => self.chooser.read_typed(library, ctx),
         };
         if let Err(err) = begun {
             workbench.refusal = Some(format!("the protocol cannot be read: {err}"));
@@ -238,12 +239,17 @@ impl Screen for RunScreen {
                     Some(Err(reason)) => workbench.refusal = Some(reason),
                     request => self.begin(request.and_then(Result::ok), workbench),
                 }
+                // What moves is to be seen.
+                return Reaction::Show;
             }
             UiCommand::ManualMove(manual) => {
                 let request = workbench.manual_run(manual);
                 self.begin(request, workbench);
             }
             UiCommand::View(view) => {
+                if *view == RunPane::Choose {
+                    self.chooser.list_locked(workbench.library.clone().ok(), ctx);
+                }
                 self.middle = *view;
                 return Reaction::Show;
             }

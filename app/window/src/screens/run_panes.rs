@@ -5,13 +5,14 @@ use crate::command::{Commands, UiCommand};
 use crate::plots::course::{CourseLimits, course_ui};
 use crate::widgets::{NamedControl, heading_ui, placeholder_ui, tokens_of};
 use crate::workbench::Workbench;
-use crate::workers::{Job, PathPurpose};
+use crate::workers::{BackgroundTask, Job, PathPurpose};
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
+use palpate_analysis::protocol_sources::{ProtocolSource, find_protocol, locked_protocols};
 use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
 use palpate_protocols::plans::{Plan, Step};
 use palpate_runner::RunView;
-use palpate_sessions::text::read_if_present;
+use palpate_sessions::locked_protocols::StoredLockedProtocol;
 use std::path::{Path, PathBuf};
 
 /// A view in the middle of the run screen.
@@ -78,11 +79,13 @@ pub fn first_view(plan: &Plan) -> RunPane {
 }
 
 /// A file read, or why not.
-type Text = (PathBuf, Result<String, String>);
+type Text = (PathBuf, Result<ProtocolSource, String>);
 
 /// The list of protocols and the file being read.
 pub struct Chooser {
     built_in: Vec<Protocol>,
+    /// Name and author of each locked protocol of the library, once they are read.
+    locked: BackgroundTask<Vec<(String, String)>>,
     typed: String,
     reading: Job<Text>,
 }
@@ -92,6 +95,7 @@ impl Default for Chooser {
         let texts = BUILT_IN.iter().map(|(_, text)| Protocol::read(text));
         Self {
             built_in: texts.filter_map(Result::ok).collect(),
+            locked: BackgroundTask::default(),
             typed: String::new(),
             reading: Job::default(),
         }
@@ -100,30 +104,61 @@ impl Default for Chooser {
 
 impl Chooser {
     /// Reads the file whose path is typed; the answer is polled.
-    pub fn read_typed(&mut self, ctx: &Context) -> std::io::Result<()> {
+    pub fn read_typed(&mut self, library: Option<&Path>, ctx: &Context) -> std::io::Result<()> {
         let path = PathBuf::from(self.typed.trim());
-        self.read(&path, ctx)
+        self.read(&path, library, ctx)
     }
 
-    /// Reads a file on a thread of its own.
-    pub fn read(&mut self, path: &Path, ctx: &Context) -> std::io::Result<()> {
+    /// Reads a file, or a locked protocol of the library by its name, on a thread of its own.
+    pub fn read(
+        &mut self,
+        path: &Path,
+        library: Option<&Path>,
+        ctx: &Context,
+    ) -> std::io::Result<()> {
+        let library = library.map(Path::to_owned);
         self.typed = path.display().to_string();
         let path = path.to_owned();
         let work = move || {
             let name = path.display();
-            let text = match read_if_present(&path) {
-                Ok(Some(text)) => Ok(text),
-                Ok(None) => Err(format!("the file {name} does not exist; choose another")),
-                Err(err) => Err(format!("{name} cannot be read ({err}); choose a text file")),
-            };
-            (path, text)
+            let found = find_protocol(&path.to_string_lossy(), library.as_deref());
+            let none = || format!("the file {name} does not exist; choose another");
+            let source = found.and_then(|found| found.ok_or_else(none));
+            (path, source)
         };
         self.reading.start("protocol-file", ctx, work)
     }
 
     /// A file that was read, once.
     pub fn poll(&mut self) -> Option<Text> {
+        self.locked.poll();
         self.reading.poll()
+    }
+
+    /// Lists the locked protocols of the library again.
+    pub fn list_locked(&mut self, library: Option<PathBuf>, ctx: &Context) {
+        self.locked.start("locked-protocols", ctx, move |_| {
+            let (found, _) = library.map(|library| locked_protocols(&library)).unwrap_or_default();
+            let pair = |one: StoredLockedProtocol| (one.document.name, one.document.by);
+            Ok(found.into_iter().map(pair).collect())
+        });
+    }
+
+    fn locked_ui(&self, ui: &mut Ui, form: &ProtocolForm, commands: &mut Commands) {
+        let Some(Ok(locked)) = self.locked.answer() else { return };
+        if locked.is_empty() {
+            return;
+        }
+        heading_ui(ui, "Locked protocols");
+        for (name, by) in locked {
+            let is_chosen = form.is_locked && form.file.as_deref() == Some(Path::new(name));
+            let button = Button::selectable(is_chosen, RichText::new(name).strong());
+            if ui.add(button.min_size(vec2(280.0, 32.0))).named(name).clicked() {
+                commands.push(UiCommand::Chosen(PathPurpose::Protocol, name.into()));
+            }
+            placeholder_ui(ui, format!("locked by {by}: its values cannot be changed"));
+        }
+        ui.add_space(8.0);
     }
 
     /// Draws the list, the field for a file and what is wrong with the file chosen.
@@ -141,6 +176,7 @@ impl Chooser {
                 mistakes_ui(ui, file, form);
             }
             ui.add_space(8.0);
+            self.locked_ui(ui, form, commands);
             ui.label(RichText::new("Built-in protocols").heading().strong());
             for protocol in &self.built_in {
                 let chosen = form.protocol.as_ref().ok();

@@ -182,11 +182,11 @@ fn carry_out(library: Result<PathBuf, String>, work: QueueWork, who: &Attributio
         QueueWork::Read | QueueWork::Judge(..) => read(),
         QueueWork::Change(wanted) => change(library, who, wanted),
         QueueWork::AddNamed(names, protocol) => {
-            let specimens = named_specimens(&names, &protocol)?;
+            let specimens = named_specimens(library, &names, &protocol)?;
             change(library, who, QueueChange::Added { specimens })
         }
         QueueWork::AddTable(file, protocol) => {
-            let specimens = read_specimens(&file, &protocol)?;
+            let specimens = read_specimens(library, &file, &protocol)?;
             change(library, who, QueueChange::Added { specimens })
         }
         QueueWork::Shuffle(seed) => change(library, who, read()?.shuffle(seed)),

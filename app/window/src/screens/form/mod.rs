@@ -7,6 +7,7 @@ pub use field::{LabelField, ParamField};
 use crate::command::ManualMove;
 use crate::widgets::require;
 use palpate_analysis::daily::needs_daily_check;
+use palpate_analysis::protocol_sources::ProtocolSource;
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::metadata::{METADATA_KEYS, SessionLabels};
 use palpate_model::rig::{Limits, RigDescription};
@@ -43,6 +44,8 @@ pub struct ProtocolForm {
     /// None for a built-in protocol.
     pub file: Option<PathBuf>,
     pub fields: Vec<ParamField>,
+    /// The values of the fields cannot be changed.
+    pub is_locked: bool,
     /// In the order of [`METADATA_KEYS`].
     pub label_fields: Vec<LabelField>,
     /// Folder for new sessions; empty for the library.
@@ -80,6 +83,7 @@ impl Default for ProtocolForm {
             protocol: Err(Vec::new()),
             file: None,
             fields: Vec::new(),
+            is_locked: false,
             label_fields: METADATA_KEYS.iter().map(empty).collect(),
             folder: String::new(),
             labels: SessionLabels::default(),
@@ -100,13 +104,20 @@ impl ProtocolForm {
         }
     }
 
-    /// Takes the text of a file.
-    pub fn choose_file(&mut self, path: &Path, text: Result<String, String>) {
-        let protocol = match text {
-            Ok(text) => Protocol::read(&text),
-            Err(reason) => Err(vec![ProtocolProblem::error(0, reason)]),
+    /// Takes the text of a file, or a locked protocol by its name.
+    pub fn choose_file(&mut self, path: &Path, source: Result<ProtocolSource, String>) {
+        let (protocol, locked) = match source {
+            Ok(source) => (Protocol::read(&source.text), source.locked),
+            Err(reason) => (Err(vec![ProtocolProblem::error(0, reason)]), None),
         };
         self.choose(protocol, Some(path.to_owned()));
+        self.is_locked = locked.is_some();
+        for (name, text) in locked.unwrap_or_default() {
+            let mut fields = self.fields.iter_mut();
+            if let Some(field) = fields.find(|field| field.parameter.name == name) {
+                field.text = text;
+            }
+        }
     }
 
     fn choose(&mut self, protocol: Result<Protocol, Vec<ProtocolProblem>>, file: Option<PathBuf>) {
@@ -118,6 +129,7 @@ impl ProtocolForm {
         }
         self.protocol = protocol;
         self.file = file;
+        self.is_locked = false;
         self.forget();
     }
 

@@ -1,4 +1,5 @@
 use super::*;
+use palpate_analysis::protocol_sources::ProtocolSource;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::units::MmPerS;
 use palpate_protocols::plans::{Hold, RampHold, Step, Unload};
@@ -146,7 +147,7 @@ fn labels_that_a_protocol_requires_must_be_filled_in() {
 fn a_file_with_mistakes_names_their_lines_and_does_not_start() {
     let mut form = ProtocolForm::default();
     let text = "palpate = 1\nname = \"x\"\nversion = 1\ntitle = \"X\"\nabout = \"x\"\n[procedure]\nsteps = [\n  { do = \"rmap\" },\n]\n";
-    form.choose_file(Path::new("x.toml"), Ok(text.into()));
+    form.choose_file(Path::new("x.toml"), Ok(ProtocolSource::free(text.into())));
     type_into(&mut form, &[]);
     let words: Vec<String> = form.problems().iter().map(ProtocolProblem::to_string).collect();
     assert!(words.iter().any(|one| one.starts_with("line 8: ")), "{words:?}");

@@ -27,8 +27,10 @@ pub struct TodayScreen {
     form: QueueForm,
     /// It was shown in the last frame.
     was_shown: bool,
-    /// The facts and the queue are to be read again.
+    /// The facts are to be read again.
     is_stale: bool,
+    /// The queue is to be read again: the command line may have changed it.
+    is_queue_stale: bool,
 }
 
 impl TodayScreen {
@@ -40,6 +42,8 @@ impl TodayScreen {
             form: QueueForm::default(),
             was_shown: false,
             is_stale: true,
+            // Once at the beginning, so that the screen of the run knows it too.
+            is_queue_stale: true,
         }
     }
 
@@ -79,13 +83,9 @@ impl Screen for TodayScreen {
         self.is_stale |= !std::mem::take(&mut self.was_shown);
         self.facts.poll();
         self.form.poll(workbench);
-        if !workbench.queue.is_read() && !workbench.queue.is_busy() && self.library.is_ok() {
-            // Once, so that the screen of the run knows the queue too.
-            let is_refused = workbench.queue.refusal.is_some();
-            if !is_refused {
-                workbench.queue.ask(QueueWork::Read, "", "");
-                ctx.request_repaint();
-            }
+        if std::mem::take(&mut self.is_queue_stale) && self.library.is_ok() {
+            workbench.queue.ask(QueueWork::Read, "", "");
+            ctx.request_repaint();
         }
     }
 
@@ -93,6 +93,7 @@ impl Screen for TodayScreen {
         self.was_shown = true;
         if std::mem::take(&mut self.is_stale) {
             self.read(ctx);
+            self.is_queue_stale = true;
             self.form.has_come();
         }
     }
