@@ -90,7 +90,7 @@ impl RunScreen {
         if workbench.is_busy() {
             return;
         }
-        let item = match workbench.queue.take_specimen(number) {
+        let item = match workbench.queue.waiting(number) {
             Ok(item) => item,
             Err(reason) => return workbench.queue.refusal = Some(reason),
         };
@@ -234,8 +234,10 @@ impl Screen for RunScreen {
         match command {
             UiCommand::Start => {
                 let specimen = workbench.form.specimen().to_owned();
+                let protocol = workbench.form.source_name();
                 let request = workbench.ready_run();
-                match request.map(|request| workbench.queue.start(&specimen).map(|()| request)) {
+                let queue = &mut workbench.queue;
+                match request.map(|request| queue.start(&specimen, &protocol).map(|()| request)) {
                     Some(Err(reason)) => workbench.refusal = Some(reason),
                     request => self.begin(request.and_then(Result::ok), workbench),
                 }

@@ -42,8 +42,6 @@ pub struct QueueDesk {
     pub refusal: Option<String>,
     /// The last session that was judged.
     judged: Option<(PathBuf, Result<QueueVerdict, String>)>,
-    /// Number of the specimen whose protocol and labels are in the form.
-    taken: Option<u32>,
     /// The specimen of the run that is about to begin.
     to_begin: Option<u32>,
 }
@@ -60,7 +58,6 @@ impl QueueDesk {
             doing: None,
             refusal: None,
             judged: None,
-            taken: None,
             to_begin: None,
         }
     }
@@ -122,8 +119,8 @@ impl QueueDesk {
         }
     }
 
-    /// The specimen of this number, if it waits and no run is without a verdict; it is then the one in the form.
-    pub fn take_specimen(&mut self, number: u32) -> Result<QueueItem, String> {
+    /// The specimen of this number, if it waits and no run is without a verdict.
+    pub fn waiting(&self, number: u32) -> Result<QueueItem, String> {
         if let Some(open) = self.queue.open_run() {
             return Err(format!(
                 "the run of {} has no verdict yet; accept, reject or repeat it first",
@@ -132,22 +129,34 @@ impl QueueDesk {
         }
         let item = self.queue.items.iter().find(|item| item.number == number);
         let item = item.filter(|item| item.state == SpecimenState::Waiting);
-        let item = item.ok_or("this specimen does not wait any more")?.clone();
-        self.taken = Some(number);
-        Ok(item)
+        item.cloned().ok_or_else(|| "this specimen does not wait any more".into())
     }
 
-    /// Says that the run that is about to start measures the specimen in the form, if that is one of the queue.
-    pub fn start(&mut self, specimen: &str) -> Result<(), String> {
-        let item = self.queue.items.iter().find(|item| Some(item.number) == self.taken);
-        let Some(item) = item.filter(|item| item.wanted.specimen == specimen) else {
-            self.to_begin = None;
-            return Ok(());
-        };
-        if item.state == SpecimenState::Begun && !self.is_busy() {
-            return Err(format!(
-                "the run of {specimen} has no verdict yet; accept, reject or repeat it first"
-            ));
+    /// Says which run is about to start: one of a specimen of the queue counts there, if it is what the queue asks for.
+    pub fn start(&mut self, specimen: &str, protocol: &str) -> Result<(), String> {
+        self.to_begin = None;
+        let Some(item) = self.queue.find(specimen) else { return Ok(()) };
+        match item.state {
+            // The verdict that lets it wait again is being written.
+            SpecimenState::Begun if self.is_busy() => {}
+            SpecimenState::Waiting if item.wanted.protocol == protocol => {}
+            SpecimenState::Waiting => {
+                return Err(format!(
+                    "the queue asks for the protocol {} on {specimen}; press 'Measure the next specimen' on the screen Today, or choose that protocol",
+                    item.wanted.protocol
+                ));
+            }
+            SpecimenState::Begun => {
+                return Err(format!(
+                    "the run of {specimen} has no verdict yet; accept, reject or repeat it first"
+                ));
+            }
+            SpecimenState::Accepted | SpecimenState::Rejected | SpecimenState::Skipped => {
+                return Err(format!(
+                    "{specimen} is {} in the queue; choose the next specimen on the screen Today, or let it wait again there",
+                    item.state
+                ));
+            }
         }
         self.to_begin = Some(item.number);
         Ok(())

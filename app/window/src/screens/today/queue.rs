@@ -4,12 +4,13 @@ use crate::command::{Commands, UiCommand};
 use crate::widgets::{ChoiceTable, ScrollPosition, TableAction};
 use crate::widgets::{
     Column, Emphasis, NamedControl, TableCell, TableLine, alarm_ui, form_label, placeholder_ui,
-    quiet_ui, reason_button, require, section_ui, sentence_ui, text_row, tick_box, tokens_of,
+    quiet_ui, reason_button, require, section_ui, sentence_ui, steady, text_row, tick_box,
+    tokens_of,
 };
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
 use crate::workers::queue_desk::QueueWork;
-use eframe::egui::{Button, Label, RichText, TextEdit, Ui, Vec2, vec2};
+use eframe::egui::{Button, Key, Label, RichText, TextEdit, Ui, Vec2, vec2};
 use palpate_analysis::report::queue::counts_text;
 use palpate_analysis::specimen_queue::{drawn_seed, visible_items};
 use palpate_sessions::specimen_queue::{
@@ -188,19 +189,19 @@ impl QueueForm {
     /// The field that a barcode scanner types into.
     fn scan_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
         section_ui(ui, "Scan or type a specimen");
-        let is_taken = ui
-            .horizontal(|ui| {
-                let label = form_label(ui, "scan here");
-                let input = TextEdit::singleline(&mut self.scanned).char_limit(200);
-                let input = input.desired_width(320.0).hint_text("name, then Enter");
-                let input = ui.add(input).labelled_by(label.id).named("scan here");
-                if std::mem::take(&mut self.is_to_focus) {
-                    input.request_focus();
-                }
-                let is_entered = ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
-                input.lost_focus() && is_entered
-            })
-            .inner;
+        // What stands above changes with a verdict; the field keeps the keys.
+        let row = |ui: &mut Ui| {
+            let label = form_label(ui, "scan here");
+            let input = TextEdit::singleline(&mut self.scanned).char_limit(200);
+            let input = input.desired_width(320.0).hint_text("name, then Enter");
+            let input = ui.add(input).labelled_by(label.id).named("scan here");
+            if std::mem::take(&mut self.is_to_focus) {
+                input.request_focus();
+            }
+            let is_entered = ui.input(|input| input.key_pressed(Key::Enter));
+            input.lost_focus() && is_entered
+        };
+        let is_taken = steady(ui, "scan here", |ui| ui.horizontal(row).inner);
         if is_taken {
             self.scan(workbench, commands);
         }
