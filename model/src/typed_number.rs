@@ -92,7 +92,7 @@ fn plain_letter(letter: char) -> char {
         // The Greek letter for the micro sign.
         '\u{3bc}' => '\u{b5}',
         // The ring and the ordinal indicator for the degree sign.
-        '\u{2da}' | '\u{ba}' => '\u{b0}',
+        '˚' | 'º' => '°',
         one if THIN_SPACES.contains(&one) => ' ',
         one => one,
     }

@@ -6,8 +6,9 @@ mod tables;
 use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
-    NamedControl, QuantityField, alarm_ui, placeholder_ui, quantity_ui, quiet_ui, require,
-    section_ui, sentence_ui, small_alarm_ui, small_ui, table_ui, tick_box, tolerance_ui, work_ui,
+    NamedControl, QuantityField, alarm_ui, heading_ui, placeholder_ui, quantity_ui, quiet_ui,
+    require, section_ui, sentence_ui, small_alarm_ui, small_ui, table_ui, tick_box, tolerance_ui,
+    work_ui,
 };
 use crate::workers::BackgroundTask;
 use eframe::egui::{Context, Key, Label, RichText, Ui, vec2};
@@ -233,8 +234,8 @@ impl Screen for TradeScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        ui.horizontal(|ui| {
-            ui.label(RichText::new("Error over time").heading().strong());
+        heading_ui(ui, "Error over time");
+        ui.horizontal_wrapped(|ui| {
             for (view, name) in VIEWS {
                 ui.selectable_value(&mut self.view, view, name).named(name);
             }
