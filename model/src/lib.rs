@@ -11,6 +11,7 @@
 
 pub mod assessment;
 pub mod calibration;
+pub mod control_chart;
 pub mod estimate;
 pub mod linalg;
 pub mod metadata;

@@ -5,6 +5,7 @@ use crate::catalog_search::session_folders;
 use crate::progress::Progress;
 use crate::source::{SourceError, calibration_of, decisions, records};
 use palpate_model::calibration::{Calibration, KnownWeight, WeightCheck};
+use palpate_model::control_chart::{ControlLimits, ControlSignal, READINGS_MIN};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
@@ -134,6 +135,42 @@ fn zero_of(
     Ok((volts, deviation))
 }
 
+/// Control limits of the deviations before the last, and what the last ones show; `None` of too few.
+#[must_use]
+pub fn control_limits(
+    known: &[DailyCheckDeviation],
+) -> Option<(ControlLimits, Option<ControlSignal>)> {
+    let readings: Vec<f64> = known.iter().map(|one| one.newtons).collect();
+    let (_, before) = readings.split_last()?;
+    let limits = ControlLimits::of(before)?;
+    Some((limits, limits.signal(&readings)))
+}
+
+/// What a control chart shows, in one sentence, and whether it is to be looked at.
+#[must_use]
+pub fn control_sentence(found: Option<(ControlLimits, Option<ControlSignal>)>) -> (String, bool) {
+    let Some((limits, signal)) = found else {
+        let words = format!("control limits need {} checks or more", READINGS_MIN + 1);
+        return (words, false);
+    };
+    let between = format!("the control limits of {:+.4} to {:+.4} N", limits.low, limits.high);
+    let advice = "find out what changed, and calibrate the load cell again before it fails";
+    let words = match signal {
+        None => return (format!("steady within {between}"), false),
+        Some(ControlSignal::Beyond) => format!("the last check is beyond {between}; {advice}"),
+        Some(ControlSignal::NearLimit) => {
+            format!("two of the last three checks are near one of {between}; {advice}")
+        }
+        Some(ControlSignal::Shift(count)) => {
+            format!("the last {count} checks lie on one side of the mean of {between}; {advice}")
+        }
+        Some(ControlSignal::Trend(count)) => {
+            format!("the last {count} checks move in one direction within {between}; {advice}")
+        }
+    };
+    (words, true)
+}
+
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let (volts, DailyCheckDeviation { newtons, limit }) = zero_of(calibration, records)?;
     let is_passed = newtons.abs() <= limit;
@@ -248,6 +285,28 @@ mod tests {
     use super::*;
     use palpate_protocols::plans::RampHold;
     use palpate_sessions::checks::add_check;
+
+    #[test]
+    fn a_drift_is_told_before_a_check_fails() {
+        let of = |newtons: &[f64]| {
+            let one = |newtons: &f64| DailyCheckDeviation { newtons: *newtons, limit: 0.1 };
+            control_sentence(control_limits(&newtons.iter().map(one).collect::<Vec<_>>()))
+        };
+        let steady = [0.01, -0.01, 0.0, 0.01, -0.01, 0.01, 0.0, -0.01, 0.01, 0.0, -0.01];
+        let (words, is_warning) = of(&steady);
+        assert!(words.starts_with("steady within") && !is_warning, "{words}");
+        assert!(of(&steady[..10]).0.contains("need 11 checks"));
+        let last = [&steady[..], &[0.06]].concat();
+        let (words, is_warning) = of(&last);
+        // Far from the limit of 0.1 N at which the check fails.
+        assert!(words.contains("beyond the control limits") && is_warning, "{words}");
+        let rising = [&steady[..], &[-0.005, 0.0, 0.004, 0.008, 0.012]].concat();
+        assert!(
+            of(&rising).0.contains("the last 6 checks move in one direction"),
+            "{:?}",
+            of(&rising)
+        );
+    }
 
     fn weighed(mass_g: f64, volts: f64) -> Record {
         Record::Weighed {

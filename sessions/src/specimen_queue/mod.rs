@@ -12,8 +12,7 @@ pub use change::{
 use crate::folder::{LOCK_FILE, create_folder};
 use crate::journal::{JOURNAL_FILE, Journal, format_time};
 use crate::lock::HolderLock;
-use rand_pcg::Pcg64;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use palpate_model::random::SplitMix;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -346,16 +345,14 @@ impl SpecimenQueue {
         counts
     }
 
-    /// Puts those that wait in a random order: Fisher and Yates's shuffle with the PCG64 generator of the seed.
+    /// Puts those that wait in a random order: Fisher and Yates's shuffle with the SplitMix64 generator of the seed.
     pub fn shuffle(&self, seed: u64) -> QueueChange {
         let mut order = self.waiting_numbers();
         // From the order of adding, so that a seed gives one order whatever was moved before.
         order.sort_unstable();
-        let mut random = Pcg64::seed_from_u64(seed);
+        let mut random = SplitMix::seeded(seed);
         for last in (1..order.len()).rev() {
-            // The product's upper half is uniform but for 2^-64 of its share.
-            let chosen = (u128::from(random.next_u64()) * (last as u128 + 1)) >> 64;
-            order.swap(last, chosen as usize);
+            order.swap(last, random.below(last + 1));
         }
         QueueChange::Shuffled { seed, order }
     }

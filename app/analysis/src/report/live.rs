@@ -6,6 +6,7 @@ use super::picture::band;
 use crate::daily::DailyCheckDeviation;
 use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries};
 use palpate_model::calibration::{CalibrationCurve, Direction, ForceUncertainty, newtons_of};
+use palpate_model::control_chart::ControlLimits;
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
 use palpate_model::units::Newtons;
@@ -209,15 +210,23 @@ pub fn weighing_plot(run: &RunView, curve: &CalibrationCurve) -> Plot {
     }
 }
 
-/// Deviation of one reading of each daily check in N over days, between its limits.
+/// Deviation of one reading of each daily check in N over days, between its limits and those of its control chart.
 #[must_use]
-pub fn deviation_plot(title: &str, known: &[(f64, DailyCheckDeviation)]) -> Plot {
+pub fn deviation_plot(
+    title: &str,
+    known: &[(f64, DailyCheckDeviation)],
+    control: Option<ControlLimits>,
+) -> Plot {
     let line = |of: fn(&DailyCheckDeviation) -> f64| {
         known.iter().map(|(at, one)| [*at, of(one)]).collect()
     };
     let dots = |is_within: bool| {
         let own = known.iter().filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
         own.map(|(at, one)| [*at, one.newtons]).collect()
+    };
+    let level = |height: Option<f64>| {
+        let points = |height: f64| known.iter().map(|(at, _)| [*at, height]).collect();
+        height.map_or_else(Vec::new, points)
     };
     // One check alone has no span of time; a day on either side gives it one.
     let seen = match known {
@@ -232,6 +241,8 @@ pub fn deviation_plot(title: &str, known: &[(f64, DailyCheckDeviation)]) -> Plot
     .with([
         PlotSeries::dashed("limit", Ink::Limit, 1.5, line(|one| one.limit)),
         PlotSeries::dashed("limit", Ink::Limit, 1.5, line(|one| -one.limit)),
+        PlotSeries::dashed("control limit", Ink::Line, 1.0, level(control.map(|it| it.low))),
+        PlotSeries::dashed("control limit", Ink::Line, 1.0, level(control.map(|it| it.high))),
         PlotSeries::line("deviation", Ink::Line, 1.0, line(|one| one.newtons)),
         PlotSeries::dots("within the limit", Ink::Series, 4.0, dots(true)),
         PlotSeries::rings("beyond the limit", Ink::Alarm, 4.0, dots(false)),

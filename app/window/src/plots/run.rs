@@ -3,7 +3,7 @@
 use super::figure::{PlacedPlot, PlotLook};
 use crate::widgets::{NamedControl, heading_ui, tokens_of};
 use crate::workers::fit::ExactFit;
-use eframe::egui::{RichText, Ui, vec2};
+use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::live::{LiveCycle, RunPlots, set_course};
 use palpate_figures::figure::{Ink, PlotLevel};
 use palpate_model::assessment::{Assessment, QualityCheck};
@@ -90,7 +90,8 @@ impl PlotCache {
                 ui.selectable_value(&mut self.is_from_ramp, view, name).named(name);
             }
             if let Some(remark) = &self.remark {
-                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+                let words = RichText::new(remark).color(tokens.text_quiet).small();
+                ui.add(Label::new(words).truncate());
             }
         });
         // The chart over time carries the limits and phases, so it gets the larger half.

@@ -9,7 +9,10 @@ use crate::widgets::{
 use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, Ui, vec2};
-use palpate_analysis::daily::{DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, past_checks};
+use palpate_analysis::daily::{
+    DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, control_limits, control_sentence,
+    past_checks,
+};
 use palpate_analysis::report::live::deviation_plot;
 use std::path::PathBuf;
 
@@ -94,7 +97,9 @@ impl Screen for ChecksScreen {
                 let known: Vec<(f64, DailyCheckDeviation)> =
                     checks.iter().filter_map(|one| Some((days(one), measured(one)?))).collect();
                 let look = PlotLook { x_text: Some(day_text), ..PlotLook::default() };
-                plot_ui(ui, head, &deviation_plot(head, &known), look);
+                let readings: Vec<DailyCheckDeviation> = known.iter().map(|(_, it)| *it).collect();
+                let control = control_limits(&readings).map(|(limits, _)| limits);
+                plot_ui(ui, head, &deviation_plot(head, &known, control), look);
             });
         }
         let columns = [
@@ -122,6 +127,13 @@ impl Screen for ChecksScreen {
         for part in &check.parts {
             section_ui(ui, &part.what);
             if part.is_passed { quiet_ui(ui, &part.sentence) } else { alarm_ui(ui, &part.sentence) }
+        }
+        section_ui(ui, "Trend");
+        for (name, measured) in [("weight", PLOTS[0].1), ("zero", PLOTS[1].1)] {
+            let readings: Vec<DailyCheckDeviation> = checks.iter().filter_map(measured).collect();
+            let (words, is_warning) = control_sentence(control_limits(&readings));
+            let words = format!("{name}: {words}");
+            if is_warning { alarm_ui(ui, words) } else { quiet_ui(ui, words) }
         }
         let failed = checks.iter().filter(|one| !one.check.is_passed).count();
         section_ui(ui, "All checks");
