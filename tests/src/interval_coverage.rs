@@ -7,9 +7,11 @@ use palpate_analysis::fit::{IntervalRequest, JointFitRequest, fit_together};
 use palpate_analysis::recordings::{Recording, Recordings};
 use palpate_analysis::source::{self, RecordStretch};
 use palpate_drivers::sim::{RigWithTruth, SimCell, SimProfile, SimRig, SimSettings};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::calibration::Calibration;
+use palpate_model::rig::{HandAction, RigCommand, RigDescription};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_model::{Depth, MmPerS, Seconds};
+use palpate_model::{Depth, MmPerS, Nanos, Seconds};
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_rheology::fit::{
@@ -151,7 +153,52 @@ fn measured_compliance(settings: SimSettings) -> ComplianceCorrections {
     ComplianceCorrections::named(LATEST_COMPLIANCE, Some(library.path())).expect("it is in force")
 }
 
-/// One ramp and hold as a recording, and what was true.
+/// A simulated rig that has stood for longer than a run takes, so that no noise of a run of the same seed comes again. Its
+/// clocks begin at zero all the same.
+struct LaterRig {
+    rig: Box<dyn Rig>,
+    since: Nanos,
+}
+
+/// Ticks that the rig has stood.
+const STOOD: u64 = 600_000;
+
+impl LaterRig {
+    fn new(mut rig: Box<dyn Rig>, tick_nanos: u64) -> Self {
+        let since = Nanos(STOOD * tick_nanos);
+        while rig.next_event(since).is_some() {}
+        Self { rig, since }
+    }
+}
+
+impl Rig for LaterRig {
+    fn description(&self) -> &RigDescription {
+        self.rig.description()
+    }
+
+    fn send(&mut self, command: RigCommand) {
+        self.rig.send(command);
+    }
+
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
+        let mut event = self.rig.next_event(Nanos(until.0 + self.since.0))?;
+        event.at = event.at.since(self.since);
+        if let RigEventBody::Reading(reading) = &mut event.body {
+            reading.tick -= STOOD;
+        }
+        Some(event)
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+
+    fn apply_hand_action(&mut self, action: HandAction) {
+        self.rig.apply_hand_action(action);
+    }
+}
+
+/// One ramp and hold as a recording, and what was true. One of a speed of its own is the second on its specimen.
 ///
 /// # Panics
 /// If the run fails or its compliance cannot be measured.
@@ -177,7 +224,12 @@ pub fn recorded(
     if let Some(speed) = speed {
         params.speed = MmPerS(speed);
     }
-    let session = record_ramp_hold(watched, calibration.clone(), params);
+    let rig: Box<dyn Rig> = match speed {
+        // The second run on a specimen has noise and drift of its own.
+        Some(_) => Box::new(LaterRig::new(watched, settings.tick_nanos())),
+        None => watched,
+    };
+    let session = record_ramp_hold(rig, calibration.clone(), params);
     let truth = truths.recv().expect("the rig is switched off");
     let contact = contact_of(&session);
     let read = source::of_session(session, RecordStretch::RampHold, &[]);
