@@ -1,16 +1,18 @@
 //! Control limits of single readings over time (Shewhart's chart for individuals, ISO 7870-2), and what shows that the process
 //! moves before a reading leaves them.
 
-/// Readings from which limits are computed at least: with fewer, the mean moving range is uncertain by more than a fifth.
+/// Readings from which limits are computed at least: with fewer, the mean moving range is uncertain by more than a
+/// quarter.
 pub const READINGS_MIN: usize = 10;
 
-/// Three standard deviations over the mean moving range of two readings: 3 / 1.128 (ISO 7870-2, table 2).
+/// Three standard deviations over the mean moving range of two readings, which is 1.128 standard deviations: 3 / 1.128.
 const LIMITS_PER_RANGE: f64 = 2.66;
 
-/// Readings in a row on one side of the mean that show a shift; a steady process does so once in 128 readings.
+/// Readings in a row on one side of the mean that show a shift (Western Electric, Statistical Quality Control Handbook, 1956); eight
+/// given ones of a steady process do so once in 128 times.
 const SHIFT: usize = 8;
 
-/// Readings in a row that each rise, or fall, and show a trend.
+/// Readings in a row that each rise, or fall, and show a trend (Nelson, J. Quality Technology 16 (1984) 237-239).
 const TREND: usize = 6;
 
 /// Mean and limits, in the unit of the readings.

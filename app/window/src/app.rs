@@ -127,6 +127,10 @@ impl WorkbenchApp {
             UiCommand::Work => self.screens.shown_mut().work(ctx, &mut self.workbench),
             UiCommand::CancelWork => self.screens.shown_mut().cancel(),
             UiCommand::Show(screen) => self.screens.show(screen),
+            // What is judged is to be seen.
+            UiCommand::AcceptRun if self.screens.shown() != run::SCREEN.name => {
+                self.screens.show(run::SCREEN.name);
+            }
             UiCommand::SwitchTheme => theme::switch(ctx),
             UiCommand::Resize { edge, is_larger } => {
                 self.sizes.grow(edge, if is_larger { STEP } else { -STEP });

@@ -304,7 +304,10 @@ impl Workbench {
         self.refusal = None;
         match self.runner.request(RunnerRequest::Run(Box::new(request), reply)) {
             Ok(()) => self.start = Start::Sent(answer),
-            Err(reason) => self.refusal = Some(reason),
+            Err(reason) => {
+                self.queue.cancel_start();
+                self.refusal = Some(reason);
+            }
         }
     }
 
@@ -331,6 +334,7 @@ impl Workbench {
                 }
                 Err(TryRecvError::Empty) => {}
                 Err(TryRecvError::Disconnected) => {
+                    self.queue.cancel_start();
                     self.refusal = Some(
                         "the thread that runs protocols ended unexpectedly; close palpate and check the rig"
                             .into(),

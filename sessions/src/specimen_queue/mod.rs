@@ -1,7 +1,7 @@
 //! The queue of specimens: which are to be measured, by which protocol, in which order, and what became of each.
 //!
-//! Its only storage is the journal of its changes, each on the disk before anything else happens: it survives a crash, and
-//! every change keeps its time, author and reason.
+//! Its only storage is the journal of its changes, each synchronised with the disk: it survives a crash, and every change
+//! keeps its time, author and reason.
 
 mod change;
 

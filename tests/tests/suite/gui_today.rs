@@ -181,3 +181,41 @@ fn a_window_that_ends_in_mid_run_leaves_the_specimen_to_be_judged() {
     flow.wait_for_words("1 skipped");
     assert_eq!(queue(&flow).find("pig 2").unwrap().state, SpecimenState::Skipped);
 }
+
+#[test]
+fn a_refused_change_does_not_hold_up_the_day_and_a_blinded_label_is_not_shown() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    let library = flow.folder.path().to_owned();
+    let labels = [("series.id".to_owned(), "treated".to_owned())];
+    let specimen = QueuedSpecimen {
+        specimen: "pig 1".into(),
+        protocol: "ramp-hold".into(),
+        labels: labels.into(),
+    };
+    let started = palpate_sessions::specimen_queue::start("pilot", true);
+    for change in [started, QueueChange::Added { specimens: vec![specimen] }] {
+        SpecimenQueue::change(&library, UNIX_EPOCH, "Ada", "", change).unwrap();
+    }
+    show_today(&mut flow);
+    flow.wait_for_words("1 waiting");
+    flow.type_into("names", "pig 1");
+    flow.click("Add");
+    flow.wait_for_words("already has a specimen 'pig 1'");
+    flow.click("Measure the next specimen");
+    flow.window.run_steps(3);
+    assert_eq!(flow.window.get_by_label("specimen").value().as_deref(), Some("pig 1"));
+    assert!(flow.says("labels of this specimen are hidden"));
+    assert!(!flow.says("More about specimen"));
+    shorten(&mut flow);
+    start(&mut flow);
+    let session = flow.run().unwrap().folder;
+    let manifest = SessionSummary::read(&session).unwrap().manifest;
+    assert_eq!(manifest.about.get("series.id").unwrap(), "treated");
+    // Another screen's Ctrl+Enter shows the run before it can be judged.
+    show_today(&mut flow);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    flow.window.run_steps(3);
+    assert_eq!(queue(&flow).open_run().unwrap().wanted.specimen, "pig 1");
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
+    flow.wait_for_words("Accepted.");
+}

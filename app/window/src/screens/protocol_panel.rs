@@ -45,7 +45,9 @@ pub fn protocol_ui(
         // Locked during a run, but still readable: it says what is running.
         ui.visuals_mut().disabled_alpha = LOCKED_ALPHA;
         ui.add_enabled_ui(!is_busy, |ui| {
-            for field in form.label_fields.iter_mut().filter(|one| is_shown(one)) {
+            let is_blinded = form.is_blinded;
+            let shown = form.label_fields.iter_mut();
+            for field in shown.filter(|one| is_shown(one) && !is_hidden(one, is_blinded)) {
                 label_ui(ui, field);
             }
             if form.is_locked {
@@ -56,7 +58,14 @@ pub fn protocol_ui(
                     parameter_ui(ui, field);
                 }
             });
-            more_labels_ui(ui, &mut form.label_fields);
+            if is_blinded {
+                quiet_ui(
+                    ui,
+                    "The queue is blinded: labels of this specimen are hidden, and recorded.",
+                );
+            } else {
+                more_labels_ui(ui, &mut form.label_fields);
+            }
             folder_ui(ui, &mut form.folder, facts, is_dialog_open, commands);
         });
     });
@@ -118,6 +127,11 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
 
 fn is_shown(field: &LabelField) -> bool {
     field.is_required || ALWAYS.contains(&field.key.name)
+}
+
+/// Whether a label would tell a blinded operator which group a specimen is of.
+fn is_hidden(field: &LabelField, is_blinded: bool) -> bool {
+    is_blinded && (field.key.name.starts_with("specimen.") || field.key.name.starts_with("series."))
 }
 
 /// The other labels, folded away.

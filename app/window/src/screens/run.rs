@@ -85,21 +85,24 @@ impl RunScreen {
         }
     }
 
-    /// Takes protocol and labels of a specimen in the queue into the form.
-    fn take_specimen(&mut self, number: u32, ctx: &Context, workbench: &mut Workbench) {
-        if workbench.is_busy() {
-            return;
-        }
-        let item = match workbench.queue.waiting(number) {
+    /// Takes protocol and labels of a specimen in the queue into the form, and shows them.
+    fn take_specimen(&mut self, number: u32, ctx: &Context, workbench: &mut Workbench) -> Reaction {
+        let found = workbench.free_verdict().and_then(|()| workbench.queue.waiting(number));
+        let item = match found {
             Ok(item) => item,
-            Err(reason) => return workbench.queue.refusal = Some(reason),
+            Err(reason) => {
+                workbench.queue.refusal = Some(reason);
+                return Reaction::Done;
+            }
         };
-        workbench.form.take_labels(&item.wanted);
+        workbench.queue.refusal = None;
+        workbench.form.take_labels(&item.wanted, workbench.queue.queue().is_blinded);
         let protocol = &item.wanted.protocol;
         match BUILT_IN.iter().find(|(name, _)| name == protocol) {
             Some((name, _)) => self.take_protocol(name, workbench),
             None => self.read(Some(Path::new(protocol)), ctx, workbench),
         }
+        Reaction::Show
     }
 
     /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
@@ -245,6 +248,7 @@ impl Screen for RunScreen {
                 return Reaction::Show;
             }
             UiCommand::ManualMove(manual) => {
+                workbench.queue.cancel_start();
                 let request = workbench.manual_run(manual);
                 self.begin(request, workbench);
             }
@@ -261,12 +265,7 @@ impl Screen for RunScreen {
             }
             UiCommand::AcceptRun => return self.accept(workbench),
             UiCommand::TakeSpecimen(number) => {
-                self.take_specimen(*number, ctx, workbench);
-                return if workbench.queue.refusal.is_none() {
-                    Reaction::Show
-                } else {
-                    Reaction::Done
-                };
+                return self.take_specimen(*number, ctx, workbench);
             }
             UiCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);

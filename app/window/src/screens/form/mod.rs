@@ -46,6 +46,8 @@ pub struct ProtocolForm {
     pub fields: Vec<ParamField>,
     /// The values of the fields cannot be changed.
     pub is_locked: bool,
+    /// The labels of the specimen, but for its name, are not shown.
+    pub is_blinded: bool,
     /// In the order of [`METADATA_KEYS`].
     pub label_fields: Vec<LabelField>,
     /// Folder for new sessions; empty for the library.
@@ -84,6 +86,7 @@ impl Default for ProtocolForm {
             file: None,
             fields: Vec::new(),
             is_locked: false,
+            is_blinded: false,
             label_fields: METADATA_KEYS.iter().map(empty).collect(),
             folder: String::new(),
             labels: SessionLabels::default(),
@@ -189,7 +192,10 @@ impl ProtocolForm {
     }
 
     /// Takes the labels of a queued specimen; those of the specimen before do not stay, those of operator and probe do.
-    pub fn take_labels(&mut self, wanted: &QueuedSpecimen) {
+    ///
+    /// Where whoever measures is blinded, those of the specimen are recorded and not shown.
+    pub fn take_labels(&mut self, wanted: &QueuedSpecimen, is_blinded: bool) {
+        self.is_blinded = is_blinded;
         for field in &mut self.label_fields {
             let name = field.key.name;
             if name == "specimen" {
