@@ -19,7 +19,6 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::{LogLine, RunView, TimeScale};
 use palpate_test_support::wait::Deadline;
 use palpate_window::app::WorkbenchApp;
-use palpate_window::screens::run::RunScreen;
 use palpate_window::screens::screen::Screen;
 use palpate_window::window::WindowOptions;
 use palpate_window::workers::fit::Refit;
@@ -38,8 +37,7 @@ pub fn screen_of<T: Screen>(window: &TestWindow) -> &T {
 /// State of the exact fit of the run on the screen.
 #[must_use]
 pub fn refit(window: &TestWindow) -> Refit<'_> {
-    let run = window.state().snapshot().run.as_ref();
-    screen_of::<RunScreen>(window).refit(run)
+    window.state().refit()
 }
 
 /// Sleep between two frames of a wait.

@@ -2,7 +2,7 @@
 
 use crate::command::{Commands, TextSize, UiCommand};
 use crate::screens::screen::{Screen, Screens};
-use crate::screens::{rig, run, start_page};
+use crate::screens::{result, rig, run, start_page};
 use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
 use crate::shell::dropped_files::push_dropped;
@@ -22,6 +22,7 @@ use crate::widgets::places;
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
+use crate::workers::fit::Refit;
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_analysis::demonstration_library::has_no_session;
 use palpate_analysis::window_requests::WorkbenchRequest;
@@ -102,6 +103,11 @@ impl WorkbenchApp {
         &self.workbench.snapshot
     }
 
+    /// How far the exact fit of the run is.
+    pub fn refit(&self) -> Refit<'_> {
+        self.workbench.latest_run.refit(self.workbench.run())
+    }
+
     pub fn screen<T: Screen>(&self) -> Option<&T> {
         self.screens.get()
     }
@@ -128,8 +134,8 @@ impl WorkbenchApp {
             UiCommand::CancelWork => self.screens.shown_mut().cancel(),
             UiCommand::Show(screen) => self.screens.show(screen),
             // What is judged is to be seen.
-            UiCommand::AcceptRun if self.screens.shown() != run::SCREEN.name => {
-                self.screens.show(run::SCREEN.name);
+            UiCommand::AcceptRun if self.screens.shown() != result::SCREEN.name => {
+                self.screens.show(result::SCREEN.name);
             }
             UiCommand::SwitchTheme => theme::switch(ctx),
             UiCommand::Resize { edge, is_larger } => {
@@ -321,6 +327,10 @@ impl eframe::App for WorkbenchApp {
         }
         self.workbench.occupation = self.screens.occupation();
         self.screens.poll(ctx, &mut self.workbench);
+        // Who watched the run sees what came of it; who is elsewhere is left there.
+        if self.workbench.follow_run(ctx) && self.screens.shown() == run::SCREEN.name {
+            self.screens.show(result::SCREEN.name);
+        }
         if let Some(request) = self.workbench.next_rig.take() {
             self.take_rig(ctx, request);
         }

@@ -8,6 +8,7 @@
 
 pub mod app;
 pub mod command;
+mod latest_run;
 pub mod playback;
 pub mod plots;
 pub mod scene;

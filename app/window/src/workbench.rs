@@ -1,13 +1,14 @@
 //! State that all screens share: the runner and its snapshot, the protocol in the form, the calibration in use.
 
 use crate::command::{ManualMove, UiCommand};
-use crate::screens::form::{ProtocolForm, RunSetup};
+use crate::latest_run::LatestRun;
+use crate::screens::form::{CheckedPlan, ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
 use crate::workers::queue_desk::QueueDesk;
 use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
-use eframe::egui::Context;
+use eframe::egui::{Context, Ui};
 use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
@@ -74,6 +75,7 @@ pub struct Workbench {
     pub occupation: Occupation,
     /// The queue of specimens.
     pub queue: QueueDesk,
+    pub latest_run: LatestRun,
     start: Start,
     starts: u64,
     /// The run that begins once every loop of the window has stopped.
@@ -108,6 +110,7 @@ impl Workbench {
             None => palpate_sessions::library_folder().map_err(|err| err.to_string()),
         };
         let mut workbench = Self {
+            latest_run: LatestRun::new(&request.calibration),
             snapshot: runner.snapshot(),
             runner,
             bench: RunSetup {
@@ -148,11 +151,6 @@ impl Workbench {
     /// The run in progress or the last one.
     pub fn run(&self) -> Option<&RunView> {
         self.snapshot.run.as_ref()
-    }
-
-    /// How many runs were started from this window.
-    pub fn starts(&self) -> u64 {
-        self.starts
     }
 
     pub fn intent(&self) -> Intent {
@@ -317,6 +315,20 @@ impl Workbench {
         self.ports.poll();
         self.poll_start();
         self.queue.poll(ctx);
+    }
+
+    /// Follows the run of the snapshot; true when a run that has a result has just ended.
+    pub fn follow_run(&mut self, ctx: &Context) -> bool {
+        let run = self.snapshot.run.as_ref();
+        let depth_mm = self.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
+        let library = self.library.as_ref().ok();
+        self.latest_run.update(ctx, run, self.starts, &self.bench, depth_mm, library);
+        self.latest_run.take_ended(run)
+    }
+
+    /// Draws the plots of the run.
+    pub fn plots_ui(&mut self, ui: &mut Ui) {
+        self.latest_run.plots_ui(ui, self.snapshot.run.as_ref());
     }
 
     fn poll_start(&mut self) {

@@ -7,7 +7,7 @@ use eframe::egui::{Modifiers, Rect, Vec2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_runner::TimeScale;
 use palpate_tests::flow::{TestWindow, WindowFlow};
-use palpate_window::screens::table::SCREENS;
+use palpate_window::screens::table::screens;
 use palpate_window::shell::rail;
 use palpate_window::shell::sizes::{PanelEdge, Sizes};
 
@@ -68,7 +68,7 @@ fn no_word_and_no_control_reaches_over_the_edge_of_its_panel() {
                 window.query_by_label("Accept").is_some()
             });
         }
-        for screen in SCREENS {
+        for screen in screens() {
             let Some(key) = screen.key else { continue };
             flow.window.key_press_modifiers(Modifiers::COMMAND, key);
             flow.window.run_steps(6);

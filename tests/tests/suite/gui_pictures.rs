@@ -21,7 +21,7 @@ use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::scene::SceneScreen;
-use palpate_window::screens::table::SCREENS;
+use palpate_window::screens::table::screens;
 use palpate_window::window::WindowOptions;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
@@ -231,7 +231,7 @@ fn every_screen_looks_as_it_did() {
         .max_failed_pixels(40);
     settle(&mut window);
     for theme in ["light", "dark"] {
-        for screen in SCREENS {
+        for screen in screens() {
             match screen.key {
                 Some(key) => window.key_press_modifiers(Modifiers::COMMAND, key),
                 None => show_by_name(&mut window, screen.name),

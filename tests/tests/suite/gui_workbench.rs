@@ -11,7 +11,7 @@ use palpate_runner::replay::replay;
 use palpate_runner::{RunView, TimeScale};
 use palpate_sessions::log::Session;
 use palpate_tests::flow::WindowFlow;
-use palpate_window::screens::table::SCREENS;
+use palpate_window::screens::table::screens;
 use palpate_window::screens::{rig, run};
 use palpate_window::widgets::places::places;
 use palpate_window::window::WindowOptions;
@@ -25,7 +25,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     for words in ["Stop motion", "Retract after a stop", "Protocol sine", "no run is in progress"] {
         assert!(flow.says(words), "{words}");
     }
-    for screen in SCREENS {
+    for screen in screens() {
         assert!(flow.says(&format!("Screen {}", screen.name)));
     }
     flow.type_into("command", "nothing is called like this");
@@ -133,7 +133,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
 fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
     let mut flow = WindowFlow::open(TimeScale::Max);
     let mut seen = 0;
-    for screen in SCREENS {
+    for screen in screens() {
         flow.act_by_name(&format!("screen {}", screen.name));
         let known: Vec<String> =
             places(&flow.window.ctx).into_iter().map(|(name, _)| name).collect();

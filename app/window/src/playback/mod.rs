@@ -13,7 +13,6 @@ use crate::shell::top_bar::{HEIGHT, numbers_ui};
 use crate::theme::{self};
 use crate::widgets::{badge_ui, tokens_of};
 use crate::window::open_window;
-use crate::workers::fit::Refit;
 use crate::workers::player::PlayerThread;
 use eframe::egui::{
     Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, Visuals, vec2,
@@ -153,7 +152,7 @@ impl eframe::App for PlaybackApp {
             .show(ui, |ui| {
                 let area = ScrollArea::vertical().id_salt("results");
                 area.auto_shrink(false).show(ui, |ui| {
-                    findings_ui(ui, &self.snapshot, Refit::NotYet, self.plots.cycles());
+                    findings_ui(ui, &self.snapshot, self.plots.cycles());
                 });
             });
         CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));

@@ -1,6 +1,7 @@
 //! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
 
 use super::calibration::calibration_session;
+use super::result;
 use crate::command::{Commands, UiCommand};
 use crate::shell::activity::is_planned;
 use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, reason_button, section_ui, tokens_of};
@@ -10,25 +11,31 @@ use palpate_protocols::engine::RunOutcome;
 use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
-pub fn after_stop_ui(
-    ui: &mut Ui,
-    run: &RunView,
-    quality: Option<&Assessment>,
-    commands: &mut Commands,
-) {
+pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     if let Some(outcome) = &run.outcome {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
-        if calibration_session(Some(run)).is_ok()
-            && reason_button(ui, "Save this calibration", vec2(190.0, 28.0), &checked(quality))
-        {
-            commands.push(UiCommand::KeepCalibration);
+        if ui.button("Show the result").clicked() {
+            commands.push(UiCommand::Show(result::SCREEN.name));
         }
     } else if let Some(ending) = &run.holding {
         section_ui(ui, "Run stopped, axis holds");
         outcome_ui(ui, ending);
         choices_ui(ui, run, commands);
+    }
+}
+
+/// How a run ended, where its data is, and whether a calibration that it measured is to be kept.
+pub fn ended_ui(ui: &mut Ui, run: &RunView, quality: Option<&Assessment>, commands: &mut Commands) {
+    let Some(outcome) = &run.outcome else { return };
+    section_ui(ui, "Run ended");
+    outcome_ui(ui, outcome);
+    log_ui(ui, run);
+    if calibration_session(Some(run)).is_ok()
+        && reason_button(ui, "Save this calibration", vec2(190.0, 48.0), &checked(quality))
+    {
+        commands.push(UiCommand::KeepCalibration);
     }
 }
 

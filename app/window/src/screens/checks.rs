@@ -18,6 +18,7 @@ use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Checks",
+    icon: lucide_icons::Icon::ListChecks,
     purpose: "the rig's daily checks over time",
     key: Some(Key::D),
     open: |workbench| {

@@ -13,6 +13,7 @@ use palpate_rheology::extremes::{ExtremesExtent, ExtremesRow, ExtremesVerdict};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Extremes",
+    icon: lucide_icons::Icon::MoveHorizontal,
     purpose: "numerical stability of every family, integrator and fit at extreme inputs",
     key: Some(Key::Num8),
     open: |_| Box::new(ExtremesScreen::default()),

@@ -1,52 +1,20 @@
-//! Results of the run: parameters, measured values, its steps and its end.
+//! What is known of a run while it goes on: parameters, measured values, its steps.
 
-use super::after_stop::after_stop_ui;
-use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
-use super::quality_panel::quality_ui;
-use crate::command::Commands;
-use crate::widgets::{StepState, alarm_ui, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
-use crate::workers::fit::Refit;
+use crate::widgets::{StepState, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui};
 use eframe::egui::Ui;
 use palpate_analysis::report::live::LiveCycle;
-use palpate_model::assessment::Assessment;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, RunnerSnapshot};
 
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;
 
-pub fn results_ui(
-    ui: &mut Ui,
-    snapshot: &RunnerSnapshot,
-    refit: Refit<'_>,
-    quality: Option<&Assessment>,
-    cycles: &[LiveCycle],
-    commands: &mut Commands,
-    verdict_ui: impl FnOnce(&mut Ui, &mut Commands),
-) {
+/// Draws what is known of a run so far.
+pub fn findings_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, cycles: &[LiveCycle]) {
     let run = snapshot.run.as_ref();
-    if let Some(run) = run {
-        after_stop_ui(ui, run, quality, commands);
-    }
-    if let Some(quality) = quality {
-        quality_ui(ui, quality);
-        verdict_ui(ui, commands);
-    }
-    findings_ui(ui, snapshot, refit, cycles);
-}
-
-/// Draws what was found, without what can be done.
-pub fn findings_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, refit: Refit<'_>, cycles: &[LiveCycle]) {
-    let run = snapshot.run.as_ref();
-    match refit {
-        Refit::Done(exact) => exact_ui(ui, &exact.report),
-        _ => {
-            section_ui(ui, "Live parameters");
-            refit_ui(ui, refit);
-            parameters_ui(ui, run);
-        }
-    }
+    section_ui(ui, "Live parameters");
+    parameters_ui(ui, run);
     section_ui(ui, "Measured");
     match run {
         Some(run) => facts_ui(ui, run),
@@ -61,24 +29,8 @@ pub fn findings_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, refit: Refit<'_>, cyc
     }
 }
 
-/// Seconds after which a fit that is under way says so.
-const BUSY_SECS: f64 = 1.0;
-
-/// Why the parameters are still the live ones.
-fn refit_ui(ui: &mut Ui, refit: Refit<'_>) {
-    match refit {
-        Refit::Refused(reason) => alarm_ui(ui, format!("No exact fit: {reason}")),
-        Refit::Busy(seconds) if seconds > BUSY_SECS => {
-            ui.horizontal(|ui| {
-                ui.spinner();
-                ui.label(format!("fitting every sample, {seconds:.0} s so far"));
-            });
-        }
-        Refit::Busy(_) | Refit::Done(_) | Refit::NotYet => {}
-    }
-}
-
-fn facts_ui(ui: &mut Ui, run: &RunView) {
+/// Draws what a run measured.
+pub(super) fn facts_ui(ui: &mut Ui, run: &RunView) {
     let not_yet = || "not yet".to_string();
     let peak = run.force_peak.map_or_else(not_yet, |peak| format!("{peak:.3}"));
     fact_ui(ui, "peak force", peak);
@@ -98,7 +50,7 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 }
 
 /// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
-fn cycles_ui(ui: &mut Ui, cycles: &[LiveCycle]) {
+pub(super) fn cycles_ui(ui: &mut Ui, cycles: &[LiveCycle]) {
     let Some(first) = cycles.first().and_then(|one| one.peak) else { return };
     section_ui(ui, "Peak force of each cycle and change from the first cycle");
     let left_out = cycles.len().saturating_sub(CYCLES_SHOWN);

@@ -1,33 +1,29 @@
 //! The run screen: rig and protocol on the left, what is expected or measured in the middle, what is known on the right.
 
+use super::after_stop::after_stop_ui;
 use super::approach::Approach;
 use super::form::CheckedPlan;
 use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
-use super::results_panel::results_ui;
+use super::results_panel::findings_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
-use super::run_verdict::RunVerdict;
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
-use super::today;
 use super::weighing::weighing_ui;
-use crate::plots::PlotCache;
 use crate::plots::course::CourseLimits;
 use crate::widgets::require;
-use crate::workers::fit::{Refit, Refitter};
-use crate::workers::queue_desk::QueueWork;
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
 use palpate_protocols::file::BUILT_IN;
-use palpate_runner::{RunRequest, RunView, wall_now};
+use palpate_runner::{RunRequest, wall_now};
 use palpate_sessions::recover::recover_library;
-use palpate_sessions::specimen_queue::QueueVerdict;
 use std::path::Path;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Run",
-    purpose: "run a protocol and see its results",
+    icon: lucide_icons::Icon::Play,
+    purpose: "run a protocol and watch it",
     key: Some(Key::Num3),
-    open: |workbench| Box::new(RunScreen::new(workbench)),
+    open: |_| Box::new(RunScreen::new()),
 };
 
 /// The screen's state. What runs belongs to the runner.
@@ -35,11 +31,6 @@ pub struct RunScreen {
     chooser: Chooser,
     middle: RunPane,
     approach: Approach,
-    plots: PlotCache,
-    /// The start that the plots are of.
-    plotted: u64,
-    refitter: Refitter,
-    verdict: RunVerdict,
     /// Sessions recovered after a crash, a line each.
     recovery: BackgroundTask<Vec<String>>,
     is_recovery_begun: bool,
@@ -48,26 +39,17 @@ pub struct RunScreen {
 }
 
 impl RunScreen {
-    fn new(workbench: &Workbench) -> Self {
+    fn new() -> Self {
         Self {
             chooser: Chooser::default(),
             middle: RunPane::default(),
             approach: Approach::default(),
-            plots: PlotCache::for_calibration(&workbench.bench.calibration),
-            plotted: 0,
-            refitter: Refitter::default(),
-            verdict: RunVerdict::default(),
             recovery: BackgroundTask::default(),
             is_recovery_begun: false,
             library: palpate_sessions::library_folder()
                 .map(|path| path.display().to_string())
                 .map_err(|err| err.to_string()),
         }
-    }
-
-    /// How far the exact fit of this run is.
-    pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
-        self.refitter.of(run)
     }
 
     /// Takes a built-in protocol into the form, unless a run is in progress.
@@ -103,21 +85,6 @@ impl RunScreen {
             None => self.read(Some(Path::new(protocol)), ctx, workbench),
         }
         Reaction::Show
-    }
-
-    /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
-    fn accept(&mut self, workbench: &mut Workbench) -> Reaction {
-        let Some(session) = self.refitter.assessed(workbench.run()) else { return Reaction::Done };
-        if workbench.queue.is_busy() {
-            return Reaction::Done;
-        }
-        let work = QueueWork::Judge(session.to_owned(), QueueVerdict::Accept);
-        let by = workbench.form.label_text("operator").to_owned();
-        workbench.queue.ask(work, &by, self.verdict.reason());
-        match workbench.queue.queue().next() {
-            Some(_) => Reaction::ShowOther(today::SCREEN.name),
-            None => Reaction::Done,
-        }
     }
 
     fn read(&mut self, path: Option<&Path>, ctx: &Context, workbench: &mut Workbench) {
@@ -181,28 +148,15 @@ impl Screen for RunScreen {
                 };
                 expected_ui(ui, checked, limits);
             }
-            (RunPane::Measured, _) => {
-                let exact = match self.refitter.of(run) {
-                    Refit::Done(exact) => Some(exact),
-                    _ => None,
-                };
-                self.plots.mark(self.refitter.quality(run));
-                self.plots.ui(ui, exact);
-            }
+            (RunPane::Measured, _) => workbench.plots_ui(ui),
         }
     }
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let run = workbench.run();
-        let (refitter, verdict) = (&self.refitter, &mut self.verdict);
-        let (refit, quality) = (refitter.of(run), refitter.quality(run));
-        let verdict_ui = |ui: &mut Ui, commands: &mut Commands| {
-            if let Some(session) = refitter.assessed(run) {
-                verdict.ui(ui, session, &workbench.queue, &workbench.start_verdict(), commands);
-            }
-        };
-        let (snapshot, cycles) = (&workbench.snapshot, self.plots.cycles());
-        results_ui(ui, snapshot, refit, quality, cycles, commands, verdict_ui);
+        if let Some(run) = workbench.run() {
+            after_stop_ui(ui, run, commands);
+        }
+        findings_ui(ui, &workbench.snapshot, workbench.latest_run.plots().cycles());
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -224,13 +178,6 @@ impl Screen for RunScreen {
                 Err(_) => RunPane::Choose,
             };
         }
-        if self.plotted != workbench.starts() {
-            self.plotted = workbench.starts();
-            self.plots = PlotCache::for_calibration(&workbench.bench.calibration);
-        }
-        let depth = workbench.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
-        self.plots.update(workbench.run(), workbench.bench.limits.force_max, depth);
-        self.refitter.update(ctx, workbench.run(), workbench.library.as_ref().ok());
     }
 
     fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
@@ -263,7 +210,6 @@ impl Screen for RunScreen {
                 self.take_protocol(name, workbench);
                 return Reaction::Show;
             }
-            UiCommand::AcceptRun => return self.accept(workbench),
             UiCommand::TakeSpecimen(number) => {
                 return self.take_specimen(*number, ctx, workbench);
             }
@@ -289,8 +235,6 @@ impl Screen for RunScreen {
             (RunPane::Weighing, "View: weights"),
             (RunPane::Approach, "View: surface search"),
         ];
-        let has_checks = self.refitter.assessed(workbench.run()).is_some();
-        let can_accept = require(has_checks, "no run has ended and been checked");
         let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
@@ -304,10 +248,6 @@ impl Screen for RunScreen {
             let words = format!("Protocol {name}");
             PaletteAction::new(words, "", UiCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
-        actions.push(
-            PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun)
-                .if_ok(can_accept),
-        );
         actions.push(PaletteAction::new(
             "Open a protocol file",
             "",

@@ -1,6 +1,6 @@
 //! The trait of screens, through which the window reaches each of them.
 
-use super::table::SCREENS;
+use super::table::screens;
 pub use crate::command::{Commands, UiCommand};
 pub use crate::shell::palette::PaletteAction;
 use crate::shell::panels::{frame, side_ui};
@@ -15,6 +15,7 @@ use std::any::Any;
 #[derive(Clone, Copy)]
 pub struct ScreenEntry {
     pub name: &'static str,
+    pub icon: lucide_icons::Icon,
     /// Hint on the rail.
     pub purpose: &'static str,
     /// Shows the screen with Ctrl (Command on a Mac); a screen without a key is not on the rail.
@@ -137,7 +138,7 @@ impl Screens {
     /// Opens all screens and shows the one of this name, or the run screen.
     #[must_use]
     pub fn open(workbench: &Workbench, name: &str) -> Self {
-        let all = SCREENS.iter().map(|one| (one.name, (one.open)(workbench)));
+        let all = screens().map(|one| (one.name, (one.open)(workbench)));
         let mut screens = Self { all: all.collect(), shown: 0 };
         screens.show(super::run::SCREEN.name);
         screens.show(name);

@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Start page",
+    icon: lucide_icons::Icon::House,
     purpose: "simulated rig, search for a rig, recorded sessions",
     key: None,
     open: |workbench| Box::new(StartPage::new(workbench.library.clone())),

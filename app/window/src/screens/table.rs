@@ -2,22 +2,38 @@
 
 use super::screen::ScreenEntry;
 
-/// How many of the screens are a technician's, for a day at the rig; the others are a researcher's.
-pub const TECHNICIAN_SCREENS: usize = 5;
+/// A part of the rail.
+pub struct ScreenGroup {
+    pub name: &'static str,
+    pub screens: &'static [ScreenEntry],
+}
 
-/// The screens as they stand on the rail.
-pub const SCREENS: &[ScreenEntry] = &[
-    super::today::SCREEN,
-    super::run::SCREEN,
-    super::rig::SCREEN,
-    super::calibration::SCREEN,
-    super::checks::SCREEN,
-    super::library::SCREEN,
-    super::review::SCREEN,
-    super::models::SCREEN,
-    super::trade::SCREEN,
-    super::extremes::SCREEN,
-    super::haptics::SCREEN,
-    super::scene::SCREEN,
-    super::start_page::SCREEN,
+/// The screens as they stand on the rail: what a day of measuring needs, what prepares it, what is done with the data.
+pub const GROUPS: [ScreenGroup; 3] = [
+    ScreenGroup {
+        name: "Measure",
+        screens: &[super::today::SCREEN, super::run::SCREEN, super::result::SCREEN],
+    },
+    ScreenGroup {
+        name: "Prepare",
+        screens: &[super::rig::SCREEN, super::calibration::SCREEN, super::checks::SCREEN],
+    },
+    ScreenGroup {
+        name: "Research",
+        screens: &[
+            super::library::SCREEN,
+            super::review::SCREEN,
+            super::models::SCREEN,
+            super::trade::SCREEN,
+            super::extremes::SCREEN,
+            super::haptics::SCREEN,
+            super::scene::SCREEN,
+        ],
+    },
 ];
+
+/// All screens, those on the rail first.
+pub fn screens() -> impl Iterator<Item = &'static ScreenEntry> {
+    const START_PAGE: &ScreenEntry = &super::start_page::SCREEN;
+    GROUPS.iter().flat_map(|group| group.screens).chain([START_PAGE])
+}

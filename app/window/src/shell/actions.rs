@@ -6,7 +6,7 @@ use super::run_strip::RunControl;
 use super::sizes::PanelEdge;
 use crate::app::WorkbenchApp;
 use crate::command::{ManualMove, TextSize, UiCommand};
-use crate::screens::table::SCREENS;
+use crate::screens::table::screens;
 use crate::widgets::require;
 
 impl WorkbenchApp {
@@ -60,7 +60,7 @@ impl WorkbenchApp {
             PaletteAction::new("Cancel this screen's task", "", UiCommand::CancelWork),
         ]);
         actions.extend(self.screens.actions(bench));
-        for screen in SCREENS {
+        for screen in screens() {
             let keys =
                 screen.key.map_or_else(String::new, |key| format!("Ctrl+{}", key.symbol_or_name()));
             let name = format!("Screen {}: {}", screen.name, screen.purpose);

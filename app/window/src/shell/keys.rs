@@ -3,7 +3,7 @@
 use super::run_strip::RunControl;
 use super::top_bar::push_stop_buttons;
 use crate::command::{Commands, UiCommand};
-use crate::screens::table::SCREENS;
+use crate::screens::table::screens;
 use eframe::egui::{Context, Event, Key};
 
 /// The keys and their commands. Escape stops too: a startled hand finds it.
@@ -80,7 +80,7 @@ impl KeyReader {
                     commands.push(command);
                 }
             }
-            for screen in SCREENS {
+            for screen in screens() {
                 if screen.key.is_some_and(|key| is_pressed(&input.events, key, true)) {
                     commands.push(UiCommand::Show(screen.name));
                 }

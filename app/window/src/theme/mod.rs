@@ -1,9 +1,10 @@
 //! How the window looks: colour tokens and the type scale, applied once at the start.
 
 use eframe::egui::{
-    Context, CornerRadius, FontFamily, FontId, Stroke, Style, TextStyle, Theme, ThemePreference,
-    Visuals, vec2,
+    Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, RichText, Stroke, Style,
+    TextStyle, Theme, ThemePreference, Visuals, vec2,
 };
+use lucide_icons::{Icon, LUCIDE_FONT_BYTES};
 pub use palpate_figures::tokens::Tokens;
 
 /// Text style of the numbers read from across the room.
@@ -20,6 +21,28 @@ pub fn apply(ctx: &Context) {
         ctx.style_mut_of(theme, set_type);
     }
     ctx.set_theme(ThemePreference::Light);
+    ctx.set_fonts(fonts());
+}
+
+/// Family of the icons.
+const ICONS: &str = "icons";
+/// Size of an icon in points.
+const ICON_SIZE: f32 = 19.0;
+
+/// The fonts of egui and the icons of Lucide (lucide.dev, ISC licence).
+fn fonts() -> FontDefinitions {
+    let mut fonts = FontDefinitions::default();
+    let data = FontData::from_static(LUCIDE_FONT_BYTES);
+    fonts.font_data.insert(ICONS.to_owned(), data.into());
+    fonts.families.insert(FontFamily::Name(ICONS.into()), vec![ICONS.to_owned()]);
+    fonts
+}
+
+/// An icon as text; whatever has it needs an accessible name, since nobody can read an icon aloud.
+#[must_use]
+pub fn icon_text(icon: Icon) -> RichText {
+    let font = FontId::new(ICON_SIZE, FontFamily::Name(ICONS.into()));
+    RichText::new(char::from(icon)).font(font)
 }
 
 /// The colour in which the window is cleared: that of a canvas, on which plots and tables stand.

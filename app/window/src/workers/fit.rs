@@ -70,7 +70,8 @@ impl Refitter {
         }
     }
 
-    fn is_of(&self, run: Option<&RunView>) -> bool {
+    /// Whether this run has ended and is or was checked.
+    pub fn is_of(&self, run: Option<&RunView>) -> bool {
         let ended = run.filter(|run| run.outcome.is_some()).map(|run| &run.folder);
         ended.is_some() && ended == self.session.as_ref()
     }

@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Calibration",
+    icon: lucide_icons::Icon::Scale,
     purpose: "load-cell calibrations in the library, which convert volts to newtons",
     key: Some(Key::Num2),
     open: |workbench| Box::new(CalibrationScreen::new(workbench)),

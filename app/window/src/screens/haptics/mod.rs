@@ -34,6 +34,7 @@ pub struct HapticsCheck {
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Haptics",
+    icon: lucide_icons::Icon::Hand,
     purpose: "feel a material through a haptic device: stability margin, limit cycle and force loop",
     key: Some(Key::Num9),
     open: |_| Box::new(HapticsScreen::default()),

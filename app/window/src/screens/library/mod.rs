@@ -28,6 +28,7 @@ use std::rc::Rc;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Library",
+    icon: lucide_icons::Icon::Library,
     purpose: "find sessions",
     key: Some(Key::Num4),
     open: |workbench| Box::new(LibraryScreen::new(workbench.library.clone())),

@@ -13,6 +13,7 @@ use palpate_analysis::select::{SelectionReport, select_sources};
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Models",
+    icon: lucide_icons::Icon::Sigma,
     purpose: "which model family a recording needs",
     key: Some(Key::Num6),
     open: |_| Box::new(ModelsScreen::default()),

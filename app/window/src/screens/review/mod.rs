@@ -26,6 +26,7 @@ use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Review",
+    icon: lucide_icons::Icon::ChartLine,
     purpose: "one session in detail, or several side by side",
     key: Some(Key::Num5),
     open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),

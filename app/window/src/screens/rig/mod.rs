@@ -17,6 +17,7 @@ use palpate_runner::RigView;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
+    icon: lucide_icons::Icon::Plug,
     purpose: "readings of the rig, and manual moves",
     key: Some(Key::Num1),
     open: |_| Box::new(RigScreen::default()),

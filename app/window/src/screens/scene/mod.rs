@@ -29,6 +29,7 @@ const TURN: [f64; 3] = [0.0, -0.5, 0.0];
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
+    icon: lucide_icons::Icon::Box,
     purpose: "press into a piece of tissue and see it deform",
     // Every number is taken: Ctrl+0 is the usual size of text.
     key: Some(Key::E),

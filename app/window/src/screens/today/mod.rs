@@ -15,6 +15,7 @@ use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Today",
+    icon: lucide_icons::Icon::Sun,
     purpose: "the next specimen, the queue, and the state of the rig",
     key: Some(Key::T),
     open: |workbench| Box::new(TodayScreen::new(workbench)),

@@ -69,6 +69,7 @@ struct TradeMeasurement {
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Trade",
+    icon: lucide_icons::Icon::Gauge,
     purpose: "what accuracy costs on this machine",
     key: Some(Key::Num7),
     open: |workbench| Box::new(TradeScreen::new(workbench.library.clone())),

@@ -1,0 +1,87 @@
+//! The run in progress or the last one, as the screens Run and Result show it.
+
+use crate::plots::PlotCache;
+use crate::screens::form::RunSetup;
+use crate::workers::fit::{Refit, Refitter};
+use eframe::egui::{Context, Ui};
+use palpate_model::assessment::Assessment;
+use palpate_model::calibration::Calibration;
+use palpate_runner::RunView;
+use std::path::{Path, PathBuf};
+
+/// Its plots, and what is found once it has ended.
+pub struct LatestRun {
+    plots: PlotCache,
+    /// The start that the plots are of.
+    plotted: u64,
+    refitter: Refitter,
+    /// The session whose end was told.
+    told: Option<PathBuf>,
+}
+
+impl LatestRun {
+    pub fn new(calibration: &Calibration) -> Self {
+        Self {
+            plots: PlotCache::for_calibration(calibration),
+            plotted: 0,
+            refitter: Refitter::default(),
+            told: None,
+        }
+    }
+
+    /// Follows the run of so many starts. `depth_mm` is the depth that the form asks for.
+    pub fn update(
+        &mut self,
+        ctx: &Context,
+        run: Option<&RunView>,
+        starts: u64,
+        setup: &RunSetup,
+        depth_mm: f64,
+        library: Option<&PathBuf>,
+    ) {
+        if self.plotted != starts {
+            self.plotted = starts;
+            self.plots = PlotCache::for_calibration(&setup.calibration);
+        }
+        self.plots.update(run, setup.limits.force_max, depth_mm);
+        self.refitter.update(ctx, run, library);
+        self.plots.mark(self.refitter.quality(run));
+    }
+
+    /// Whether a run that has a result has just ended: true once for each.
+    pub fn take_ended(&mut self, run: Option<&RunView>) -> bool {
+        let ended = run.filter(|run| run.outcome.is_some() && self.refitter.is_of(Some(run)));
+        let Some(ended) = ended.filter(|run| self.told.as_ref() != Some(&run.folder)) else {
+            return false;
+        };
+        self.told = Some(ended.folder.clone());
+        true
+    }
+
+    pub fn plots(&self) -> &PlotCache {
+        &self.plots
+    }
+
+    pub fn plots_ui(&mut self, ui: &mut Ui, run: Option<&RunView>) {
+        let exact = match self.refitter.of(run) {
+            Refit::Done(exact) => Some(exact),
+            _ => None,
+        };
+        self.plots.ui(ui, exact);
+    }
+
+    /// How far the exact fit of this run is.
+    pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
+        self.refitter.of(run)
+    }
+
+    /// The checks of this run, once they are made.
+    pub fn quality(&self, run: Option<&RunView>) -> Option<&Assessment> {
+        self.refitter.quality(run)
+    }
+
+    /// Session of this run, once its checks are made.
+    pub fn assessed(&self, run: Option<&RunView>) -> Option<&Path> {
+        self.refitter.assessed(run)
+    }
+}

@@ -1,0 +1,127 @@
+//! The result screen: whether the run that has ended is good, and what it tells.
+
+mod quality;
+mod verdict;
+
+use super::after_stop::ended_ui;
+use super::exact_fit::exact_ui;
+use super::parameters::parameters_ui;
+use super::results_panel::{cycles_ui, facts_ui};
+use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use super::today;
+use crate::shell::activity::run_in_progress;
+use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, require, section_ui};
+use crate::workers::fit::Refit;
+use crate::workers::queue_desk::QueueWork;
+use eframe::egui::{Context, Key, Ui};
+use palpate_runner::RunView;
+use palpate_sessions::specimen_queue::QueueVerdict;
+use verdict::RunVerdict;
+
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Result",
+    icon: lucide_icons::Icon::ClipboardCheck,
+    purpose: "judge the last run and see its parameters",
+    key: Some(Key::R),
+    open: |_| Box::new(ResultScreen::default()),
+};
+
+/// Seconds after which a fit that is under way says so.
+const BUSY_SECS: f64 = 1.0;
+
+/// What the operator says of the run. The run itself belongs to the workbench.
+#[derive(Default)]
+pub struct ResultScreen {
+    verdict: RunVerdict,
+}
+
+impl ResultScreen {
+    /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
+    fn accept(&mut self, workbench: &mut Workbench) -> Reaction {
+        let Some(session) = workbench.latest_run.assessed(workbench.run()) else {
+            return Reaction::Done;
+        };
+        if workbench.queue.is_busy() {
+            return Reaction::Done;
+        }
+        let work = QueueWork::Judge(session.to_owned(), QueueVerdict::Accept);
+        let by = workbench.form.label_text("operator").to_owned();
+        workbench.queue.ask(work, &by, self.verdict.reason());
+        match workbench.queue.queue().next() {
+            Some(_) => Reaction::ShowOther(today::SCREEN.name),
+            None => Reaction::Done,
+        }
+    }
+}
+
+impl Screen for ResultScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let Some(run) = workbench.run() else {
+            section_ui(ui, "Result");
+            placeholder_ui(ui, "no run yet; choose a protocol on the screen Run and start it");
+            return;
+        };
+        let latest = &workbench.latest_run;
+        let quality = latest.quality(Some(run));
+        if run_in_progress(&workbench.snapshot).is_some() {
+            section_ui(ui, "Result");
+            quiet_ui(ui, "the run is in progress; its result comes when it has ended");
+            return;
+        }
+        ended_ui(ui, run, quality, commands);
+        if let Some(session) = latest.assessed(Some(run)) {
+            let may_start = workbench.start_verdict();
+            self.verdict.ui(ui, session, &workbench.queue, &may_start, commands);
+        }
+        if let Some(quality) = quality {
+            quality::quality_ui(ui, quality);
+        }
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
+        workbench.plots_ui(ui);
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
+        let run = workbench.run();
+        found_ui(ui, run, workbench.latest_run.refit(run));
+        if let Some(run) = run {
+            section_ui(ui, "Measured");
+            facts_ui(ui, run);
+        }
+        cycles_ui(ui, workbench.latest_run.plots().cycles());
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
+        match command {
+            UiCommand::AcceptRun => self.accept(workbench),
+            _ => Reaction::NotMine,
+        }
+    }
+
+    fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
+        let has_checks = workbench.latest_run.assessed(workbench.run()).is_some();
+        let verdict = require(has_checks, "no run has ended and been checked");
+        let accept = PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun);
+        vec![accept.if_ok(verdict)]
+    }
+}
+
+/// The parameters of the exact fit, or the live ones with the reason.
+fn found_ui(ui: &mut Ui, run: Option<&RunView>, refit: Refit<'_>) {
+    if let Refit::Done(exact) = refit {
+        return exact_ui(ui, &exact.report);
+    }
+    section_ui(ui, "Live parameters");
+    match refit {
+        Refit::Refused(reason) => alarm_ui(ui, format!("No exact fit: {reason}")),
+        Refit::Busy(seconds) if seconds > BUSY_SECS => {
+            ui.horizontal(|ui| {
+                ui.spinner();
+                ui.label(format!("fitting every sample, {seconds:.0} s so far"));
+            });
+        }
+        Refit::Busy(_) | Refit::Done(_) | Refit::NotYet => {}
+    }
+    parameters_ui(ui, run);
+}
