@@ -19,7 +19,7 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::{LogLine, RunView, TimeScale};
 use palpate_test_support::wait::Deadline;
 use palpate_window::app::WorkbenchApp;
-use palpate_window::screens::screen::Screen;
+use palpate_window::screens::screen::{Screen, ScreenEntry};
 use palpate_window::window::WindowOptions;
 use palpate_window::workers::fit::Refit;
 use std::path::PathBuf;
@@ -140,6 +140,12 @@ impl WindowFlow {
         // By name and not by place: a control may be scrolled out of sight.
         self.window.get_by_label(name).click_accesskit();
         self.window.run_steps(2);
+    }
+
+    /// Shows a screen by its key.
+    pub fn show(&mut self, screen: &ScreenEntry) {
+        self.window.key_press_modifiers(Modifiers::COMMAND, screen.key.unwrap());
+        self.window.run_steps(3);
     }
 
     /// Whether a named control can be pressed.

@@ -268,7 +268,7 @@ impl WorkbenchApp {
             panel("tour", ui).show(ui, |ui| self.tour.ui(ui, commands));
         }
         Panel::left("rail")
-            .exact_size(rail::WIDTH)
+            .exact_size(rail::width(ui.ctx().content_rect().width()))
             .resizable(false)
             .frame(frame(ui, false))
             .show(ui, |ui| rail_ui(ui, self.screens.shown(), commands));

@@ -63,7 +63,7 @@ pub(crate) fn open_window<A: eframe::App + 'static>(
             // The name of the desktop entry, by which a desktop finds the icon.
             .with_app_id("palpate")
             .with_inner_size(vec2(1360.0, 820.0))
-            .with_min_inner_size(vec2(1180.0, 640.0)),
+            .with_min_inner_size(vec2(768.0, 600.0)),
         ..eframe::NativeOptions::default()
     };
     eframe::run_native(

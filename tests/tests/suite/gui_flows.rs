@@ -15,6 +15,7 @@ use palpate_sessions::log::Session;
 use palpate_tests::flow::{TestWindow, WindowFlow, refit};
 use palpate_tests::workspace;
 use palpate_window::screens::exact_fit::exact_ui;
+use palpate_window::screens::run;
 use palpate_window::shell::activity::{is_motion_possible, run_in_progress};
 use palpate_window::workers::fit::Refit;
 
@@ -44,8 +45,9 @@ fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
     assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
     assert_eq!(run.log_error, None);
     assert!(flow.says("Session in"));
-    assert!(flow.says("Step hold: done"));
     assert!(flow.says("State: IDLE"));
+    flow.show(&run::SCREEN);
+    assert!(flow.says("Step hold: done"));
     assert_eq!(flow.sessions(), [flow.folder.path().join("session-0001")]);
     let session = Session::open(&flow.sessions()[0]).unwrap();
     assert_eq!(session.manifest.specimen, "S-014");
@@ -79,7 +81,8 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
     let residual = &exact.residual.plot.series[0].points;
     assert!(residual.len() > 1000 && residual.len() <= 4000);
     // A second run begins with live numbers again.
-    flow.click("Start  F5");
+    flow.window.key_press(Key::F5);
+    flow.window.run_steps(2);
     flow.wait("live numbers", |window| window.query_by_label("Live parameters").is_some());
     assert!(!flow.says("Exact fit"));
 }

@@ -1,8 +1,8 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{cell, symbol_ui, tight, value_ui};
+use super::parameters::{cell, number_ui, symbol_ui, tight, value_ui};
 use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
-use eframe::egui::{CollapsingHeader, Label, RichText, Ui};
+use eframe::egui::{CollapsingHeader, RichText, Ui};
 use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
 use palpate_analysis::report::text::{ParameterText, quality, typeset};
 use palpate_model::estimate::FittedParameter;
@@ -22,14 +22,13 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
 }
 
 fn row_ui(ui: &mut Ui, text: &ParameterText) {
-    value_ui(ui, &text.name, RichText::new(&text.value), &text.unit);
+    let tokens = tokens_of(ui);
+    value_ui(ui, &text.name, &text.value, tokens.text, &text.unit);
     let intervals = [("95 %", &text.interval), ("total 95 %", &text.total)];
     for (name, interval) in intervals.into_iter().filter(|(_, interval)| !interval.is_empty()) {
-        let quiet = tokens_of(ui).text_quiet;
         ui.horizontal(|ui| {
-            cell(ui, 60.0, |ui| ui.label(RichText::new(name).color(quiet).small()));
-            let interval = RichText::new(interval).monospace().small();
-            ui.add(Label::new(interval.color(quiet)).wrap());
+            cell(ui, 74.0, |ui| ui.label(RichText::new(name).color(tokens.text_quiet).small()));
+            number_ui(ui, interval, tokens.text_quiet);
         });
     }
 }

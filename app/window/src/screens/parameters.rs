@@ -2,7 +2,9 @@
 
 use crate::widgets::{quiet_ui, tokens_of};
 use eframe::egui::text::LayoutJob;
-use eframe::egui::{Align, FontSelection, Layout, Response, RichText, Role, Ui, WidgetInfo, vec2};
+use eframe::egui::{
+    Align, Color32, FontSelection, Label, Layout, Response, RichText, Role, Ui, WidgetInfo, vec2,
+};
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{FittedParameter, LiveEstimate};
 use palpate_model::rig::Phase;
@@ -88,23 +90,41 @@ fn row_ui(
 ) {
     let tokens = tokens_of(ui);
     let ink = if is_known(parameter) { tokens.text } else { tokens.text_quiet };
-    let value = RichText::new(value_text(parameter)).color(ink);
-    let label = value_ui(ui, name, value, &typeset(unit));
+    let label = value_ui(ui, name, &value_text(parameter), ink, &typeset(unit));
     if let Some(reason) = reason {
         label.on_hover_text(reason);
     }
 }
 
 /// Draws name, value and unit of a parameter; returns the value.
-pub(super) fn value_ui(ui: &mut Ui, name: &str, value: RichText, unit: &str) -> Response {
+pub(super) fn value_ui(ui: &mut Ui, name: &str, value: &str, ink: Color32, unit: &str) -> Response {
     let quiet = tokens_of(ui).text_quiet;
     let row = |ui: &mut Ui| {
         cell(ui, 60.0, |ui| symbol_ui(ui, name));
-        let value = cell(ui, 166.0, |ui| ui.label(value.monospace()));
+        let value = cell(ui, 166.0, |ui| number_ui(ui, value, ink));
         ui.label(RichText::new(unit).color(quiet).small());
         value
     };
     ui.horizontal(row).inner
+}
+
+/// Draws a number with its power of ten as in print; as typed, it is what a screen reader says.
+pub(super) fn number_ui(ui: &mut Ui, text: &str, ink: Color32) -> Response {
+    let mut job = LayoutJob::default();
+    let mut append = |text: RichText, align: Align| {
+        let text = text.color(ink).monospace();
+        text.append_to(&mut job, ui.style(), FontSelection::Default, align);
+    };
+    match text.rsplit_once('e').filter(|(_, exponent)| exponent.parse::<i32>().is_ok()) {
+        Some((number, exponent)) => {
+            append(RichText::new(format!("{number}·10")), Align::BOTTOM);
+            append(RichText::new(exponent).size(INDEX_SIZE), Align::TOP);
+        }
+        None => append(RichText::new(text), Align::BOTTOM),
+    }
+    let label = ui.add(Label::new(job).wrap());
+    label.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
+    label
 }
 
 /// Draws a parameter's symbol as in print; its key is the tooltip and what a screen reader says.

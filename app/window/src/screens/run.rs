@@ -4,6 +4,7 @@ use super::after_stop::after_stop_ui;
 use super::approach::Approach;
 use super::form::CheckedPlan;
 use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
+use super::result;
 use super::results_panel::findings_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
@@ -188,7 +189,13 @@ impl Screen for RunScreen {
                 let request = workbench.ready_run();
                 let queue = &mut workbench.queue;
                 match request.map(|request| queue.start(&specimen, &protocol).map(|()| request)) {
-                    Some(Err(reason)) => workbench.refusal = Some(reason),
+                    Some(Err(reason)) => {
+                        let is_unjudged = queue.queue().open_run().is_some();
+                        workbench.refusal = Some(reason);
+                        if is_unjudged {
+                            return Reaction::ShowOther(result::SCREEN.name);
+                        }
+                    }
                     request => self.begin(request.and_then(Result::ok), workbench),
                 }
                 // What moves is to be seen.

@@ -37,7 +37,7 @@ const VIEWS: [(RunPane, &str); 5] = [
 
 /// Draws the switch between the views.
 pub fn views_ui(ui: &mut Ui, shown: RunPane, run: Option<&RunView>, commands: &mut Commands) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for (view, name) in VIEWS {
             if !is_offered(view, run) {
                 continue;

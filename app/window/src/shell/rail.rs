@@ -7,16 +7,26 @@ use crate::theme::icon_text;
 use crate::widgets::quiet_ui;
 use eframe::egui::{Button, ScrollArea, Ui, vec2};
 
-/// Width of the rail in points.
-pub const WIDTH: f32 = 140.0;
+/// Widths of the rail in points: with icons and words, and with icons alone.
+const WIDTHS: [f32; 2] = [140.0, 60.0];
+/// Points of window below which the words have no room.
+const ROOM_FOR_WORDS: f32 = 1260.0;
 /// Height of an entry in points: large enough for a gloved finger.
 const ENTRY_HEIGHT: f32 = 48.0;
+
+/// Width of the rail in a window so wide, in points.
+#[must_use]
+pub fn width(window: f32) -> f32 {
+    WIDTHS[usize::from(window < ROOM_FOR_WORDS)]
+}
 
 pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
     ScrollArea::vertical().id_salt("rail").show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         for group in &GROUPS {
-            quiet_ui(ui, group.name);
+            if has_words(ui) {
+                quiet_ui(ui, group.name);
+            }
             for screen in group.screens {
                 entry_ui(ui, screen, screen.name == shown, commands);
             }
@@ -28,12 +38,19 @@ pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
 fn entry_ui(ui: &mut Ui, screen: &ScreenEntry, is_shown: bool, commands: &mut Commands) {
     let Some(key) = screen.key else { return };
     let icon = icon_text(screen.icon);
-    let button = Button::selectable(is_shown, (icon, screen.name))
-        .min_size(vec2(ui.available_width(), ENTRY_HEIGHT));
-    let hint = format!("{} (Ctrl+{})", screen.purpose, key.symbol_or_name());
+    let button = match has_words(ui) {
+        true => Button::selectable(is_shown, (icon, screen.name)),
+        false => Button::selectable(is_shown, icon),
+    };
+    let button = button.min_size(vec2(ui.available_width(), ENTRY_HEIGHT));
+    let hint = format!("{}: {} (Ctrl+{})", screen.name, screen.purpose, key.symbol_or_name());
     // A screen reader cannot say an icon.
     let entry = ui.add(button).accessible_name(screen.name);
     if entry.on_hover_text(hint).clicked() {
         commands.push(UiCommand::Show(screen.name));
     }
+}
+
+fn has_words(ui: &Ui) -> bool {
+    width(ui.ctx().content_rect().width()) == WIDTHS[0]
 }

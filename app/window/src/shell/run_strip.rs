@@ -71,8 +71,8 @@ pub fn is_controllable(run: &RunView) -> bool {
 
 /// Draws the buttons, the state of the pause in words, and the prompt if there is one.
 pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
-    let tokens = tokens_of(ui);
-    ui.horizontal(|ui| {
+    let is_wide = ui.available_width() >= ONE_ROW;
+    ui.horizontal_wrapped(|ui| {
         let after = match &run.next_checkpoint {
             Some((_, name)) if name.starts_with("after ") => format!("Pause {name}  F4"),
             Some((_, name)) => format!("Pause at {name}  F4"),
@@ -87,16 +87,31 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mu
         ] {
             control_ui(ui, run, control, text, commands);
         }
-        let words = RichText::new(pause_words(run)).color(tokens.text_quiet);
-        ui.add(Label::new(words).truncate());
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            note_ui(ui, note, commands);
-        });
+        if is_wide {
+            remark_ui(ui, run, note, commands);
+        }
     });
+    if !is_wide {
+        ui.horizontal(|ui| remark_ui(ui, run, note, commands));
+    }
     if let Some(prompt) = &run.prompt {
         prompt_ui(ui, run, prompt, commands);
     }
 }
+
+/// The note at the right, and in front of it the state of the pause in words, cut off where there is too little room.
+fn remark_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        note_ui(ui, note, commands);
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            let words = RichText::new(pause_words(run)).color(tokens_of(ui).text_quiet);
+            ui.add(Label::new(words).truncate());
+        });
+    });
+}
+
+/// Points from which the buttons and the note have room in one row.
+const ONE_ROW: f32 = 980.0;
 
 /// Most characters of a note.
 const NOTE_MAX: usize = 300;

@@ -1,6 +1,7 @@
 //! The bar that stands on every screen: state, run, progress, the numbers, the stop control.
 
 use super::activity::{Activity, is_motion_possible, run_in_progress};
+use super::panels::is_narrow;
 use crate::command::{Commands, UiCommand};
 use crate::theme::reading_style;
 use crate::widgets::{badge_ui, quiet_ui, share_ui, tokens_of};
@@ -12,8 +13,8 @@ use palpate_runner::{RunView, RunnerSnapshot};
 /// Height of the bar's content in points.
 pub const HEIGHT: f32 = 52.0;
 
-/// Width of the run's name and progress in points.
-const RUN_WIDTH: f32 = 226.0;
+/// Width of the run's name and progress in points, and in a narrow window.
+const RUN_WIDTHS: [f32; 2] = [226.0, 150.0];
 
 /// Draws the bar. `specimen` is the one of the run in progress or of the form.
 pub fn top_bar_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, activity: &Activity, specimen: &str) {
@@ -76,9 +77,9 @@ fn halt_ui(ui: &mut Ui) -> Id {
 
 fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
     let tokens = tokens_of(ui);
-    let size = vec2(RUN_WIDTH, HEIGHT);
-    ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
-        ui.set_width(RUN_WIDTH);
+    let width = RUN_WIDTHS[usize::from(is_narrow(ui.ctx()))];
+    ui.allocate_ui_with_layout(vec2(width, HEIGHT), Layout::top_down(Align::Min), |ui| {
+        ui.set_width(width);
         ui.spacing_mut().item_spacing.y = 2.0;
         let specimen = match specimen.trim() {
             "" => "specimen not named".to_string(),
@@ -119,10 +120,23 @@ pub fn numbers_ui(ui: &mut Ui, snapshot: &RunnerSnapshot) {
     let depth = derived.and_then(|derived| derived.depth).map(|depth| depth.0);
     let force = derived.and_then(|derived| derived.force).map(|force| force.0);
     let velocity = derived.map(|derived| derived.velocity.0);
-    number_ui(ui, "velocity v", "mm/s", number(velocity, 2), 110.0);
-    number_ui(ui, "position x", "mm", number(position, 3), 118.0);
-    number_ui(ui, "depth", "mm", number(depth, 3), 100.0);
-    number_ui(ui, "force F", "N", number(force, 3), 100.0);
+    let all = [
+        ("force F", "N", number(force, 3), 100.0),
+        ("depth", "mm", number(depth, 3), 100.0),
+        ("position x", "mm", number(position, 3), 118.0),
+        ("velocity v", "mm/s", number(velocity, 2), 110.0),
+    ];
+    let gap = ui.spacing().item_spacing.x;
+    let mut left = ui.available_width();
+    let fits = |(_, _, _, width): &&(&str, &str, String, f32)| {
+        left -= width + gap;
+        left >= 0.0
+    };
+    // The ones that matter most are kept in a narrow window.
+    let count = all.iter().take_while(fits).count();
+    for (name, unit, text, width) in all.into_iter().take(count).rev() {
+        number_ui(ui, name, unit, text, width);
+    }
 }
 
 /// A number of fixed decimals, or dashes where there is none. Minus zero is zero.

@@ -68,6 +68,9 @@ impl Screen for ResultScreen {
             quiet_ui(ui, "the run is in progress; its result comes when it has ended");
             return;
         }
+        if let Some(reason) = &workbench.refusal {
+            alarm_ui(ui, reason);
+        }
         ended_ui(ui, run, quality, commands);
         if let Some(session) = latest.assessed(Some(run)) {
             let may_start = workbench.start_verdict();

@@ -5,10 +5,10 @@ use super::screen::{Commands, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::command::ManualMove;
 use crate::theme::reading_style;
 use crate::widgets::{
-    QuantityField, alarm_ui, placeholder_ui, quantity_ui, reason_button, require, section_ui,
-    tokens_of,
+    QuantityField, alarm_ui, fact_ui, placeholder_ui, quantity_ui, reason_button, require,
+    section_ui, tokens_of,
 };
-use eframe::egui::{Button, Grid, Key, Label, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{Align, Button, Key, Label, Layout, RichText, ScrollArea, Ui, Vec2, vec2};
 use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
@@ -25,6 +25,9 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 
 /// Distances of the buttons, in mm; positive towards the tissue.
 const READY: [f64; 8] = [-10.0, -5.0, -1.0, -0.1, 0.1, 1.0, 5.0, 10.0];
+
+/// Room of one large reading, in points.
+const READING: Vec2 = vec2(180.0, 52.0);
 
 #[derive(Debug)]
 pub struct RigScreen {
@@ -71,10 +74,8 @@ impl RigScreen {
         let tokens = tokens_of(ui);
         let fastest = rig.description.speed_max.0;
         let furthest = rig.description.travel.0;
-        ui.horizontal(|ui| {
-            quantity_ui(ui, "distance", "mm", &mut self.distance);
-            quantity_ui(ui, "jog speed", "mm/s", &mut self.speed);
-        });
+        ui.horizontal(|ui| quantity_ui(ui, "distance", "mm", &mut self.distance));
+        ui.horizontal(|ui| quantity_ui(ui, "jog speed", "mm/s", &mut self.speed));
         self.distance.check(|mm| {
             let words = format!(
                 "type a distance other than 0, at most {furthest:.0} mm in either direction"
@@ -138,18 +139,17 @@ fn values_ui(ui: &mut Ui, rig: &RigView, curve: &CalibrationCurve) {
         format!("{:.3} mm", place.0)
     });
     let place = if rig.is_homed { "position from home" } else { "counter, home not known" };
-    Grid::new("values").num_columns(3).spacing(vec2(40.0, 6.0)).show(ui, |ui| {
-        for name in ["signal", "force, not tared", place] {
-            placeholder_ui(ui, name);
+    let signal = rig.reading.map(|reading| format!("{:.4}", reading.volts));
+    let force = rig.reading.map(|reading| curve.newtons_from_volts(reading.volts));
+    let force = force.map(|force| format!("{force:.3}"));
+    ui.horizontal_wrapped(|ui| {
+        for (name, value) in [("signal", signal), ("force, not tared", force), (place, position)] {
+            ui.allocate_ui_with_layout(READING, Layout::top_down(Align::Min), |ui| {
+                ui.set_width(READING.x);
+                placeholder_ui(ui, name);
+                ui.label(RichText::new(value.unwrap_or_else(none)).text_style(reading_style()));
+            });
         }
-        ui.end_row();
-        let signal = rig.reading.map(|reading| format!("{:.4}", reading.volts));
-        let force = rig.reading.map(|reading| curve.newtons_from_volts(reading.volts));
-        let force = force.map(|force| format!("{force:.3}"));
-        for value in [signal, force, position] {
-            ui.label(RichText::new(value.unwrap_or_else(none)).text_style(reading_style()));
-        }
-        ui.end_row();
     });
     let health = match (&rig.link_error, &rig.link) {
         (Some(reason), _) => RichText::new(format!("Link lost: {reason}")).color(tokens.alarm_text),
@@ -173,24 +173,16 @@ fn limits_ui(ui: &mut Ui, rig: &RigView, limits: &Limits) {
     let silence =
         |speed: f64| Limits::sample_age_max(MmPerS(speed), about.unseen_max, apart).0 * 1e3;
     let fastest = about.speed_max.0;
-    Grid::new("limits").num_columns(2).spacing(vec2(24.0, 4.0)).show(ui, |ui| {
-        for (name, value) in [
-            ("furthest position", format!("{:.1} mm from home", limits.travel_max.0)),
-            ("force above tare", format!("{:.1} to {:.1}", limits.force_min, limits.force_max)),
-            ("change of force", format!("{:.0} N/s", limits.force_rate_max)),
-            ("signal", format!("{:.2}, independent of the calibration", limits.volts_max)),
-            (
-                "time without a sample",
-                format!(
-                    "{:.0} ms at rest, {:.0} ms at {fastest} mm/s",
-                    silence(0.0),
-                    silence(fastest)
-                ),
-            ),
-        ] {
-            ui.label(name);
-            ui.label(value);
-            ui.end_row();
-        }
-    });
+    for (name, value) in [
+        ("furthest position", format!("{:.1} mm from home", limits.travel_max.0)),
+        ("force above tare", format!("{:.1} to {:.1}", limits.force_min, limits.force_max)),
+        ("change of force", format!("{:.0} N/s", limits.force_rate_max)),
+        ("signal", format!("{:.2}, independent of the calibration", limits.volts_max)),
+        (
+            "time without a sample",
+            format!("{:.0} ms at rest, {:.0} ms at {fastest} mm/s", silence(0.0), silence(fastest)),
+        ),
+    ] {
+        fact_ui(ui, name, value);
+    }
 }
