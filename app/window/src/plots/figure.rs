@@ -3,7 +3,7 @@
 use super::style::{quiet, round_marks};
 use crate::theme::Tokens;
 use crate::widgets::tokens_of;
-use eframe::egui::{Align2, Color32, Id, RichText, Sense, Ui, vec2};
+use eframe::egui::{Align2, Color32, Id, Role, Sense, TextStyle, Ui, WidgetInfo, vec2};
 use egui_plot::{
     FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, PlotPoint, PlotPoints,
     PlotUi, Points, Span, Text, VLine,
@@ -148,12 +148,19 @@ pub fn legend_ui(ui: &mut Ui, plots: &[&Plot]) {
     });
 }
 
-/// Draws a patch of an ink and the words that it stands for.
+/// Draws a patch of an ink and the words that it stands for, both in the same line.
 pub fn patch_ui(ui: &mut Ui, ink: Ink, words: &str) {
     let tokens = tokens_of(ui);
-    let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::empty());
-    ui.painter().rect_filled(rect, 2.0, ink.of(tokens));
-    ui.label(RichText::new(words).small());
+    let font = TextStyle::Small.resolve(ui.style());
+    let text = ui.painter().layout_no_wrap(words.to_owned(), font, tokens.text);
+    let patch = vec2(12.0, 12.0);
+    let indent = patch.x + ui.spacing().item_spacing.x;
+    let size = vec2(indent + text.size().x, text.size().y.max(patch.y));
+    let (rect, response) = ui.allocate_exact_size(size, Sense::empty());
+    let middle = Align2::LEFT_CENTER.align_size_within_rect(patch, rect);
+    ui.painter().rect_filled(middle, 2.0, ink.of(tokens));
+    ui.painter().galley(rect.min + vec2(indent, 0.0), text, tokens.text);
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, words));
 }
 
 /// Draws what a loop did over time so high in points, live or computed, its names above: nothing along x has a name

@@ -96,13 +96,15 @@ impl PlotCache {
         });
         // The chart over time carries the limits and phases, so it gets the larger half.
         let height = (ui.available_height() - 30.0) * 0.56;
-        let below = if exact.is_some() { RESIDUAL_HEIGHT } else { 0.0 };
+        // A low window keeps the force; Review shows residuals too.
+        let exact_below = exact.filter(|_| height > 2.0 * RESIDUAL_HEIGHT);
+        let below = if exact_below.is_some() { RESIDUAL_HEIGHT } else { 0.0 };
         let shown = ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
             let (shown, over) = (self.force_time.plot.x.range, exact.map(|exact| &exact.fitted));
             let look = PlotLook { shown, over, ..PlotLook::default() };
             self.force_time.ui(ui, "force_time", look)
         });
-        if let Some(exact) = exact {
+        if let Some(exact) = exact_below {
             ui.allocate_ui(vec2(ui.available_width(), below), |ui| {
                 // Low as it is, it has room for three numbers.
                 let steps = [None, Some(4.0)];

@@ -1,6 +1,6 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{cell, number_ui, symbol_ui, tight, value_ui};
+use super::parameters::{NAME_WIDTH, cell, number_ui, symbol_ui, tight, value_ui};
 use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
@@ -24,10 +24,12 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
 fn row_ui(ui: &mut Ui, text: &ParameterText) {
     let tokens = tokens_of(ui);
     value_ui(ui, &text.name, &text.value, tokens.text, &text.unit);
-    let intervals = [("95 %", &text.interval), ("total 95 %", &text.total)];
+    let intervals = [("95 %", &text.interval), ("total", &text.total)];
     for (name, interval) in intervals.into_iter().filter(|(_, interval)| !interval.is_empty()) {
         ui.horizontal(|ui| {
-            cell(ui, 74.0, |ui| ui.label(RichText::new(name).color(tokens.text_quiet).small()));
+            cell(ui, NAME_WIDTH, |ui| {
+                ui.label(RichText::new(name).color(tokens.text_quiet).small())
+            });
             number_ui(ui, interval, tokens.text_quiet);
         });
     }

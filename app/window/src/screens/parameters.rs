@@ -24,6 +24,10 @@ const SHOWN: [(&str, &str); 7] = [
 /// Height of a symbol's index in points: two thirds of the letter, as in print.
 const INDEX_SIZE: f32 = 9.0;
 
+/// Columns of a parameter's name and value in points: a value of five digits with its uncertainty and a power of ten has room.
+pub(super) const NAME_WIDTH: f32 = 68.0;
+const VALUE_WIDTH: f32 = 190.0;
+
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     let live = run.and_then(|run| run.live.as_ref());
@@ -100,8 +104,8 @@ fn row_ui(
 pub(super) fn value_ui(ui: &mut Ui, name: &str, value: &str, ink: Color32, unit: &str) -> Response {
     let quiet = tokens_of(ui).text_quiet;
     let row = |ui: &mut Ui| {
-        cell(ui, 60.0, |ui| symbol_ui(ui, name));
-        let value = cell(ui, 166.0, |ui| number_ui(ui, value, ink));
+        cell(ui, NAME_WIDTH, |ui| symbol_ui(ui, name));
+        let value = cell(ui, VALUE_WIDTH, |ui| number_ui(ui, value, ink));
         ui.label(RichText::new(unit).color(quiet).small());
         value
     };

@@ -18,7 +18,7 @@ pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
 /// Points below which a window has no room for panels on both sides of plots: what is right of them stands below them then.
 const ROOM_FOR_BOTH: f32 = 1180.0;
 /// Share of the height that it has there.
-const SHARE_BELOW: f32 = 0.38;
+const SHARE_BELOW: f32 = 0.34;
 
 /// Whether the window is narrow: a tablet held upright, or large text.
 pub fn is_narrow(ctx: &Context) -> bool {

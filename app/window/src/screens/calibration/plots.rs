@@ -2,12 +2,18 @@
 
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::widgets::heading_ui;
-use eframe::egui::{Ui, vec2};
+use eframe::egui::{Frame, Panel, Ui, vec2};
 use palpate_figures::figure::Plot;
 
 /// Draws all four in the space there is, two in a row.
 pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
-    let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 84.0) * 0.5);
+    // First what may take two lines.
+    Panel::bottom("legend")
+        .resizable(false)
+        .show_separator_line(false)
+        .frame(Frame::NONE)
+        .show(ui, |ui| legend_ui(ui, &plots.each_ref()));
+    let size = vec2((ui.available_width() - 12.0) * 0.5, (ui.available_height() - 60.0) * 0.5);
     // Half as wide as the plots of a run.
     let steps = [Some(4.0), None];
     let look = PlotLook { steps, link: Some("calibration_force"), ..PlotLook::default() };
@@ -24,5 +30,4 @@ pub fn curves_ui(ui: &mut Ui, plots: &[Plot; 4]) {
             }
         });
     }
-    legend_ui(ui, &plots.each_ref());
 }

@@ -1,4 +1,4 @@
-//! The checks of a run that has ended: what somebody should look at first, everything else folded away.
+//! The checks of a run that has ended: what somebody should look at stands first.
 
 use crate::widgets::{GLYPH_RADIUS, GLYPH_WIDTH, Glyph, glyph_at, section_ui, tokens_of};
 use eframe::egui::{Align, CollapsingHeader, Label, Layout, RichText, Sense, Ui, vec2};
@@ -15,7 +15,7 @@ pub fn quality_ui(ui: &mut Ui, quality: &Assessment) {
         0 => format!("{} checks good", good.len()),
         unknown => format!("{} checks good, {unknown} not judged", good.len()),
     };
-    CollapsingHeader::new(words).show(ui, |ui| {
+    CollapsingHeader::new(words).default_open(true).show(ui, |ui| {
         unknown.iter().chain(&good).for_each(|check| check_ui(ui, check));
     });
 }

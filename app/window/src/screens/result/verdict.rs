@@ -54,14 +54,14 @@ impl RunVerdict {
         let can_reject = is_free.clone().and(has_reason);
         let can_repeat = can_reject.clone().and_then(|()| may_start.clone());
         ui.horizontal(|ui| {
-            if button_ui(ui, "Accept", is_free.is_ok()) {
+            if button_ui(ui, "Accept", "Ctrl+Enter", is_free.is_ok()) {
                 commands.push(UiCommand::AcceptRun);
             }
             for (name, verdict, can) in [
                 ("Reject", QueueVerdict::Reject, &can_reject),
                 ("Repeat", QueueVerdict::Repeat, &can_repeat),
             ] {
-                if button_ui(ui, name, can.is_ok()) {
+                if button_ui(ui, name, "", can.is_ok()) {
                     let work = QueueWork::Judge(session.to_owned(), verdict);
                     commands.push(UiCommand::Queue(work, self.reason.clone()));
                     if verdict == QueueVerdict::Repeat {
@@ -94,6 +94,8 @@ fn next_ui(ui: &mut Ui, queue: &QueueDesk, commands: &mut Commands) {
     }
 }
 
-fn button_ui(ui: &mut Ui, name: &str, is_enabled: bool) -> bool {
-    ui.add_enabled(is_enabled, Button::new(name).min_size(BUTTON)).named(name).clicked()
+fn button_ui(ui: &mut Ui, name: &str, key: &str, is_enabled: bool) -> bool {
+    let button = ui.add_enabled(is_enabled, Button::new(name).min_size(BUTTON)).named(name);
+    let button = if key.is_empty() { button } else { button.on_hover_text(key) };
+    button.clicked()
 }

@@ -71,7 +71,6 @@ impl Screen for RigScreen {
 impl RigScreen {
     fn move_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
         let (rig, verdict) = (&workbench.snapshot.rig, workbench.move_verdict());
-        let tokens = tokens_of(ui);
         let fastest = rig.description.speed_max.0;
         let furthest = rig.description.travel.0;
         ui.horizontal(|ui| quantity_ui(ui, "distance", "mm", &mut self.distance));
@@ -93,7 +92,7 @@ impl RigScreen {
         });
         ui.horizontal_wrapped(|ui| {
             let is_possible = typed.clone().map(|_| ());
-            if reason_button(ui, "Jog", vec2(80.0, 34.0), &is_possible)
+            if reason_button(ui, "Jog", vec2(80.0, 48.0), &is_possible)
                 && let Ok((distance, speed)) = typed
             {
                 commands.push(UiCommand::ManualMove(ManualMove::jog(distance, speed)));
@@ -102,7 +101,7 @@ impl RigScreen {
         ui.horizontal_wrapped(|ui| {
             let speed = self.speed.value.clone();
             for distance in READY {
-                let button = Button::new(format!("{distance:+} mm")).min_size(vec2(66.0, 30.0));
+                let button = Button::new(format!("{distance:+} mm")).min_size(vec2(72.0, 48.0));
                 let is_possible = verdict.is_ok() && speed.is_ok();
                 if ui.add_enabled(is_possible, button).clicked()
                     && let Ok(speed) = speed
@@ -114,17 +113,15 @@ impl RigScreen {
         let words = "Plus moves towards the tissue. Every move is a run of its own: it is recorded, all interlocks apply, and Stop motion stops it.";
         placeholder_ui(ui, words);
         ui.add_space(6.0);
-        ui.horizontal_wrapped(|ui| {
-            if reason_button(ui, "Find home", vec2(110.0, 34.0), &verdict) {
-                commands.push(UiCommand::ManualMove(ManualMove::home()));
-            }
-            let words = if rig.is_homed {
-                "Position zero is known. The axis touches the home switch again to verify it."
-            } else {
-                "Position zero is not known. The probe moves away from the tissue until the home switch closes."
-            };
-            ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
-        });
+        if reason_button(ui, "Find home", vec2(110.0, 48.0), &verdict) {
+            commands.push(UiCommand::ManualMove(ManualMove::home()));
+        }
+        let words = if rig.is_homed {
+            "Position zero is known. The axis touches the home switch again to verify it."
+        } else {
+            "Position zero is not known. The probe moves away from the tissue until the home switch closes."
+        };
+        placeholder_ui(ui, words);
         if let Some(reason) = &workbench.refusal {
             alarm_ui(ui, reason);
         }
