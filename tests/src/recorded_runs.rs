@@ -47,17 +47,36 @@ pub fn try_record_plan(
     record(rig, calibration, RecordingRequest::of(plan))
 }
 
+/// Records a run on a specimen into a folder.
+///
+/// # Panics
+/// If the run is not started or says nothing for minutes.
+pub fn record_specimen(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    params: RampHold,
+    specimen: &str,
+    out: &Path,
+) {
+    let labels = SessionLabels { specimen: specimen.to_owned(), ..SessionLabels::default() };
+    let request =
+        RecordingRequest { is_acknowledged: true, labels, ..RecordingRequest::of(params.plan()) };
+    wait_for_end(ask(rig, calibration, request, out).expect("a start"));
+}
+
 /// What is asked of the runner.
 struct RecordingRequest {
     plan: Plan,
     scale: TimeScale,
     leader: Option<SharedLeadSource>,
     is_acknowledged: bool,
+    labels: SessionLabels,
 }
 
 impl RecordingRequest {
     fn of(plan: Plan) -> Self {
-        Self { plan, scale: TimeScale::Max, leader: None, is_acknowledged: false }
+        let labels = SessionLabels::default();
+        Self { plan, scale: TimeScale::Max, leader: None, is_acknowledged: false, labels }
     }
 }
 
@@ -125,13 +144,13 @@ fn ask(
     request: RecordingRequest,
     out: &Path,
 ) -> Result<StartedRun, StartError> {
-    let RecordingRequest { plan, scale, leader, is_acknowledged } = request;
+    let RecordingRequest { plan, scale, leader, is_acknowledged, labels } = request;
     let request = RunRequest {
         plan,
         calibration,
         limits: Limits::for_travel(rig.description().travel),
         out: Some(out.to_owned()),
-        labels: SessionLabels::default(),
+        labels,
         is_acknowledged,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,

@@ -19,6 +19,7 @@ mod gui_playback;
 mod gui_protocols;
 mod gui_report;
 mod gui_review;
+mod gui_review_ten;
 mod gui_scene;
 mod gui_start;
 mod gui_tape;

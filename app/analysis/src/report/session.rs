@@ -4,24 +4,48 @@ use super::catalog::one_line;
 use super::text::table;
 use palpate_runner::fidelity::{Fidelity, TargetResult};
 use palpate_sessions::{DataQuality, EndRecord, Manifest};
+use std::fmt;
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
 const GAP_USUAL_S: f64 = 1.1e-3;
 
+/// What a person calls a session, in parts.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SessionNameParts {
+    pub specimen: String,
+    pub protocol: String,
+    /// Day and minute at which it began, in UTC.
+    pub day: String,
+    pub time: String,
+}
+
+impl SessionNameParts {
+    #[must_use]
+    pub fn of(manifest: &Manifest) -> Self {
+        let specimen = match one_line(&manifest.specimen) {
+            text if text.is_empty() => "no specimen".to_owned(),
+            text => text,
+        };
+        let protocol = match (&manifest.imported, manifest.plan["name"].as_str()) {
+            (None, Some(name)) => one_line(name),
+            (Some(_), _) => "imported".to_owned(),
+            (None, None) => "no protocol".to_owned(),
+        };
+        let at = |format: &str| manifest.started_at.format(format).to_string();
+        Self { specimen, protocol, day: at("%Y-%m-%d"), time: at("%H:%M UTC") }
+    }
+}
+
+impl fmt::Display for SessionNameParts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {}, {} {}", self.specimen, self.protocol, self.day, self.time)
+    }
+}
+
 /// What a person calls a session: specimen, protocol and when it began.
 #[must_use]
 pub fn session_name(manifest: &Manifest) -> String {
-    let specimen = match one_line(&manifest.specimen) {
-        text if text.is_empty() => "no specimen".to_owned(),
-        text => text,
-    };
-    let protocol = match (&manifest.imported, manifest.plan["name"].as_str()) {
-        (None, Some(name)) => one_line(name),
-        (Some(_), _) => "imported".to_owned(),
-        (None, None) => "no protocol".to_owned(),
-    };
-    let at = manifest.started_at.format("%Y-%m-%d %H:%M UTC");
-    format!("{specimen}, {protocol}, {at}")
+    SessionNameParts::of(manifest).to_string()
 }
 
 #[must_use]

@@ -99,7 +99,7 @@ impl ReviewScreen {
             quiet_ui(ui, "None of the sessions shown has cycles.");
             return;
         }
-        self.moves_ui(ui);
+        self.remarks_ui(ui);
         let height = (0.55 * ui.available_height()).max(160.0);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
         let words = "peak force of every cycle; 'palpate analyse' also computes hysteresis, relaxation and the shift of the loops";

@@ -1,63 +1,15 @@
 //! The sessions shown, and how they are laid over each other.
 
-use super::{ReviewScreen, ReviewSubject, View};
+use super::ReviewScreen;
 use crate::command::{Commands, UiCommand};
 use crate::screens::library;
-use crate::theme::Tokens;
 use crate::widgets::{
-    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, share_ui, task_ui,
-    text_row, tick_box, tokens_of,
+    NamedControl, alarm_ui, quiet_ui, reason_button, require, section_ui, task_ui, text_row,
+    tick_box,
 };
-use crate::workers::review::{Quantity, Stage, TimeOrigin};
-use eframe::egui::{Color32, Label, RichText, Sense, Ui, vec2};
+use crate::workers::review::{Quantity, TimeOrigin};
+use eframe::egui::{Ui, vec2};
 use std::path::PathBuf;
-
-/// A button of a session.
-enum SessionAction {
-    Front(usize),
-    Remove(usize),
-    Cancel(usize),
-    ReadAgain(usize),
-}
-
-/// The colour of a session.
-pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
-    tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
-}
-
-/// A small button of one word, which says aloud of which session.
-fn action_ui(ui: &mut Ui, word: &str, session: &str) -> bool {
-    let name = format!("{word}: {session}");
-    ui.small_button(word).accessible_name(&name).named(&name).clicked()
-}
-
-/// Draws how far a session is read; returns the button that was pressed.
-fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<SessionAction> {
-    let recording = &subject.recording;
-    let share = recording.share();
-    let mut pressed = None;
-    match &recording.stage {
-        Stage::Whole => return None,
-        Stage::Waiting => quiet_ui(ui, "waiting to be read"),
-        Stage::Reading => {
-            share_ui(ui, share);
-            ui.horizontal(|ui| {
-                quiet_ui(ui, format!("still reading {:.0} %", 100.0 * share));
-                if action_ui(ui, "cancel", &subject.name) {
-                    pressed = Some(SessionAction::Cancel(index));
-                }
-            });
-            return pressed;
-        }
-        Stage::Cancelled => {
-            quiet_ui(ui, format!("reading was cancelled at {:.0} % of the session", 100.0 * share))
-        }
-        Stage::Failed(reason) => alarm_ui(ui, reason),
-    }
-    let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
-    (can_read && action_ui(ui, "read again", &subject.name))
-        .then_some(SessionAction::ReadAgain(index))
-}
 
 impl ReviewScreen {
     pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
@@ -101,49 +53,6 @@ impl ReviewScreen {
         }
     }
 
-    fn sessions_ui(&mut self, ui: &mut Ui) {
-        let tokens = tokens_of(ui);
-        if self.subjects.is_empty() {
-            quiet_ui(
-                ui,
-                "no session is shown yet: choose some in the library, or type the path of a session",
-            );
-        }
-        let mut pressed = None;
-        for (index, subject) in self.subjects.iter().enumerate() {
-            ui.horizontal(|ui| {
-                let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
-                ui.painter().rect_filled(rect, 2.0, color_of(tokens, subject.id));
-                let mut name = RichText::new(&subject.name);
-                if index == 0 {
-                    name = name.strong();
-                }
-                ui.add(Label::new(name).wrap());
-            });
-            ui.horizontal(|ui| {
-                if index == 0 {
-                    quiet_ui(ui, "in front");
-                } else if action_ui(ui, "front", &subject.name) {
-                    pressed = Some(SessionAction::Front(index));
-                }
-                if action_ui(ui, "remove", &subject.name) {
-                    pressed = Some(SessionAction::Remove(index));
-                }
-            });
-            pressed = pressed.or(stage_ui(ui, index, subject));
-            ui.add_space(4.0);
-        }
-        match pressed {
-            Some(SessionAction::Front(index)) => self.subjects[..=index].rotate_right(1),
-            Some(SessionAction::Remove(index)) => {
-                self.subjects.remove(index);
-            }
-            Some(SessionAction::Cancel(index)) => self.subjects[index].recording.cancel(),
-            Some(SessionAction::ReadAgain(index)) => self.subjects[index].read_again(),
-            None => {}
-        }
-    }
-
     fn add_ui(&mut self, ui: &mut Ui) {
         let hint = "the folder of a session";
         let is_entered = text_row(ui, "session", hint, &mut self.path);
@@ -167,12 +76,6 @@ impl ReviewScreen {
                 );
                 quiet_ui(ui, &words);
             }
-        }
-    }
-
-    pub(super) fn views_ui(&mut self, ui: &mut Ui) {
-        for view in View::ALL {
-            ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
         }
     }
 }

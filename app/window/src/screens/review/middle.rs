@@ -1,15 +1,15 @@
 //! The plots: over time above each other, over depth, and the tables.
 
 use super::keys::ViewMove;
-use super::left::color_of;
+use super::session_list::color_of;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
-use crate::widgets::{heading_ui, quiet_ui, sentence_ui, tokens_of};
+use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
-use eframe::egui::{Ui, vec2};
+use eframe::egui::{Button, Ui, vec2};
 use palpate_model::signal::track::SignalTrack;
 
 /// Points that the axes beside and below a plot take of it.
@@ -21,14 +21,14 @@ const FULL_LINES: usize = 6;
 impl ReviewScreen {
     pub fn draw_middle(&mut self, ui: &mut Ui) {
         self.read_keys(ui.ctx());
-        ui.horizontal_wrapped(|ui| self.views_ui(ui));
+        self.head_ui(ui);
         if self.subjects.is_empty() {
             quiet_ui(ui, "no session is shown; choose some in the library");
             return;
         }
         match self.view {
             View::OverTime | View::OverDepth => {
-                self.moves_ui(ui);
+                self.remarks_ui(ui);
                 self.readout_ui(ui);
                 match self.view {
                     View::OverTime => self.over_time_ui(ui),
@@ -41,32 +41,43 @@ impl ReviewScreen {
         }
     }
 
-    /// Buttons for what the pointer and the keys can do.
-    pub(super) fn moves_ui(&mut self, ui: &mut Ui) {
+    /// Views, and on the right what the pointer and the keys can do in them.
+    fn head_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            for (text, key, to) in [
-                ("Zoom in", "+", ViewMove::ZoomIn),
-                ("Zoom out", "-", ViewMove::ZoomOut),
-                ("Pan left", "left arrow", ViewMove::PanLeft),
-                ("Pan right", "right arrow", ViewMove::PanRight),
-                ("Reset view", "Home", ViewMove::Reset),
-                ("Cursor A", "A, or a click", ViewMove::Cursor(0)),
-                ("Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
-                ("Clear cursors", "Delete", ViewMove::ClearCursors),
+            for view in View::ALL {
+                ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
+            }
+            if self.subjects.is_empty() || !self.view.has_axes() {
+                return;
+            }
+            ui.separator();
+            ui.spacing_mut().item_spacing.x = 2.0;
+            for (text, name, key, to) in [
+                ("+", "Zoom in", "+", ViewMove::ZoomIn),
+                ("-", "Zoom out", "-", ViewMove::ZoomOut),
+                ("<", "Pan left", "left arrow", ViewMove::PanLeft),
+                (">", "Pan right", "right arrow", ViewMove::PanRight),
+                ("All", "Reset view", "Home", ViewMove::Reset),
+                ("A", "Cursor A", "A, or a click", ViewMove::Cursor(0)),
+                ("B", "Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
+                ("Clear", "Clear cursors", "Delete", ViewMove::ClearCursors),
             ] {
                 // Cursors stand in time, which the view of cycles does not have.
                 let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
-                let is_offered = !is_cursor || self.view != View::Cycles;
-                if is_offered && ui.button(text).on_hover_text(key).clicked() {
+                if is_cursor && self.view == View::Cycles {
+                    continue;
+                }
+                let button = ui.add(Button::new(text).min_size(vec2(28.0, 0.0)));
+                let button = button.accessible_name(name).named(name);
+                if button.on_hover_text(format!("{name}: {key}")).clicked() {
                     self.go(to);
                 }
             }
         });
-        self.remarks_ui(ui);
     }
 
     /// What a reader of the plots must know.
-    fn remarks_ui(&self, ui: &mut Ui) {
+    pub(super) fn remarks_ui(&self, ui: &mut Ui) {
         for subject in self.subjects.iter().filter(|one| one.recording.is_reading()) {
             let share = 100.0 * subject.recording.share();
             quiet_ui(ui, format!("{}: still reading {share:.0} %", subject.name));

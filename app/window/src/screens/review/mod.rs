@@ -9,6 +9,7 @@ mod parameters;
 mod prediction;
 mod readout;
 mod right;
+mod session_list;
 mod subject;
 
 use subject::ReviewSubject;
@@ -51,6 +52,13 @@ palpate_model::named! {
         Parameters = "Parameters",
         /// The fit of one session applied to another.
         Prediction = "Prediction",
+    }
+}
+
+impl View {
+    /// Whether it shows a part of axes, which can be moved.
+    const fn has_axes(self) -> bool {
+        matches!(self, Self::OverTime | Self::OverDepth | Self::Cycles)
     }
 }
 

@@ -1,8 +1,8 @@
 //! The fit of the session in front, applied to the depths of the next one and compared with its measured force.
 
 use super::ReviewScreen;
-use super::left::color_of;
 use super::middle::head_ui;
+use super::session_list::color_of;
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
 use crate::plots::stretches::LineWindow;

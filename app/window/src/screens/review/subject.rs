@@ -6,6 +6,7 @@ use crate::widgets::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
 use crate::workers::review::{Quantity, ReviewRecording, Stage, TimeOrigin};
 use eframe::egui::Context;
+use palpate_analysis::report::session::SessionNameParts;
 use palpate_model::rig::Phase;
 use std::sync::Arc;
 
@@ -15,6 +16,8 @@ pub struct ReviewSubject {
     /// Its own as long as it is shown; its colour follows from it.
     pub id: u64,
     pub name: String,
+    /// The parts of its name; none before they are read.
+    pub parts: Option<SessionNameParts>,
     pub recording: ReviewRecording,
     /// None before a fit was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
@@ -34,6 +37,7 @@ impl ReviewSubject {
         let recording = ReviewRecording::new(&source.session, source.analysis.as_deref());
         Self {
             name: recording.name(),
+            parts: None,
             source,
             id,
             recording,
@@ -55,6 +59,7 @@ impl ReviewSubject {
             return;
         }
         self.name = self.recording.name();
+        self.parts = self.recording.name_parts();
         if let Some(analysis) = &self.source.analysis {
             self.name = format!("{} as {analysis}", self.name);
         }

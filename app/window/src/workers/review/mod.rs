@@ -8,7 +8,7 @@ pub use facts::{SessionEvent, SessionFacts, TimeOrigin};
 pub use read::read;
 
 use eframe::egui::Context;
-use palpate_analysis::report::session::session_name;
+use palpate_analysis::report::session::{SessionNameParts, session_name};
 use palpate_model::rig::Phase;
 use palpate_model::signal::track::{SignalTrack, TrackSegment};
 use palpate_sessions::log::SessionSummary;
@@ -214,6 +214,11 @@ impl ReviewRecording {
             let name = self.path.file_name().unwrap_or(self.path.as_os_str());
             name.to_string_lossy().into_owned()
         })
+    }
+
+    /// The parts of that name, once they are read.
+    pub fn name_parts(&self) -> Option<SessionNameParts> {
+        self.head.as_ref().map(|head| SessionNameParts::of(&head.manifest))
     }
 
     /// Time of the first sample of a phase; `None` without one.

@@ -1,0 +1,204 @@
+//! The sessions shown, one line each: what they have in common is said once above them.
+
+use super::{ReviewScreen, ReviewSubject};
+use crate::theme::Tokens;
+use crate::widgets::{Glyph, NamedControl, alarm_ui, glyph_at, quiet_ui, steady, tokens_of};
+use crate::workers::review::Stage;
+use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
+use eframe::egui::{
+    Align2, Color32, Rect, Response, Role, Sense, Stroke, StrokeKind, TextStyle, Ui, WidgetInfo,
+    pos2, vec2,
+};
+use palpate_analysis::report::session::SessionNameParts;
+
+/// Height of a line in points.
+const ROW: f32 = 26.0;
+/// Width in points of a session's colour and of the button that removes it.
+const SWATCH: f32 = 20.0;
+const REMOVE: f32 = 26.0;
+
+/// What was pressed in the list.
+enum SessionAction {
+    Front(usize),
+    Remove(usize),
+    Cancel(usize),
+    ReadAgain(usize),
+}
+
+/// The colour of a session.
+pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
+    tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
+}
+
+/// What all sessions shown have in common; nothing of one alone.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct CommonParts([Option<String>; 3]);
+
+fn list(parts: &SessionNameParts) -> [&String; 3] {
+    [&parts.specimen, &parts.protocol, &parts.day]
+}
+
+impl CommonParts {
+    pub fn of(subjects: &[ReviewSubject]) -> Self {
+        let mut all = subjects.iter().filter_map(|one| one.parts.as_ref());
+        let Some(first) = all.next().filter(|_| subjects.len() > 1) else {
+            return Self::default();
+        };
+        let mut common = list(first).map(|part| Some(part.clone()));
+        for parts in all {
+            for (known, own) in common.iter_mut().zip(list(parts)) {
+                known.take_if(|known| known != own);
+            }
+        }
+        Self(common)
+    }
+
+    /// In words, empty without any.
+    fn words(&self) -> String {
+        self.0.iter().flatten().map(String::as_str).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The name of a session without what it has in common with the others.
+    pub fn short_name(&self, subject: &ReviewSubject) -> String {
+        let Some(parts) = &subject.parts else { return subject.name.clone() };
+        // The analysis by which it is read, and its number among those of one name.
+        let rest = subject.name.strip_prefix(&parts.to_string()).unwrap_or_default();
+        let own = list(parts).into_iter().zip(&self.0);
+        let own = own.filter(|(_, common)| common.is_none()).map(|(part, _)| part.as_str());
+        let own = own.chain([parts.time.as_str()]).collect::<Vec<_>>().join(", ");
+        own + rest
+    }
+}
+
+/// A small button of one word, which says aloud of which session.
+fn action_ui(ui: &mut Ui, word: &str, session: &str) -> bool {
+    let name = format!("{word}: {session}");
+    ui.small_button(word).accessible_name(&name).named(&name).clicked()
+}
+
+/// Draws what the keyboard and the pointer see of a part of a line that can be pressed.
+fn pressable(ui: &Ui, response: &Response, name: &str) {
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
+    let tokens = tokens_of(ui);
+    if response.hovered() {
+        ui.painter().rect_filled(response.rect, 3.0, tokens.control_hover);
+    }
+    if response.has_focus() {
+        let stroke = Stroke::new(1.5, tokens.focus);
+        ui.painter().rect_stroke(response.rect, 3.0, stroke, StrokeKind::Inside);
+    }
+}
+
+/// Draws a line; returns whether its session is to come to the front, and whether it is to be removed.
+fn row_ui(ui: &mut Ui, subject: &ReviewSubject, short: &str, is_front: bool) -> [bool; 2] {
+    let tokens = tokens_of(ui);
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    let place = Rect::from_min_max(rect.min, pos2(rect.right() - REMOVE, rect.bottom()));
+    if is_front {
+        ui.painter().rect_filled(rect, 3.0, tokens.selection);
+    }
+    let id = ui.scope_id().with(("session", subject.id));
+    let name = match is_front {
+        true => format!("in front: {}", subject.name),
+        false => format!("front: {}", subject.name),
+    };
+    let row = ui.interact(place, id, Sense::click());
+    pressable(ui, &row, &name);
+    let row = row.named(&name).on_hover_text(&subject.name);
+    let middle = place.center().y;
+    let swatch =
+        Rect::from_center_size(pos2(place.left() + 0.5 * SWATCH, middle), vec2(10.0, 14.0));
+    ui.painter().rect_filled(swatch, 2.0, color_of(tokens, subject.id));
+    let font = TextStyle::Body.resolve(ui.style());
+    let mut job =
+        LayoutJob::single_section(short.to_owned(), TextFormat::simple(font, tokens.text));
+    job.wrap = TextWrapping::truncate_at_width(place.width() - SWATCH - 2.0);
+    let galley = ui.fonts_mut(|fonts| fonts.layout_job(job));
+    let at = pos2(place.left() + SWATCH, middle);
+    let text = Align2::LEFT_CENTER.anchor_size(at, galley.size());
+    ui.painter().galley(text.min, galley.clone(), tokens.text);
+    if is_front {
+        // The fonts have no bold: once more, a third of a point to the right.
+        ui.painter().galley(text.min + vec2(0.35, 0.0), galley, tokens.text);
+    }
+    let place = Rect::from_min_max(pos2(place.right(), rect.top()), rect.max);
+    let remove = ui.interact(place, id.with("remove"), Sense::click());
+    let name = format!("remove: {}", subject.name);
+    pressable(ui, &remove, &name);
+    let ink = if remove.hovered() { tokens.text } else { tokens.text_quiet };
+    glyph_at(ui.painter(), Glyph::Cross, place.center(), 4.0, ink);
+    let remove = remove.named(&name).on_hover_text("remove from the view");
+    [row.clicked() && !is_front, remove.clicked()]
+}
+
+/// Draws how far a session is read, where that is not to its end; returns the button that was pressed.
+fn stage_ui(ui: &mut Ui, index: usize, subject: &ReviewSubject) -> Option<SessionAction> {
+    let recording = &subject.recording;
+    let percent = 100.0 * recording.share();
+    let (words, button) = match &recording.stage {
+        Stage::Whole => return None,
+        Stage::Waiting => ("waiting to be read".to_owned(), None),
+        Stage::Reading => (format!("still reading {percent:.0} %"), Some("cancel")),
+        Stage::Cancelled => {
+            (format!("reading was cancelled at {percent:.0} %"), Some("read again"))
+        }
+        Stage::Failed(reason) => {
+            ui.horizontal(|ui| {
+                ui.add_space(SWATCH);
+                ui.vertical(|ui| alarm_ui(ui, reason));
+            });
+            (String::new(), Some("read again"))
+        }
+    };
+    let mut pressed = None;
+    ui.horizontal(|ui| {
+        ui.add_space(SWATCH);
+        if button.is_some_and(|word| action_ui(ui, word, &subject.name)) {
+            pressed = Some(match recording.stage {
+                Stage::Reading => SessionAction::Cancel(index),
+                _ => SessionAction::ReadAgain(index),
+            });
+        }
+        if !words.is_empty() {
+            quiet_ui(ui, words);
+        }
+    });
+    pressed
+}
+
+impl ReviewScreen {
+    pub(super) fn sessions_ui(&mut self, ui: &mut Ui) {
+        if self.subjects.is_empty() {
+            let words = "no session is shown yet: choose some in the library, or type the path of a session";
+            quiet_ui(ui, words);
+        }
+        let common = CommonParts::of(&self.subjects);
+        let words = common.words();
+        if !words.is_empty() {
+            quiet_ui(ui, format!("all {}: {words}", self.subjects.len()));
+        }
+        let mut pressed = None;
+        let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
+        for (index, subject) in self.subjects.iter().enumerate() {
+            let short = common.short_name(subject);
+            let [front, remove] = row_ui(ui, subject, &short, index == 0);
+            if front {
+                pressed = Some(SessionAction::Front(index));
+            } else if remove {
+                pressed = Some(SessionAction::Remove(index));
+            }
+            let stage = steady(ui, subject.id, |ui| stage_ui(ui, index, subject));
+            pressed = pressed.or(stage);
+        }
+        ui.spacing_mut().item_spacing.y = spacing;
+        match pressed {
+            Some(SessionAction::Front(index)) => self.subjects[..=index].rotate_right(1),
+            Some(SessionAction::Remove(index)) => {
+                self.subjects.remove(index);
+            }
+            Some(SessionAction::Cancel(index)) => self.subjects[index].recording.cancel(),
+            Some(SessionAction::ReadAgain(index)) => self.subjects[index].read_again(),
+            None => {}
+        }
+    }
+}
