@@ -65,7 +65,7 @@ fn named(flow: &WindowFlow, word: &str) -> Vec<(String, Rect)> {
 
 #[test]
 fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
-    let (flow, paths) = ten_sessions();
+    let (mut flow, paths) = ten_sessions();
     let rows = named(&flow, "remove: ");
     assert_eq!(rows.len(), 10);
     // One line below the other, all within the panel, each with its name before its button.
@@ -85,4 +85,30 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     assert!(flow.says(&format!("all 10: ramp-hold, {day}")));
     assert!(flow.says(&format!("in front: {}", session_name(&manifest))));
     flow.window.check_accessibility();
+    // One comes to the front, another is removed; both are undone, by key and by button.
+    let order = |flow: &WindowFlow| -> Vec<String> {
+        named(flow, "remove: ").into_iter().map(|(name, _)| name).collect()
+    };
+    let before = order(&flow);
+    let [third, fifth] = [&before[2], &before[4]];
+    flow.click(&format!("front: {third}"));
+    assert_eq!(order(&flow)[..3], [third.clone(), before[0].clone(), before[1].clone()]);
+    let moved = order(&flow);
+    flow.click(&format!("remove: {fifth}"));
+    assert_eq!(order(&flow).len(), 9);
+    flow.click(&format!("Undo: remove {fifth}"));
+    wait_until_read(&mut flow, 10);
+    assert_eq!(order(&flow), moved);
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    flow.window.run_steps(3);
+    assert_eq!(order(&flow), before);
+    assert!(!flow.says("Undo: "));
+    // All of them go and come back; what was added since stays.
+    flow.click("Clear list");
+    assert!(flow.says("no session is shown yet"));
+    flow.type_into("session", &paths[7].display().to_string());
+    flow.click("Add to view");
+    flow.click("Undo: clear 10 sessions");
+    wait_until_read(&mut flow, 10);
+    assert_eq!(order(&flow), before);
 }

@@ -50,6 +50,9 @@ impl ReviewScreen {
         if ctx.egui_wants_keyboard_input() {
             return;
         }
+        if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
+            self.undo();
+        }
         // The modifiers are the event's own: those of the frame may have been let go already.
         let pressed: Vec<(Key, Modifiers)> = ctx.input(|input| {
             let events = input.events.iter();

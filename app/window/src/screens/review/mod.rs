@@ -70,6 +70,8 @@ const READING_MAX: usize = 2;
 pub struct ReviewScreen {
     /// The one in front comes first.
     subjects: Vec<ReviewSubject>,
+    /// Changes of that list, the last one at the end.
+    changes: Vec<session_list::ListChange>,
     analyses: AnalysesPanel,
     view: View,
     time_origin: TimeOrigin,
@@ -109,7 +111,7 @@ impl ReviewScreen {
 
     /// Shows these sessions instead of those there.
     pub fn open(&mut self, sessions: Vec<PathBuf>, ctx: &Context) {
-        self.subjects.clear();
+        self.clear();
         self.cursors = [None; 2];
         self.time.show_all();
         self.depth.show_all();

@@ -25,6 +25,29 @@ enum SessionAction {
     ReadAgain(usize),
 }
 
+/// A change of the list that can be undone.
+pub(super) enum ListChange {
+    /// A session came to the front from this place.
+    Front(usize),
+    /// A session was at this place.
+    Removed(usize, Box<ReviewSubject>),
+    /// These were shown, in this order.
+    Cleared(Vec<ReviewSubject>),
+}
+
+/// Changes that can be undone.
+const UNDO_MAX: usize = 50;
+
+impl ListChange {
+    fn words(&self) -> String {
+        match self {
+            Self::Front(_) => "front".into(),
+            Self::Removed(_, subject) => format!("remove {}", subject.name),
+            Self::Cleared(subjects) => format!("clear {} sessions", subjects.len()),
+        }
+    }
+}
+
 /// The colour of a session.
 pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
     tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
@@ -192,13 +215,80 @@ impl ReviewScreen {
         }
         ui.spacing_mut().item_spacing.y = spacing;
         match pressed {
-            Some(SessionAction::Front(index)) => self.subjects[..=index].rotate_right(1),
-            Some(SessionAction::Remove(index)) => {
-                self.subjects.remove(index);
-            }
+            Some(SessionAction::Front(index)) => self.bring_to_front(index),
+            Some(SessionAction::Remove(index)) => self.remove(index),
             Some(SessionAction::Cancel(index)) => self.subjects[index].recording.cancel(),
             Some(SessionAction::ReadAgain(index)) => self.subjects[index].read_again(),
             None => {}
         }
+        ui.horizontal(|ui| {
+            let clear = (self.subjects.len() > 1).then(|| ui.small_button("Clear list"));
+            if clear.is_some_and(|button| button.named("Clear list").clicked()) {
+                self.clear();
+            }
+            let Some(words) = self.changes.last().map(ListChange::words) else { return };
+            let name = format!("Undo: {words}");
+            let button = steady(ui, "undo", |ui| ui.small_button("Undo"));
+            let button = button.accessible_name(&name).named("Undo");
+            if button.on_hover_text(format!("{name}  (Ctrl+Z)")).clicked() {
+                self.undo();
+            }
+        });
     }
+
+    pub(super) fn bring_to_front(&mut self, index: usize) {
+        if (1..self.subjects.len()).contains(&index) {
+            self.subjects[..=index].rotate_right(1);
+            self.note(ListChange::Front(index));
+        }
+    }
+
+    fn remove(&mut self, index: usize) {
+        let subject = released(self.subjects.remove(index));
+        self.note(ListChange::Removed(index, Box::new(subject)));
+    }
+
+    pub(super) fn clear(&mut self) {
+        let subjects: Vec<_> = self.subjects.drain(..).map(released).collect();
+        if !subjects.is_empty() {
+            self.note(ListChange::Cleared(subjects));
+        }
+    }
+
+    fn note(&mut self, change: ListChange) {
+        if self.changes.len() == UNDO_MAX {
+            self.changes.remove(0);
+        }
+        self.changes.push(change);
+    }
+
+    /// Takes back the last change; sessions that were added since stay.
+    pub(super) fn undo(&mut self) {
+        let is_shown = |subjects: &[ReviewSubject], one: &ReviewSubject| {
+            subjects.iter().any(|shown| shown.source.session == one.source.session)
+        };
+        match self.changes.pop() {
+            Some(ListChange::Front(index)) if index < self.subjects.len() => {
+                self.subjects[..=index].rotate_left(1);
+            }
+            Some(ListChange::Removed(index, subject)) if !is_shown(&self.subjects, &subject) => {
+                self.subjects.insert(index.min(self.subjects.len()), *subject);
+            }
+            Some(ListChange::Cleared(before)) => {
+                let added = std::mem::replace(&mut self.subjects, before);
+                for one in added {
+                    if !is_shown(&self.subjects, &one) {
+                        self.subjects.push(one);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A session that is no longer shown, without its samples: they are read again if it comes back.
+fn released(mut subject: ReviewSubject) -> ReviewSubject {
+    subject.read_again();
+    subject
 }
