@@ -8,6 +8,7 @@ pub mod navigate;
 pub mod over_depth;
 pub mod over_time;
 mod run;
+pub mod small;
 pub mod stretches;
 mod style;
 

@@ -6,8 +6,8 @@ use super::style::still;
 use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
-use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions, Ui, vec2};
-use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, Points};
+use eframe::egui::{Color32, ColorImage, Context, Rect, TextureHandle, TextureOptions, Ui, vec2};
+use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, PlotUi, Points};
 use palpate_model::signal::polyline::{PixelCoverage, PolylineReducer};
 use palpate_model::signal::track::SignalTrack;
 use std::sync::Arc;
@@ -76,11 +76,18 @@ pub struct DepthLines {
     texture: Option<TextureHandle>,
     /// Size of the plot in pixels, once it was drawn.
     pixels: Option<[f64; 2]>,
+    /// Plots that share the points of a frame; 0 for one alone.
+    pub sharing: usize,
 }
 
 impl DepthLines {
     /// Fetches the lines that were found, and starts a search where the view or the samples have changed.
-    fn update(&mut self, ctx: &Context, lines: &[DepthLine<'_>], [depth, force]: [&AxisRange; 2]) {
+    pub fn update(
+        &mut self,
+        ctx: &Context,
+        lines: &[DepthLine<'_>],
+        [depth, force]: [&AxisRange; 2],
+    ) {
         if let Some(Some(mut found)) = self.job.poll() {
             let picture = found.picture.take();
             self.texture = picture
@@ -112,7 +119,8 @@ impl DepthLines {
         let tracks: Vec<SignalTrack> = lines.iter().map(|line| line.track.clone()).collect();
         let is_cancelled = Arc::clone(&self.is_cancelled);
         // Without a thread the lines stay as they are, and the next frame tries again.
-        let search = move || reduce(key, &tracks, &is_cancelled);
+        let points_max = POINTS_MAX / (tracks.len() * self.sharing.max(1)).max(1);
+        let search = move || reduce(key, &tracks, points_max, &is_cancelled);
         let _ = self.job.start("review-loops", ctx, search);
     }
 
@@ -159,22 +167,7 @@ impl DepthLines {
         let response = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(x[0]..=x[1]);
             plot_ui.set_plot_bounds_y(y[0]..=y[1]);
-            if let (Some(texture), Some(found)) = (&self.texture, &self.found) {
-                // At its own place, also while another view is searched for.
-                let (x, y) = (found.key.depth, found.key.force);
-                let middle = PlotPoint::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
-                let size = vec2((x[1] - x[0]) as f32, (y[1] - y[0]) as f32);
-                let picture = PlotImage::new("loops", texture.id(), middle, size);
-                plot_ui.image(picture.allow_hover(false));
-            }
-            for line in lines.iter().rev() {
-                for (number, stretch) in self.stretches(line.key.id).iter().enumerate() {
-                    let drawn = Line::new(line.name, PlotPoints::Borrowed(stretch))
-                        .id((line.key.id, number))
-                        .color(line.key.color);
-                    plot_ui.line(drawn.width(1.2).allow_hover(false));
-                }
-            }
+            self.paint(plot_ui, lines);
             for line in lines.iter().rev() {
                 for (name, place) in ["A", "B"].into_iter().zip(line.cursors) {
                     if let Some([depth, force]) = place {
@@ -185,20 +178,49 @@ impl DepthLines {
                 }
             }
         });
+        self.measure(ui, response.response.rect);
+        gesture(ui, &response.response)
+    }
+
+    /// Takes the size of the plot that was drawn, for the search to come.
+    pub fn measure(&mut self, ui: &Ui, rect: Rect) {
         let scale = f64::from(ui.ctx().pixels_per_point());
-        let size = response.response.rect.size();
-        if self.pixels.replace([size.x, size.y].map(|side| f64::from(side) * scale)).is_none() {
+        let pixels = [rect.width(), rect.height()].map(|side| f64::from(side) * scale);
+        if self.pixels.replace(pixels).is_none() {
             ui.ctx().request_repaint();
         }
-        gesture(ui, &response.response)
+    }
+
+    /// Draws what was found of lines, the first in front.
+    pub fn paint<'a>(&'a self, plot_ui: &mut PlotUi<'a>, lines: &[DepthLine<'a>]) {
+        if let (Some(texture), Some(found)) = (&self.texture, &self.found) {
+            // At its own place, also while another view is searched for.
+            let (x, y) = (found.key.depth, found.key.force);
+            let middle = PlotPoint::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
+            let size = vec2((x[1] - x[0]) as f32, (y[1] - y[0]) as f32);
+            let picture = PlotImage::new("loops", texture.id(), middle, size);
+            plot_ui.image(picture.allow_hover(false));
+        }
+        for line in lines.iter().rev() {
+            for (number, stretch) in self.stretches(line.key.id).iter().enumerate() {
+                let drawn = Line::new(line.name, PlotPoints::Borrowed(stretch))
+                    .id((line.key.id, number))
+                    .color(line.key.color);
+                plot_ui.line(drawn.width(1.2).allow_hover(false));
+            }
+        }
     }
 }
 
-fn reduce(key: Key, tracks: &[SignalTrack], is_cancelled: &AtomicBool) -> Option<DepthPicture> {
+fn reduce(
+    key: Key,
+    tracks: &[SignalTrack],
+    points_max: usize,
+    is_cancelled: &AtomicBool,
+) -> Option<DepthPicture> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
-    let points_max = POINTS_MAX / tracks.len().max(1);
     let mut lines = Vec::with_capacity(tracks.len());
     let mut picture = None;
     // The first is in front, so it comes last into the picture.
@@ -276,7 +298,7 @@ mod tests {
             .collect();
         let tracks = vec![track(); lines.len()];
         let key = Key { depth: KEY, force: KEY, pixels: [pixels; 2], lines };
-        reduce(key, &tracks, &AtomicBool::new(false)).unwrap()
+        reduce(key, &tracks, POINTS_MAX, &AtomicBool::new(false)).unwrap()
     }
 
     #[test]

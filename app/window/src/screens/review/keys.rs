@@ -26,7 +26,10 @@ impl ReviewScreen {
     /// Does what a button or a key asks for.
     pub(super) fn go(&mut self, to: ViewMove) {
         let spans = match self.view {
-            View::OverDepth | View::Cycles => vec![&mut self.depth, &mut self.force],
+            View::SideBySide if !self.side.is_over_depth => vec![&mut self.time],
+            View::OverDepth | View::SideBySide | View::Cycles => {
+                vec![&mut self.depth, &mut self.force]
+            }
             _ => vec![&mut self.time],
         };
         match to {

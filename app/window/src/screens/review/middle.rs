@@ -35,6 +35,7 @@ impl ReviewScreen {
                     _ => self.over_depth_ui(ui),
                 }
             }
+            View::SideBySide => self.side_by_side_ui(ui),
             View::Cycles => self.cycles_ui(ui),
             View::Parameters => self.parameters_ui(ui),
             View::Prediction => self.prediction_ui(ui),

@@ -2,6 +2,7 @@
 
 pub mod analyses;
 mod cycles;
+mod groups;
 mod keys;
 mod left;
 mod middle;
@@ -10,6 +11,7 @@ mod prediction;
 mod readout;
 mod right;
 mod session_list;
+mod side_by_side;
 mod subject;
 
 use subject::ReviewSubject;
@@ -47,6 +49,8 @@ palpate_model::named! {
         #[default]
         OverTime = "Over time",
         OverDepth = "Over depth",
+        /// A small plot of each session.
+        SideBySide = "Side by side",
         /// Hysteresis loops of all cycles, and their peaks.
         Cycles = "Cycles",
         Parameters = "Parameters",
@@ -58,7 +62,7 @@ palpate_model::named! {
 impl View {
     /// Whether it shows a part of axes, which can be moved.
     const fn has_axes(self) -> bool {
-        matches!(self, Self::OverTime | Self::OverDepth | Self::Cycles)
+        matches!(self, Self::OverTime | Self::OverDepth | Self::SideBySide | Self::Cycles)
     }
 }
 
@@ -74,6 +78,8 @@ pub struct ReviewScreen {
     changes: Vec<session_list::ListChange>,
     analyses: AnalysesPanel,
     view: View,
+    grouping: groups::Grouping,
+    side: side_by_side::SideBySide,
     time_origin: TimeOrigin,
     quantities: Vec<Quantity>,
     has_residuals: bool,
@@ -143,7 +149,7 @@ impl ReviewScreen {
     pub fn is_settled(&self) -> bool {
         let is_working = self.fits.is_busy() || self.prediction.is_busy();
         let is_read = self.subjects.iter().all(ReviewSubject::is_settled);
-        is_read && !is_working && !self.depth_lines.is_busy()
+        is_read && !is_working && !self.depth_lines.is_busy() && !self.side.is_busy()
     }
 
     /// Fetches what threads have answered.

@@ -62,9 +62,10 @@ fn list(parts: &SessionNameParts) -> [&String; 3] {
 }
 
 impl CommonParts {
-    pub fn of(subjects: &[ReviewSubject]) -> Self {
-        let mut all = subjects.iter().filter_map(|one| one.parts.as_ref());
-        let Some(first) = all.next().filter(|_| subjects.len() > 1) else {
+    pub fn of<'a>(subjects: impl ExactSizeIterator<Item = &'a ReviewSubject>) -> Self {
+        let is_several = subjects.len() > 1;
+        let mut all = subjects.filter_map(|one| one.parts.as_ref());
+        let Some(first) = all.next().filter(|_| is_several) else {
             return Self::default();
         };
         let mut common = list(first).map(|part| Some(part.clone()));
@@ -195,7 +196,7 @@ impl ReviewScreen {
             let words = "no session is shown yet: choose some in the library, or type the path of a session";
             quiet_ui(ui, words);
         }
-        let common = CommonParts::of(&self.subjects);
+        let common = CommonParts::of(self.subjects.iter());
         let words = common.words();
         if !words.is_empty() {
             quiet_ui(ui, format!("all {}: {words}", self.subjects.len()));
