@@ -18,8 +18,20 @@ const SCALE: f64 = 2.0;
 /// Tolerance of the curves that make a circle, in px.
 const ROUND: f64 = 0.05;
 
+/// Pixels row by row, each red, green and blue.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Raster {
+    pub size: [usize; 2],
+    pub rgb: Vec<u8>,
+}
+
 /// The drawing as a PNG file (PNG, ISO/IEC 15948).
 pub fn png(drawing: &Drawing) -> io::Result<Vec<u8>> {
+    encoded(&raster(drawing)?)
+}
+
+/// The drawing as pixels, for a clipboard.
+pub fn raster(drawing: &Drawing) -> io::Result<Raster> {
     let too_large = || io::Error::other("the figure is too large for a PNG; draw it as SVG");
     let [width, height] = drawing.size.map(|px| (px * SCALE).ceil());
     if !(width >= 1.0 && height >= 1.0) || width.max(height) > f64::from(u16::MAX) {
@@ -38,13 +50,15 @@ pub fn png(drawing: &Drawing) -> io::Result<Vec<u8>> {
     let mut pixels = Pixmap::new(width, height);
     context.flush();
     context.render(&mut pixels, &mut Resources::new());
-    encoded(&pixels)
+    // The ground is opaque, so nothing is to be seen through and premultiplied colours are plain ones.
+    let rgb = pixels.data().iter().flat_map(|pixel| [pixel.r, pixel.g, pixel.b]).collect();
+    Ok(Raster { size: [pixels.width(), pixels.height()].map(usize::from), rgb })
 }
 
-/// The ground is opaque, so nothing is to be seen through and premultiplied colours are plain ones.
-fn encoded(pixels: &Pixmap) -> io::Result<Vec<u8>> {
+fn encoded(pixels: &Raster) -> io::Result<Vec<u8>> {
     let mut file = Vec::new();
-    let size = [pixels.width(), pixels.height()].map(u32::from);
+    // No side is longer than a u16 tells.
+    let size = pixels.size.map(|side| side as u32);
     let mut encoder = png::Encoder::new(&mut file, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
@@ -54,10 +68,8 @@ fn encoded(pixels: &Pixmap) -> io::Result<Vec<u8>> {
         yppu: dots_per_m,
         unit: png::Unit::Meter,
     }));
-    let bytes: Vec<u8> =
-        pixels.data().iter().flat_map(|pixel| [pixel.r, pixel.g, pixel.b]).collect();
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&bytes)?;
+    writer.write_image_data(&pixels.rgb)?;
     writer.finish()?;
     Ok(file)
 }

@@ -120,6 +120,13 @@ impl Tokens {
         if is_dark { &DARK } else { &LIGHT }
     }
 
+    /// Behind a number that is below (-1 to 0) or above (0 to 1) those it is compared with: from the canvas to blue or to
+    /// vermilion, which every kind of colour vision tells apart, and never so strong that text is hard to read on it.
+    pub fn deviation(&self, share: f32) -> Color32 {
+        let ink = if share < 0.0 { self.series } else { self.limit };
+        self.canvas.lerp_to_gamma(ink, 0.4 * share.abs().min(1.0))
+    }
+
     /// The line of one of `count` things that have an order, such as cycles.
     pub fn in_order(&self, index: usize, count: usize) -> Color32 {
         let [first, last] = self.ordered;
@@ -198,6 +205,8 @@ mod tests {
                 (tokens.text, tokens.control_hover),
                 (tokens.text, tokens.selection),
                 (tokens.text, band(tokens)),
+                (tokens.text, tokens.deviation(-1.0)),
+                (tokens.text, tokens.deviation(1.0)),
                 (tokens.text_quiet, tokens.panel),
                 (tokens.text_quiet, tokens.canvas),
                 (tokens.text_quiet, band(tokens)),

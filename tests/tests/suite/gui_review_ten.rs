@@ -1,13 +1,20 @@
 //! Ten sessions on the review screen: the list, plots side by side, sorted parameters, and undo.
-use eframe::egui::{Key, Modifiers, Rect};
+use eframe::egui::accesskit::Role;
+use eframe::egui::{Key, Modifiers, OutputCommand, Rect, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::report::session::session_name;
+use palpate_analysis::report::text;
+use palpate_analysis::source::SourceSelection;
 use palpate_drivers::sim::{SimRig, SimSettings, SimStiffness};
+use palpate_figures::tokens::Tokens;
 use palpate_model::units::Seconds;
 use palpate_protocols::plans::RampHold;
+use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::TimeScale;
 use palpate_sessions::Session;
-use palpate_tests::flow::WindowFlow;
+use palpate_sessions::contacts::contacts;
+use palpate_tests::flow::{FRAME, WindowFlow};
 use palpate_tests::recorded_runs::record_specimen;
 use palpate_window::shell::rail;
 use palpate_window::shell::sizes::{PanelEdge, Sizes};
@@ -55,7 +62,8 @@ fn named(flow: &WindowFlow, word: &str) -> Vec<(String, Rect)> {
     let nodes = flow.window.query_all_by_label_contains(word);
     let mut found: Vec<(String, Rect)> = nodes
         .filter_map(|node| {
-            let label = node.accesskit_node().label()?;
+            let own = node.accesskit_node();
+            let label = own.label().or_else(|| own.value())?;
             Some((label.strip_prefix(word)?.to_owned(), node.rect()))
         })
         .collect();
@@ -111,4 +119,148 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     flow.click("Undo: clear 10 sessions");
     wait_until_read(&mut flow, 10);
     assert_eq!(order(&flow), before);
+}
+
+/// Fits all sessions shown.
+fn fit_all(flow: &mut WindowFlow) {
+    flow.window.key_press(Key::F6);
+    flow.wait("the fits", |window| {
+        let mut found = window.query_all_by_label_contains("from the profile likelihood");
+        found.next().is_some()
+    });
+    flow.window.run_steps(3);
+}
+
+#[test]
+fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
+    let (mut flow, paths) = ten_sessions();
+    flow.click("contact");
+    flow.click("Side by side");
+    flow.window.run_steps(3);
+    assert!(flow.says("liver 1") && flow.says("5 sessions"));
+    // Without a pointer: cursor A at a third of what is shown.
+    flow.click("Cursor A");
+    flow.window.run_steps(3);
+    let words = named(&flow, "cursor at ");
+    let (words, _) = words.first().unwrap();
+    let (t, rest) = words.split_once(" s from ").unwrap();
+    assert!(rest.starts_with("contact"), "{rest}");
+    let t: f64 = t.parse().unwrap();
+    for path in &paths {
+        let session = Session::open(path).unwrap();
+        let seconds = |index: usize| {
+            let ticks = session.rows[index].tick - session.rows[0].tick;
+            session.manifest.time_of(ticks as i64).0
+        };
+        let first = contacts(&session.entries)[0].after_sample as usize;
+        let at = t + seconds(first);
+        // The words have three decimals, so the sample may be a neighbour.
+        let near = (0..session.rows.len()).filter(|index| (seconds(*index) - at).abs() < 0.0025);
+        let forces: Vec<f64> = near.filter_map(|index| session.rows[index].force).collect();
+        let read: Vec<f64> = values_read(&flow, &session_name(&session.manifest));
+        assert!(!read.is_empty() && !forces.is_empty());
+        let is_near = |read: &f64| forces.iter().any(|force| (force - read).abs() < 1e-4);
+        assert!(read.iter().any(is_near), "{read:?} is none of {forces:?}");
+    }
+    // The pointer is the cursor where it is in a plot, and a click brings the session to the front.
+    let third = heads(&flow)[2].clone();
+    let at = third.1.center_bottom() + vec2(0.0, 30.0);
+    flow.window.hover_at(at);
+    flow.window.run_steps(3);
+    let pointed = named(&flow, "cursor at ").remove(0).0;
+    assert_ne!(&pointed, words);
+    flow.window.drag_at(at);
+    flow.window.drop_at(at);
+    flow.window.run_steps(3);
+    assert!(flow.says(&format!("in front: {}", third.0)));
+    // The plots stay where they are.
+    assert_eq!(heads(&flow)[2].0, third.0);
+    // Over depth, by protocol and in one group.
+    flow.click("Force over depth");
+    flow.click("group by protocol");
+    flow.window.run_steps(3);
+    assert!(flow.says("10 sessions"));
+    flow.click("group by none");
+    flow.window.hover_at(at);
+    flow.window.run_steps(3);
+    assert!(flow.says(" mm, where each session first reaches it"));
+    flow.window.check_accessibility();
+}
+
+/// Forces in N that the lines above the plots of sessions of a name say.
+fn values_read(flow: &WindowFlow, name: &str) -> Vec<f64> {
+    let found = named(flow, name).into_iter();
+    let read = found.filter_map(|(words, _)| {
+        // Sessions that began in one minute are numbered.
+        let (_, force) = words.rsplit_once(": ")?;
+        force.strip_suffix(" N")?.parse().ok()
+    });
+    read.collect()
+}
+
+/// Names and places of the lines above the plots, row by row.
+fn heads(flow: &WindowFlow) -> Vec<(String, Rect)> {
+    let mut found: Vec<(String, Rect)> = named(flow, "liver ")
+        .into_iter()
+        .filter_map(|(words, place)| {
+            let (name, _) = words.rsplit_once(": ").filter(|(_, force)| force.ends_with(" N"))?;
+            Some((format!("liver {name}"), place))
+        })
+        .collect();
+    found.sort_by_key(|(_, place)| (place.top() as i32, place.left() as i32));
+    found
+}
+
+#[test]
+fn parameters_are_sorted_and_an_outlier_is_named() {
+    let (mut flow, paths) = ten_sessions();
+    fit_all(&mut flow);
+    flow.click("Parameters");
+    flow.window.run_steps(3);
+    // As the command line has them.
+    let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
+    let report = |path: &PathBuf| recipe.fit(path).unwrap().result.unwrap();
+    let reports: Vec<FitReport> = paths.iter().map(report).collect();
+    let cell = |report: &FitReport| text::cell(report.parameter("mu1").unwrap());
+    let mut wanted: Vec<(f64, String)> =
+        reports.iter().map(|one| (one.parameter("mu1").unwrap().value, cell(one))).collect();
+    wanted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let head = text::parameter_head(reports[0].parameter("mu1").unwrap());
+    let sorted = |flow: &WindowFlow| -> Vec<String> {
+        let rows = flow.window.query_all_by(|node| {
+            node.role() == Role::ListBoxOption && node.label().is_some_and(|it| it.contains(&head))
+        });
+        let mut rows: Vec<(String, Rect)> =
+            rows.map(|row| (row.accesskit_node().label().unwrap(), row.rect())).collect();
+        rows.sort_by(|a, b| a.1.top().total_cmp(&b.1.top()));
+        rows.into_iter().map(|(words, _)| words).collect()
+    };
+    let click = format!("sort by {head}");
+    // By key: the heading has the focus.
+    flow.window.get_by_label(&click).focus();
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(3);
+    let rows = sorted(&flow);
+    assert!(rows.len() > 3, "{rows:?}");
+    for (row, (_, cell)) in rows.iter().zip(&wanted) {
+        assert!(row.contains(cell), "{row}: {cell}");
+    }
+    flow.click(&click);
+    for (row, (_, cell)) in sorted(&flow).iter().zip(wanted.iter().rev()) {
+        assert!(row.contains(cell), "{row}: {cell}");
+    }
+    // The fifth run of the first specimen is far from the other four; its dot says so, and brings it to the front.
+    let outlier = format!("{head} of ");
+    let dots = flow.window.query_all_by_label_contains(&outlier);
+    let dots: Vec<String> = dots.filter_map(|dot| dot.accesskit_node().label()).collect();
+    assert_eq!(dots.len(), 10);
+    let far = format!("{}, ", cell(&reports[4]));
+    let dot = dots.iter().find(|words| words.contains(&far)).expect("an outlier");
+    assert!(dot.contains("robust standard deviations above the median"), "{dot}");
+    let name = dot.strip_prefix(&outlier).unwrap().split(": ").next().unwrap().to_owned();
+    let dot = dot.clone();
+    flow.window.get_by_label(&dot).click();
+    flow.window.run_steps(3);
+    assert!(flow.says(&format!("in front: {name}")));
+    flow.window.check_accessibility();
 }

@@ -13,6 +13,7 @@ use crate::edited_session;
 use crate::progress::Progress;
 use crate::report::dossier::{self, FigureFormat, SessionFigure, SessionReading};
 use crate::report::figures::{TimeAlignment, TimeWindow};
+use palpate_figures::drawing::Drawing;
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
 use palpate_runner::wall_now;
@@ -75,6 +76,8 @@ fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(
 pub enum SessionDocument {
     Page(Vec<SessionReading>),
     Figure(SessionReading, SessionFigure, TimeWindow),
+    /// A figure that is drawn already.
+    Drawing(Box<Drawing>),
 }
 
 /// Writes a page or figure as a new file.
@@ -99,6 +102,7 @@ pub fn write_document(
                 dossier::figure(wanted, *figure, *window).map_err(|err| err.to_string())?;
             ending.bytes(&drawing?)?
         }
+        SessionDocument::Drawing(drawing) => FigureFormat::of(to)?.bytes(drawing)?,
     };
     write_new(to, &bytes)?;
     Ok(ActionReport { sentence: format!("written: {}", to.display()), ..ActionReport::default() })

@@ -2,6 +2,7 @@
 //! from the samples that are needed at the zoom shown.
 
 pub mod course;
+pub mod distribution;
 pub mod figure;
 pub mod margin;
 pub mod navigate;

@@ -145,7 +145,8 @@ impl DepthLines {
         self.job.is_busy()
     }
 
-    fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
+    /// What was found of a line; nothing where it is drawn as pixels.
+    pub fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
         let lines = self.found.as_ref().map_or(&[][..], |found| &found.lines);
         let own = lines.iter().find(|line| line.id == id);
         own.map_or(&[], |line| &line.stretches)

@@ -1,9 +1,9 @@
 //! Small plots beside each other with the same axes; only those at the outer edges have their numbers and names.
 
 use super::navigate::{Gesture, gesture};
-use super::style::still;
+use super::style::{round_marks, still};
 use crate::widgets::tokens_of;
-use eframe::egui::{Id, Rect, Ui, UiBuilder, Vec2, vec2};
+use eframe::egui::{Id, Rangef, Rect, Ui, UiBuilder, Vec2, vec2};
 use egui_plot::{Plot, PlotUi};
 
 /// Least width of a plot in points, and its height for a width.
@@ -89,10 +89,16 @@ pub fn small_plot_ui<'a>(
     if plot.names[0].is_some() {
         whole.max.y += axes.y;
     }
+    let steps = [place.width() / 60.0, place.height() / 26.0];
+    let steps = steps.map(|count| f64::from(count).clamp(2.0, 6.0));
     let drawn = move |ui: &mut Ui| {
         still(ui, Plot::new(plot.id), tokens)
             .x_axis_label(plot.names[0].unwrap_or_default())
             .y_axis_label(plot.names[1].unwrap_or_default())
+            // Quiet, and the same in all of them whether they have their numbers or not.
+            .grid_spacing(Rangef::new(20.0, 90.0))
+            .x_grid_spacer(move |input| round_marks(input, steps[0]))
+            .y_grid_spacer(move |input| round_marks(input, steps[1]))
             .show_axes(plot.names.map(|name| name.is_some()))
             .show(ui, move |plot_ui| {
                 let [x, y] = plot.shown;

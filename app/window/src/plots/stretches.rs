@@ -61,6 +61,11 @@ impl Stretches {
         self.y = (low <= high).then_some([low, high]);
     }
 
+    /// The points of each stretch.
+    pub fn parts(&self) -> impl Iterator<Item = &[PlotPoint]> {
+        self.ranges.iter().map(|range| &self.points[range.clone()])
+    }
+
     /// A line for each stretch, all of one name.
     pub fn lines<'a>(
         &'a self,

@@ -133,15 +133,22 @@ pub(super) fn number_ui(ui: &mut Ui, text: &str, ink: Color32) -> Response {
 
 /// Draws a parameter's symbol as in print; its key is the tooltip and what a screen reader says.
 pub(super) fn symbol_ui(ui: &mut Ui, name: &str) {
+    let label = ui.label(symbol_job(ui, name, "")).on_hover_text(name);
+    label.widget_info(|| WidgetInfo::labeled(Role::Label, true, name));
+}
+
+/// A parameter's symbol as in print, and its unit where one is given.
+pub(super) fn symbol_job(ui: &Ui, name: &str, unit: &str) -> LayoutJob {
     let quiet = tokens_of(ui).text_quiet;
     let (letter, index) = symbol(name);
     let mut job = LayoutJob::default();
-    for text in [RichText::new(letter), RichText::new(index).size(INDEX_SIZE)] {
+    let unit = if unit.is_empty() { String::new() } else { format!(" ({})", typeset(unit)) };
+    let unit = RichText::new(unit).small();
+    for text in [RichText::new(letter), RichText::new(index).size(INDEX_SIZE), unit] {
         let style = FontSelection::Default;
         text.color(quiet).append_to(&mut job, ui.style(), style, Align::BOTTOM);
     }
-    let label = ui.label(job).on_hover_text(name);
-    label.widget_info(|| WidgetInfo::labeled(Role::Label, true, name));
+    job
 }
 
 /// Letter and index of a parameter's key: `tau_eps` is τ with the index ε, `mu1` is μ with the index 1.

@@ -6,7 +6,7 @@ use super::text::tokens_of;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
 use eframe::egui::{
     Align2, Button, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
-    ScrollArea, Sense, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2,
+    ScrollArea, Sense, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, pos2, vec2,
 };
 use std::ops::Range;
 
@@ -121,7 +121,10 @@ impl ChoiceTable<'_> {
     fn heads_ui(&self, ui: &mut Ui, width: f32, acts: &mut Vec<TableAction>) {
         let tokens = tokens_of(ui);
         row_ui(ui, self.columns, width, |ui, index, column| {
-            let text = RichText::new(&column.head).color(tokens.text_quiet).small();
+            let text = match &column.print {
+                Some(print) => WidgetText::from(print.clone()),
+                None => RichText::new(&column.head).color(tokens.text_quiet).small().into(),
+            };
             if !(self.can_sort)(index) {
                 ui.add(Label::new(text).truncate());
                 return;
@@ -259,8 +262,12 @@ impl ChoiceTable<'_> {
 fn cell_ui(ui: &Ui, cell: &TableCell, place: Rect, is_number: bool, is_chosen: bool) {
     let tokens = tokens_of(ui);
     // The ground of a chosen row is darker: only full ink is readable on it.
-    let emphasis = if is_chosen { Emphasis::Plain } else { cell.emphasis };
+    let has_own_ground = matches!(cell.emphasis, Emphasis::Tinted(_));
+    let emphasis = if is_chosen && !has_own_ground { Emphasis::Plain } else { cell.emphasis };
     let ink = emphasis.ink(tokens);
+    if let Emphasis::Tinted(ground) = emphasis {
+        ui.painter().rect_filled(place.expand2(vec2(0.5 * GAP - 1.0, -1.0)), 2.0, ground);
+    }
     let mut left = place.left();
     if let Some(glyph) = cell.glyph {
         let center = pos2(left + GLYPH_WIDTH * 0.4, place.center().y);

@@ -2,6 +2,7 @@
 
 use super::text::tokens_of;
 use crate::theme::Tokens;
+use eframe::egui::text::LayoutJob;
 use eframe::egui::{
     Align, Color32, Label, Layout, Rect, RichText, ScrollArea, Sense, Ui, UiBuilder, Vec2, pos2,
     vec2,
@@ -22,17 +23,19 @@ pub struct Column {
     pub width: f32,
     /// Numbers stand on the right.
     pub is_number: bool,
+    /// The heading as in print, where that is more than its text.
+    pub print: Option<LayoutJob>,
 }
 
 impl Column {
     #[must_use]
     pub fn words(head: &str, width: f32) -> Self {
-        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: false }
+        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: false, print: None }
     }
 
     #[must_use]
     pub fn numbers(head: &str, width: f32) -> Self {
-        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: true }
+        Self { head: head.to_owned(), width: width * TEXT_SCALE, is_number: true, print: None }
     }
 }
 
@@ -47,12 +50,14 @@ pub enum Emphasis {
     Quiet,
     /// Wrong.
     Alarm,
+    /// On a ground of this colour.
+    Tinted(Color32),
 }
 
 impl Emphasis {
     pub(super) fn ink(self, tokens: &Tokens) -> Color32 {
         match self {
-            Self::Plain | Self::Marked => tokens.text,
+            Self::Plain | Self::Marked | Self::Tinted(_) => tokens.text,
             Self::Quiet => tokens.text_quiet,
             Self::Alarm => tokens.alarm_text,
         }

@@ -151,7 +151,7 @@ impl SessionList {
     pub fn ui(&mut self, ui: &mut Ui, sorted: (CatalogOrder, bool)) -> Vec<ListRequest> {
         let columns = COLUMNS.map(|(head, width, is_number, _)| {
             let head = head.to_owned();
-            Column { head, width, is_number }
+            Column { head, width, is_number, print: None }
         });
         let by = COLUMNS.iter().position(|column| column.3 == Some(sorted.0));
         let at = self.at.as_ref();

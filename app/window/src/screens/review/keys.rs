@@ -49,12 +49,16 @@ impl ReviewScreen {
         }
     }
 
-    pub(super) fn read_keys(&mut self, ctx: &Context) {
+    /// Reads them; those that move a view only where there is one.
+    pub(super) fn read_keys(&mut self, ctx: &Context, has_moves: bool) {
         if ctx.egui_wants_keyboard_input() {
             return;
         }
         if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
             self.undo();
+        }
+        if !has_moves {
+            return;
         }
         // The modifiers are the event's own: those of the frame may have been let go already.
         let pressed: Vec<(Key, Modifiers)> = ctx.input(|input| {

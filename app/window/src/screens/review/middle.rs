@@ -20,7 +20,8 @@ const FULL_LINES: usize = 6;
 
 impl ReviewScreen {
     pub fn draw_middle(&mut self, ui: &mut Ui) {
-        self.read_keys(ui.ctx());
+        // In the view of parameters, keys choose in the table.
+        self.read_keys(ui.ctx(), self.view != View::Parameters);
         self.head_ui(ui);
         if self.subjects.is_empty() {
             quiet_ui(ui, "no session is shown; choose some in the library");
@@ -45,6 +46,8 @@ impl ReviewScreen {
     /// Views, and on the right what the pointer and the keys can do in them.
     fn head_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            ui.spacing_mut().button_padding.x = 6.0;
             for view in View::ALL {
                 ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
             }
@@ -52,7 +55,6 @@ impl ReviewScreen {
                 return;
             }
             ui.separator();
-            ui.spacing_mut().item_spacing.x = 2.0;
             for (text, name, key, to) in [
                 ("+", "Zoom in", "+", ViewMove::ZoomIn),
                 ("-", "Zoom out", "-", ViewMove::ZoomOut),
@@ -68,7 +70,7 @@ impl ReviewScreen {
                 if is_cursor && self.view == View::Cycles {
                     continue;
                 }
-                let button = ui.add(Button::new(text).min_size(vec2(28.0, 0.0)));
+                let button = ui.add(Button::new(text).min_size(vec2(26.0, 0.0)));
                 let button = button.accessible_name(name).named(name);
                 if button.on_hover_text(format!("{name}: {key}")).clicked() {
                     self.go(to);

@@ -2,6 +2,7 @@
 
 pub mod analyses;
 mod cycles;
+mod deviation;
 mod groups;
 mod keys;
 mod left;
@@ -80,6 +81,7 @@ pub struct ReviewScreen {
     view: View,
     grouping: groups::Grouping,
     side: side_by_side::SideBySide,
+    parameter_table: parameters::ParameterTable,
     time_origin: TimeOrigin,
     quantities: Vec<Quantity>,
     has_residuals: bool,

@@ -1,57 +1,344 @@
-//! The parameters of every session's fit in one table, with their intervals.
+//! The parameters of every session's fit: how each is distributed, and a table that sorts by any of them.
 
 use super::ReviewScreen;
-use super::middle::head_ui;
+use super::deviation::{OUTLIER, deviations, median};
+use super::groups::{Grouping, SessionGroup, groups};
+use super::session_list::color_of;
 use super::subject::ReviewSubject;
-use crate::widgets::{Column, TableRow, alarm_ui, quiet_ui, table_ui};
-use eframe::egui::Ui;
+use crate::plots::distribution::{DistributionDot, DistributionLane, distribution_ui, height};
+use crate::screens::parameters::symbol_job;
+use crate::theme::Tokens;
+use crate::widgets::{
+    ChoiceTable, Column, Emphasis, Glyph, ScrollPosition, TableAction, TableCell, TableLine,
+    alarm_ui, quiet_ui, tokens_of,
+};
+use eframe::egui::{
+    Align2, Id, Label, Rect, ScrollArea, Sense, TextStyle, Ui, UiBuilder, pos2, vec2,
+};
 use palpate_analysis::report::text;
+use palpate_figures::uncertain::with_interval;
+use palpate_model::estimate::FittedParameter;
+use std::cmp::Ordering;
+use std::collections::HashMap;
 
-/// The sessions, those of one specimen together, in the order in which they stand.
-fn by_specimen(subjects: &[ReviewSubject]) -> Vec<(&ReviewSubject, String)> {
-    let specimen = |subject: &ReviewSubject| {
-        let head = subject.recording.head.as_ref();
-        head.map_or(String::new(), |head| head.manifest.specimen.trim().to_owned())
-    };
-    let mut all: Vec<(&ReviewSubject, String)> =
-        subjects.iter().map(|one| (one, specimen(one))).collect();
-    all.sort_by(|a, b| a.1.cmp(&b.1));
-    all
+/// A tint is full at so many robust standard deviations.
+const FULL: f64 = 5.0;
+/// Least width of the strip of a parameter, and width of the names of groups, in points.
+const STRIP_MIN: f32 = 138.0;
+const LANE_NAME: f32 = 76.0;
+const STRIP_HEAD: f32 = 22.0;
+
+/// The column by which the table is sorted, and how far it is scrolled.
+#[derive(Default)]
+pub(super) struct ParameterTable {
+    /// None: by group, then in the order in which sessions were added.
+    sorted: Option<(usize, bool)>,
+    scrolled: ScrollPosition,
+}
+
+/// A parameter of a session.
+struct Value {
+    parameter: FittedParameter,
+    /// From the median of its group in robust standard deviations.
+    deviation: Option<f64>,
+}
+
+impl Value {
+    /// The total interval, or the statistical one.
+    fn ends(&self) -> Option<[f64; 2]> {
+        self.parameter.total95.or(self.parameter.ci95)
+    }
+
+    fn short_text(&self) -> String {
+        match (self.parameter.std_error, self.ends()) {
+            (Some(error), Some(ends)) => with_interval(self.parameter.value, error, ends),
+            _ => text::ParameterText::of(&self.parameter).value,
+        }
+    }
+
+    /// How far it is, in words; empty where it is near.
+    fn deviation_words(&self) -> String {
+        match self.deviation {
+            Some(far) if far.abs() >= OUTLIER => {
+                let side = if far > 0.0 { "above" } else { "below" };
+                format!(", {:.1} robust standard deviations {side} the median", far.abs())
+            }
+            _ => String::new(),
+        }
+    }
+
+    fn is_outlier(&self) -> bool {
+        self.deviation.is_some_and(|far| far.abs() >= OUTLIER)
+    }
+
+    fn cell(&self, tokens: &Tokens) -> TableCell {
+        let Some(far) = self.deviation else { return TableCell::text(self.short_text()) };
+        let emphasis = Emphasis::Tinted(tokens.deviation((far / FULL) as f32));
+        let mark = if far > 0.0 { Glyph::Up } else { Glyph::Down };
+        let glyph = self.is_outlier().then_some(mark);
+        TableCell { glyph, text: self.short_text(), emphasis }
+    }
+}
+
+/// A session of the table.
+struct Row {
+    /// Among the sessions shown.
+    index: usize,
+    group: String,
+    /// What of its name the others of the group do not have.
+    short: String,
+    values: Vec<Option<Value>>,
+    rmse_mn: f64,
+}
+
+/// The sessions that are fitted, group by group, and the parameters of the first.
+struct Parameters {
+    names: Vec<FittedParameter>,
+    rows: Vec<Row>,
+}
+
+impl Parameters {
+    fn of(subjects: &[ReviewSubject], groups: &[SessionGroup]) -> Option<Self> {
+        let order = groups.iter().flat_map(|group| &group.members);
+        let first = order.clone().find_map(|index| subjects[*index].fitted())?;
+        let names = first.report.parameters.clone();
+        let mut rows = Vec::new();
+        for group in groups {
+            let short = group.members.iter().copied().zip(group.short_names(subjects));
+            let short: HashMap<usize, String> = short.collect();
+            let own = group.members.iter();
+            let fitted = own.filter_map(|index| Some((*index, &subjects[*index].fitted()?.report)));
+            let fitted: Vec<_> = fitted.collect();
+            let mut columns: Vec<Vec<Option<Value>>> = Vec::new();
+            for name in &names {
+                let found: Vec<Option<&FittedParameter>> =
+                    fitted.iter().map(|(_, report)| report.parameter(&name.name)).collect();
+                // What was kept at a value is not a finding.
+                let known = |one: &&FittedParameter| !one.is_fixed && one.value.is_finite();
+                let values: Vec<f64> =
+                    found.iter().flatten().copied().filter(known).map(|one| one.value).collect();
+                let mut far = deviations(&values).unwrap_or_default().into_iter();
+                let value = |one: Option<&FittedParameter>| {
+                    let one = one?;
+                    let deviation = if known(&one) { far.next() } else { None };
+                    Some(Value { parameter: one.clone(), deviation })
+                };
+                columns.push(found.into_iter().map(value).collect());
+            }
+            let mut columns: Vec<_> = columns.into_iter().map(Vec::into_iter).collect();
+            for (index, report) in fitted {
+                rows.push(Row {
+                    index,
+                    group: group.name.clone(),
+                    short: short[&index].clone(),
+                    values: columns.iter_mut().map(|column| column.next().flatten()).collect(),
+                    rmse_mn: report.rmse_n * 1e3,
+                });
+            }
+        }
+        Some(Self { names, rows })
+    }
+
+    /// The rows sorted by a column; those without a value there come last either way.
+    fn sort(&mut self, subjects: &[ReviewSubject], by: Option<(usize, bool)>) {
+        let Some((column, is_reversed)) = by else { return };
+        let order = |order: Ordering| if is_reversed { order.reverse() } else { order };
+        let last = self.names.len() + 2;
+        self.rows.sort_by(|a, b| match column {
+            0 => order(a.group.cmp(&b.group)),
+            1 => order(subjects[a.index].name.cmp(&subjects[b.index].name)),
+            column if column == last => order(a.rmse_mn.total_cmp(&b.rmse_mn)),
+            column => {
+                let value = |row: &Row| Some(row.values[column - 2].as_ref()?.parameter.value);
+                match (value(a), value(b)) {
+                    (Some(a), Some(b)) => order(a.total_cmp(&b)),
+                    (a, b) => b.is_some().cmp(&a.is_some()),
+                }
+            }
+        });
+    }
 }
 
 impl ReviewScreen {
-    pub(super) fn parameters_ui(&self, ui: &mut Ui) {
-        let words = "value with its statistical and its total 95 % interval from each session's fit; sessions of one specimen are grouped";
-        head_ui(ui, "Parameters", words);
-        let sorted = by_specimen(&self.subjects);
-        let first = sorted.iter().find_map(|(subject, _)| subject.fitted());
-        let Some(first) = first else {
-            quiet_ui(
-                ui,
-                "none of the sessions shown is fitted yet; press 'Fit the sessions shown'",
-            );
-            refusals_ui(ui, &self.subjects);
-            return;
+    pub(super) fn parameters_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| self.grouping_ui(ui));
+        let groups = groups(&self.subjects, self.grouping);
+        refusals_ui(ui, &self.subjects);
+        let Some(mut found) = Parameters::of(&self.subjects, &groups) else {
+            let words = "none of the sessions shown is fitted yet; press 'Fit the sessions shown'";
+            return quiet_ui(ui, words);
         };
-        let mut columns = vec![Column::words("specimen", 90.0), Column::words("session", 270.0)];
-        for parameter in &first.report.parameters {
-            columns.push(Column::numbers(&text::parameter_head(parameter), 310.0));
+        // The table has at least half of the height.
+        let strips = ScrollArea::vertical().id_salt("strips").auto_shrink([false, true]);
+        let strips = strips.max_height(0.5 * ui.available_height());
+        let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, &groups, &found)).inner;
+        quiet_ui(
+            ui,
+            "Values with their total 95 % interval. Blue is below and orange above the median of the group, full at 5 robust standard deviations (1.4826 times the median absolute deviation); beyond 3.5 a triangle and a ring mark an outlier. Groups of fewer than four have no tint.",
+        );
+        found.sort(&self.subjects, self.parameter_table.sorted);
+        chosen = chosen.or(self.parameter_table_ui(ui, &found));
+        if let Some(index) = chosen {
+            self.bring_to_front(index);
+        }
+    }
+
+    /// Draws a strip for each parameter; returns the session whose dot was clicked.
+    fn strips_ui(&self, ui: &mut Ui, groups: &[SessionGroup], found: &Parameters) -> Option<usize> {
+        let tokens = tokens_of(ui);
+        let has_names = self.grouping != Grouping::None;
+        let left = if has_names { LANE_NAME } else { 0.0 };
+        let lanes: Vec<Vec<&Row>> = groups
+            .iter()
+            .map(|group| {
+                found.rows.iter().filter(|row| group.members.contains(&row.index)).collect()
+            })
+            .filter(|rows: &Vec<&Row>| !rows.is_empty())
+            .collect();
+        // What no fit has found is not distributed.
+        let is_found = |number: &usize| {
+            let mut values = found.rows.iter().filter_map(|row| row.values[*number].as_ref());
+            values.any(|value| !value.parameter.is_fixed)
+        };
+        let shown: Vec<usize> = (0..found.names.len()).filter(is_found).collect();
+        let high = height(lanes.iter().map(Vec::len)) + STRIP_HEAD;
+        let width = ui.available_width();
+        let columns = (((width - left) / STRIP_MIN) as usize).clamp(1, shown.len().max(1));
+        // Rows of equal length.
+        let count = shown.len().div_ceil(columns).max(1);
+        let columns = shown.len().div_ceil(count).max(1);
+        let own = (width - left) / columns as f32;
+        let (whole, _) = ui.allocate_exact_size(vec2(width, high * count as f32), Sense::hover());
+        let mut chosen = None;
+        for (place, number) in shown.into_iter().enumerate() {
+            let name = &found.names[number];
+            let (row, column) = (place / columns, place % columns);
+            let corner = vec2(left + own * column as f32, high * row as f32);
+            let place = Rect::from_min_size(whole.min + corner, vec2(own - 6.0, high));
+            if column == 0 && has_names {
+                self.lane_names_ui(ui, pos2(whole.left(), place.top() + STRIP_HEAD), &lanes);
+            }
+            let head = Rect::from_min_size(place.min, vec2(place.width(), STRIP_HEAD));
+            let mut line = ui.new_child(UiBuilder::new().max_rect(head));
+            let symbol = symbol_job(ui, &name.name, &name.unit);
+            line.horizontal(|ui| {
+                ui.add_space(8.0);
+                ui.add(Label::new(symbol).truncate());
+            });
+            let values: Vec<DistributionLane> = lanes
+                .iter()
+                .map(|rows| {
+                    let known = rows.iter().filter_map(|row| row.values[number].as_ref());
+                    let known: Vec<f64> = known.map(|one| one.parameter.value).collect();
+                    let median = median(&known).filter(|_| known.len() > 2);
+                    let dots = rows.iter().map(|row| self.dot(row, number, tokens)).collect();
+                    DistributionLane { dots, median }
+                })
+                .collect();
+            let strip = Rect::from_min_max(pos2(place.left(), head.bottom()), place.max);
+            let id = Id::unique(("distribution", name.name.as_str()));
+            if let Some([lane, dot]) = distribution_ui(ui, id, strip, &values) {
+                chosen = Some(lanes[lane][dot].index);
+            }
+        }
+        chosen
+    }
+
+    fn lane_names_ui(&self, ui: &mut Ui, corner: eframe::egui::Pos2, lanes: &[Vec<&Row>]) {
+        let tokens = tokens_of(ui);
+        let font = TextStyle::Small.resolve(ui.style());
+        let mut top = corner.y;
+        for rows in lanes {
+            let high = height(std::iter::once(rows.len())) - height(std::iter::empty());
+            let place = Rect::from_min_size(pos2(corner.x, top), vec2(LANE_NAME - 6.0, high));
+            let name = rows.first().map_or("", |row| row.group.as_str());
+            let painter = ui.painter().with_clip_rect(place.intersect(ui.clip_rect()));
+            let at = place.left_center();
+            painter.text(at, Align2::LEFT_CENTER, name, font.clone(), tokens.text_quiet);
+            top += high;
+        }
+    }
+
+    /// A dot without a place where the session has no such parameter.
+    fn dot(&self, row: &Row, number: usize, tokens: &Tokens) -> DistributionDot {
+        let subject = &self.subjects[row.index];
+        let value = row.values[number].as_ref();
+        let words = value.map_or_else(String::new, |value| {
+            let cell = text::cell(&value.parameter);
+            let head = text::parameter_head(&value.parameter);
+            format!("{head} of {}: {cell}{}", subject.name, value.deviation_words())
+        });
+        DistributionDot {
+            value: value.map_or(f64::NAN, |one| one.parameter.value),
+            ends: value.and_then(Value::ends),
+            color: color_of(tokens, subject.id),
+            is_front: row.index == 0,
+            is_outlier: value.is_some_and(Value::is_outlier),
+            words,
+        }
+    }
+
+    /// Draws the table; returns the session that was chosen in it.
+    fn parameter_table_ui(&mut self, ui: &mut Ui, found: &Parameters) -> Option<usize> {
+        let tokens = tokens_of(ui);
+        let group = match self.grouping {
+            Grouping::None => "group",
+            by => by.name(),
+        };
+        let mut columns = vec![Column::words(group, 84.0), Column::words("session", 130.0)];
+        for parameter in &found.names {
+            let print = Some(symbol_job(ui, &parameter.name, &parameter.unit));
+            let head = text::parameter_head(parameter);
+            columns.push(Column { print, ..Column::numbers(&head, 196.0) });
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
-        let rows: Vec<TableRow> = sorted
-            .iter()
-            .filter_map(|(subject, specimen)| {
-                let report = &subject.fitted()?.report;
-                let mut cells = vec![specimen.clone(), subject.name.clone()];
-                let names = first.report.parameters.iter().map(|one| &one.name);
-                let found = names.map(|name| report.parameter(name));
-                cells.extend(found.map(|one| one.map_or(String::new(), text::cell)));
-                cells.push(format!("{:.3}", report.rmse_n * 1e3));
-                Some(TableRow { cells, ..TableRow::default() })
-            })
-            .collect();
-        refusals_ui(ui, &self.subjects);
-        table_ui(ui, "review_parameters", &columns, &rows);
+        let line = |number: usize| {
+            let row = &found.rows[number];
+            let name = &self.subjects[row.index].name;
+            let mut words = name.clone();
+            let mut cells = vec![TableCell::text(&row.group), TableCell::text(&row.short)];
+            for value in &row.values {
+                let Some(value) = value else {
+                    cells.push(TableCell::default());
+                    continue;
+                };
+                let head = text::parameter_head(&value.parameter);
+                words += &format!(
+                    "; {head} {}{}",
+                    text::cell(&value.parameter),
+                    value.deviation_words()
+                );
+                cells.push(value.cell(tokens));
+            }
+            cells.push(TableCell::text(format!("{:.3}", row.rmse_mn)));
+            TableLine { name: words, cells }
+        };
+        let front = found.rows.iter().position(|row| row.index == 0);
+        let table = ChoiceTable {
+            name: "parameters of the sessions shown",
+            columns: &columns,
+            can_sort: &|_| true,
+            sorted: self.parameter_table.sorted,
+            count: found.rows.len(),
+            at: front,
+            line: &line,
+            is_chosen: &|number| Some(number) == front,
+        };
+        let (acts, _) = table.ui(ui, &mut self.parameter_table.scrolled);
+        let mut chosen = None;
+        for act in acts {
+            match act {
+                TableAction::Choose(number, _) => chosen = Some(found.rows[number].index),
+                TableAction::Sort(column) => {
+                    let sorted = &mut self.parameter_table.sorted;
+                    let is_same =
+                        sorted.is_some_and(|(by, is_reversed)| by == column && !is_reversed);
+                    *sorted = Some((column, is_same));
+                }
+                TableAction::ChooseAll | TableAction::Open => {}
+            }
+        }
+        chosen
     }
 }
 

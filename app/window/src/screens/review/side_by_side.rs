@@ -39,6 +39,12 @@ impl SideBySide {
     pub fn is_busy(&self) -> bool {
         self.depth_lines.values().any(DepthLines::is_busy)
     }
+
+    /// What was found of the line of a session over depth.
+    pub fn stretches(&self, id: u64) -> Vec<&[PlotPoint]> {
+        let found = self.depth_lines.get(&id).map_or(&[][..], |lines| lines.stretches(id));
+        found.iter().map(Vec::as_slice).collect()
+    }
 }
 
 /// A plot that was drawn, with what stands above it.
@@ -106,7 +112,7 @@ fn fitted_ink(tokens: &Tokens, own: Color32) -> Color32 {
 }
 
 /// The fit of a session over depth.
-fn fitted_over_depth(subject: &ReviewSubject) -> Vec<PlotPoint> {
+pub(super) fn fitted_over_depth(subject: &ReviewSubject) -> Vec<PlotPoint> {
     let Some(fit) = subject.fitted() else { return Vec::new() };
     let count = fit.track.len();
     let track = &subject.recording.track;
@@ -367,7 +373,7 @@ fn heading_ui(ui: &mut Ui, at: Pos2, width: f32, group: &SessionGroup) {
     let mut line = ui.new_child(UiBuilder::new().max_rect(place));
     line.horizontal_centered(|ui| {
         let name = if group.name.is_empty() { "not known yet" } else { &group.name };
-        ui.strong(name);
+        crate::widgets::heading_ui(ui, name);
         let count = group.members.len();
         quiet_ui(ui, if count == 1 { "1 session".to_owned() } else { format!("{count} sessions") });
         let left = ui.cursor().left() + 6.0;

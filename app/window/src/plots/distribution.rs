@@ -1,0 +1,178 @@
+//! Values of one parameter as dots with their intervals, a lane for each group and in it a line for each value, so that
+//! no dot covers another.
+
+use crate::widgets::tokens_of;
+use eframe::egui::{
+    Align2, Color32, Id, Rect, Role, Sense, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
+};
+use palpate_figures::drawing::round_up;
+
+/// Heights of a value's line and of what a lane has around its values, in points.
+const LINE: f32 = 9.0;
+const LANE_ROOM: f32 = 9.0;
+/// Height of the numbers below.
+const NUMBERS: f32 = 20.0;
+/// Least distance of two numbers, and room around the dots at the edges.
+const NUMBER: f32 = 46.0;
+const EDGE: f32 = 8.0;
+const RADIUS: f32 = 3.5;
+/// Part of the width of all values that an interval may add on either side; wider ones are cut.
+const INTERVAL_SHARE: f64 = 0.35;
+
+/// A value.
+pub struct DistributionDot {
+    pub value: f64,
+    /// Its interval, if it has one.
+    pub ends: Option<[f64; 2]>,
+    pub color: Color32,
+    pub is_front: bool,
+    /// Beyond what the others of its lane suggest.
+    pub is_outlier: bool,
+    /// Read aloud and shown under the pointer.
+    pub words: String,
+}
+
+/// The values of a group and their median.
+#[derive(Default)]
+pub struct DistributionLane {
+    pub dots: Vec<DistributionDot>,
+    pub median: Option<f64>,
+}
+
+fn lane_height(count: usize) -> f32 {
+    count.max(1) as f32 * LINE + LANE_ROOM
+}
+
+/// Height of lanes of so many values with the numbers below.
+#[must_use]
+pub fn height(counts: impl Iterator<Item = usize>) -> f32 {
+    counts.map(lane_height).sum::<f32>() + NUMBERS
+}
+
+/// Lower and upper end of all values, with their intervals where these are not much wider.
+fn span(lanes: &[DistributionLane]) -> Option<[f64; 2]> {
+    let dots = || lanes.iter().flat_map(|lane| &lane.dots);
+    let ends = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], one| {
+            [low.min(one), high.max(one)]
+        })
+    };
+    let [low, high] = ends(&mut dots().map(|dot| dot.value));
+    if !(low.is_finite() && high.is_finite()) {
+        return None;
+    }
+    let wide = ends(&mut dots().filter_map(|dot| dot.ends).flatten().filter(|end| end.is_finite()));
+    let width = (high - low).max(1e-3 * low.abs().max(high.abs())).max(1e-12);
+    let room = INTERVAL_SHARE * width;
+    Some([
+        wide[0].clamp(low - room, low - 0.04 * width),
+        wide[1].clamp(high + 0.04 * width, high + room),
+    ])
+}
+
+/// Draws the lanes of a parameter into a place; returns the lane and the number of a dot that was clicked.
+pub fn distribution_ui(
+    ui: &mut Ui,
+    id: Id,
+    place: Rect,
+    lanes: &[DistributionLane],
+) -> Option<[usize; 2]> {
+    let tokens = tokens_of(ui);
+    let [low, high] = span(lanes)?;
+    let inner = place.shrink2(vec2(EDGE, 0.0));
+    let across = |value: f64| {
+        let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
+        inner.left() + share as f32 * inner.width()
+    };
+    let ground = Rect::from_min_max(place.min, pos2(place.right(), place.bottom() - NUMBERS));
+    ui.painter().rect_filled(ground, 2.0, tokens.panel);
+    numbers_ui(ui, [low, high], ground, &across);
+    let (mut top, mut clicked) = (ground.top(), None);
+    for (number, lane) in lanes.iter().enumerate() {
+        let below = top + lane_height(lane.dots.len());
+        if number > 0 {
+            ui.painter().hline(ground.x_range(), top, Stroke::new(1.0, tokens.line));
+        }
+        if let Some(median) = lane.median {
+            let stroke = Stroke::new(1.5, tokens.text_quiet);
+            ui.painter().vline(across(median), top + 2.0..=below - 2.0, stroke);
+        }
+        for (index, dot) in lane.dots.iter().enumerate() {
+            if !dot.value.is_finite() {
+                continue;
+            }
+            let y = top + 0.5 * LANE_ROOM + (index as f32 + 0.5) * LINE;
+            let at = pos2(across(dot.value), y);
+            let own = Rect::from_center_size(at, vec2(3.0 * RADIUS, LINE));
+            let response = ui.interact(own, id.with((number, index)), Sense::CLICK);
+            response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &dot.words));
+            if let Some([from, to]) = dot.ends {
+                let stroke = Stroke::new(if dot.is_front { 2.5 } else { 1.5 }, dot.color);
+                ui.painter().hline(across(from)..=across(to), y, stroke);
+            }
+            let radius = if response.hovered() { RADIUS + 1.5 } else { RADIUS };
+            ui.painter().circle_filled(at, radius, dot.color);
+            if dot.is_outlier || dot.is_front {
+                let ink = if dot.is_outlier { tokens.alarm_text } else { tokens.text };
+                ui.painter().circle_stroke(at, radius + 1.5, Stroke::new(1.5, ink));
+            }
+            if response.on_hover_text(&dot.words).clicked() {
+                clicked = Some([number, index]);
+            }
+        }
+        top = below;
+    }
+    clicked
+}
+
+/// Draws round numbers along the lower edge and lines up from them.
+fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64) -> f32) {
+    let tokens = tokens_of(ui);
+    let font = TextStyle::Small.resolve(ui.style());
+    let count = f64::from((ground.width() / NUMBER).clamp(1.0, 5.0));
+    let step = round_up((high - low) / count);
+    let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    let mut free = ground.left();
+    for mark in first..=last {
+        let value = mark as f64 * step;
+        let x = across(value);
+        ui.painter().vline(x, ground.y_range(), Stroke::new(1.0, tokens.line));
+        let text = match decimals {
+            0..=4 => format!("{value:.decimals$}"),
+            _ => format!("{value:.0e}"),
+        };
+        let at = pos2(x, ground.bottom() + 2.0);
+        let galley = ui.painter().layout_no_wrap(text, font.clone(), tokens.text_quiet);
+        let own = Align2::CENTER_TOP.anchor_size(at, galley.size());
+        // A number that would touch its neighbour or leave the strip is left to its line.
+        if own.left() >= free && own.right() <= ground.right() {
+            ui.painter().galley(own.min, galley, tokens.text_quiet);
+            free = own.right() + 4.0;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::theme::Tokens;
+
+    fn dot(value: f64, ends: Option<[f64; 2]>) -> DistributionDot {
+        let color = Tokens::of(false).series;
+        let words = String::new();
+        DistributionDot { value, ends, color, is_front: false, is_outlier: false, words }
+    }
+
+    #[test]
+    fn intervals_are_in_the_picture_unless_they_would_flatten_the_values() {
+        let lane = |dots| DistributionLane { dots, median: None };
+        let near = lane(vec![dot(1.0, Some([0.9, 1.1])), dot(2.0, Some([1.9, 2.2]))]);
+        assert_eq!(span(&[near]), Some([0.9, 2.2]));
+        let wide = lane(vec![dot(1.0, Some([-1e9, 1e9])), dot(2.0, None)]);
+        assert_eq!(span(&[wide]), Some([1.0 - INTERVAL_SHARE, 2.0 + INTERVAL_SHARE]));
+        assert_eq!(span(&[lane(vec![dot(f64::NAN, None)])]), None);
+        let [low, high] = span(&[lane(vec![dot(5.0, None)])]).unwrap();
+        assert!(low < 5.0 && high > 5.0);
+    }
+}
