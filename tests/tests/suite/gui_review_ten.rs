@@ -175,6 +175,27 @@ fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
     assert!(flow.says(&format!("in front: {}", third.0)));
     // The plots stay where they are.
     assert_eq!(heads(&flow)[2].0, third.0);
+    // The view as a picture on the clipboard, drawn for paper.
+    flow.click("Copy figure");
+    let mut copied = None;
+    for _ in 0..2000 {
+        flow.window.step();
+        let commands = &flow.window.output().platform_output.commands;
+        copied = commands.iter().find_map(|command| match command {
+            OutputCommand::CopyImage(image) => Some(image.clone()),
+            _ => None,
+        });
+        if copied.is_some() {
+            break;
+        }
+        std::thread::sleep(FRAME);
+    }
+    let image = copied.expect("a picture");
+    assert_eq!(image.size[0], 1920);
+    // Every ink of a session is in it.
+    for ink in Tokens::of(false).sessions {
+        assert!(image.pixels.iter().filter(|pixel| **pixel == ink).count() > 20, "{ink:?}");
+    }
     // Over depth, by protocol and in one group.
     flow.click("Force over depth");
     flow.click("group by protocol");

@@ -29,7 +29,10 @@ impl ReviewScreen {
         }
         match self.view {
             View::OverTime | View::OverDepth => {
-                self.remarks_ui(ui);
+                ui.horizontal_wrapped(|ui| {
+                    self.figure_ui(ui);
+                    self.remarks_ui(ui);
+                });
                 self.readout_ui(ui);
                 match self.view {
                     View::OverTime => self.over_time_ui(ui),

@@ -3,6 +3,7 @@
 pub mod analyses;
 mod cycles;
 mod deviation;
+mod figure;
 mod groups;
 mod keys;
 mod left;
@@ -82,6 +83,7 @@ pub struct ReviewScreen {
     grouping: groups::Grouping,
     side: side_by_side::SideBySide,
     parameter_table: parameters::ParameterTable,
+    figure: figure::FigureExport,
     time_origin: TimeOrigin,
     quantities: Vec<Quantity>,
     has_residuals: bool,
@@ -157,6 +159,7 @@ impl ReviewScreen {
     /// Fetches what threads have answered.
     pub fn fetch(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
+        self.figure.poll(ctx);
         if let Some(changed) = self.analyses.take_changed() {
             let is_it = |one: &&mut ReviewSubject| one.source.session == changed;
             if let Some(subject) = self.subjects.iter_mut().find(is_it) {
