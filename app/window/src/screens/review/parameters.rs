@@ -13,19 +13,23 @@ use crate::widgets::{
     alarm_ui, quiet_ui, tokens_of,
 };
 use eframe::egui::{
-    Align2, Id, Label, Rect, ScrollArea, Sense, TextStyle, Ui, UiBuilder, pos2, vec2,
+    Align2, Galley, Id, Label, Pos2, Rect, RichText, ScrollArea, Sense, TextStyle, Ui, UiBuilder,
+    pos2, vec2,
 };
 use palpate_analysis::report::text;
 use palpate_figures::uncertain::with_interval;
 use palpate_model::estimate::FittedParameter;
 use std::cmp::Ordering;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A tint is full at so many robust standard deviations.
 const FULL: f64 = 5.0;
-/// Least width of the strip of a parameter, and width of the names of groups, in points.
-const STRIP_MIN: f32 = 138.0;
-const LANE_NAME: f32 = 76.0;
+/// What tint, triangle and ring mean.
+const MEANING: &str = "Values stand with their total 95 % interval. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: a tint is full at 5, and beyond 3.5 a triangle in the cell and a ring around the dot mark an outlier. Groups of fewer than four sessions have no tint.";
+/// Least width of the strip of a parameter, and most of the names of groups, in points.
+const STRIP_MIN: f32 = 130.0;
+const LANE_NAME_MAX: f32 = 120.0;
 const STRIP_HEAD: f32 = 22.0;
 
 /// The column by which the table is sorted, and how far it is scrolled.
@@ -172,10 +176,9 @@ impl ReviewScreen {
         let strips = ScrollArea::vertical().id_salt("strips").auto_shrink([false, true]);
         let strips = strips.max_height(0.5 * ui.available_height());
         let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, &groups, &found)).inner;
-        quiet_ui(
-            ui,
-            "Values with their total 95 % interval. Blue is below and orange above the median of the group, full at 5 robust standard deviations (1.4826 times the median absolute deviation); beyond 3.5 a triangle and a ring mark an outlier. Groups of fewer than four have no tint.",
-        );
+        let words = "blue is below and orange above the median of its group; a triangle or ring is an outlier";
+        let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
+        ui.add(Label::new(words).truncate()).on_hover_text(MEANING);
         found.sort(&self.subjects, self.parameter_table.sorted);
         chosen = chosen.or(self.parameter_table_ui(ui, &found));
         if let Some(index) = chosen {
@@ -187,7 +190,9 @@ impl ReviewScreen {
     fn strips_ui(&self, ui: &mut Ui, groups: &[SessionGroup], found: &Parameters) -> Option<usize> {
         let tokens = tokens_of(ui);
         let has_names = self.grouping != Grouping::None;
-        let left = if has_names { LANE_NAME } else { 0.0 };
+        let names = groups.iter().map(|group| group.name.clone());
+        let names = names.map(|name| name_galley(ui, name).size().x + 10.0);
+        let left = if has_names { names.fold(0.0, f32::max).min(LANE_NAME_MAX) } else { 0.0 };
         let lanes: Vec<Vec<&Row>> = groups
             .iter()
             .map(|group| {
@@ -216,7 +221,8 @@ impl ReviewScreen {
             let corner = vec2(left + own * column as f32, high * row as f32);
             let place = Rect::from_min_size(whole.min + corner, vec2(own - 6.0, high));
             if column == 0 && has_names {
-                self.lane_names_ui(ui, pos2(whole.left(), place.top() + STRIP_HEAD), &lanes);
+                let names = pos2(whole.left(), place.top() + STRIP_HEAD);
+                lane_names_ui(ui, names, left, &lanes);
             }
             let head = Rect::from_min_size(place.min, vec2(place.width(), STRIP_HEAD));
             let mut line = ui.new_child(UiBuilder::new().max_rect(head));
@@ -242,21 +248,6 @@ impl ReviewScreen {
             }
         }
         chosen
-    }
-
-    fn lane_names_ui(&self, ui: &mut Ui, corner: eframe::egui::Pos2, lanes: &[Vec<&Row>]) {
-        let tokens = tokens_of(ui);
-        let font = TextStyle::Small.resolve(ui.style());
-        let mut top = corner.y;
-        for rows in lanes {
-            let high = height(std::iter::once(rows.len())) - height(std::iter::empty());
-            let place = Rect::from_min_size(pos2(corner.x, top), vec2(LANE_NAME - 6.0, high));
-            let name = rows.first().map_or("", |row| row.group.as_str());
-            let painter = ui.painter().with_clip_rect(place.intersect(ui.clip_rect()));
-            let at = place.left_center();
-            painter.text(at, Align2::LEFT_CENTER, name, font.clone(), tokens.text_quiet);
-            top += high;
-        }
     }
 
     /// A dot without a place where the session has no such parameter.
@@ -339,6 +330,26 @@ impl ReviewScreen {
             }
         }
         chosen
+    }
+}
+
+/// The name of a group, laid out.
+fn name_galley(ui: &Ui, name: String) -> Arc<Galley> {
+    let font = TextStyle::Small.resolve(ui.style());
+    ui.painter().layout_no_wrap(name, font, tokens_of(ui).text_quiet)
+}
+
+/// Draws the names of groups, each beside its lane.
+fn lane_names_ui(ui: &Ui, corner: Pos2, width: f32, lanes: &[Vec<&Row>]) {
+    let mut top = corner.y;
+    for rows in lanes {
+        let high = height(std::iter::once(rows.len())) - height(std::iter::empty());
+        let place = Rect::from_min_size(pos2(corner.x, top), vec2(width - 6.0, high));
+        let name = name_galley(ui, rows.first().map_or(String::new(), |row| row.group.clone()));
+        let at = Align2::LEFT_CENTER.anchor_size(place.left_center(), name.size());
+        let painter = ui.painter().with_clip_rect(place.intersect(ui.clip_rect()));
+        painter.galley(at.min, name, tokens_of(ui).text_quiet);
+        top += high;
     }
 }
 

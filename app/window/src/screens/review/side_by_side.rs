@@ -128,9 +128,11 @@ pub(super) fn fitted_over_depth(subject: &ReviewSubject) -> Vec<PlotPoint> {
 impl ReviewScreen {
     pub(super) fn side_by_side_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            for (is_over_depth, name) in [(false, "Force over time"), (true, "Force over depth")] {
-                let chosen = &mut self.side.is_over_depth;
-                ui.selectable_value(chosen, is_over_depth, name).named(name);
+            ui.label("force over:");
+            for (is_over_depth, word) in [(false, "time"), (true, "depth")] {
+                let name = format!("Force over {word}");
+                let choice = ui.selectable_value(&mut self.side.is_over_depth, is_over_depth, word);
+                choice.accessible_name(&name).named(&name);
             }
             ui.separator();
             self.grouping_ui(ui);
