@@ -17,7 +17,7 @@ const ENTRY_HEIGHT: f32 = 48.0;
 /// Width of the rail in a window so wide, in points.
 #[must_use]
 pub fn width(window: f32) -> f32 {
-    WIDTHS[usize::from(window < ROOM_FOR_WORDS)]
+    if window >= ROOM_FOR_WORDS { WIDTHS[0] } else { WIDTHS[1] }
 }
 
 pub fn rail_ui(ui: &mut Ui, shown: &str, commands: &mut Commands) {
@@ -52,5 +52,5 @@ fn entry_ui(ui: &mut Ui, screen: &ScreenEntry, is_shown: bool, commands: &mut Co
 }
 
 fn has_words(ui: &Ui) -> bool {
-    width(ui.ctx().content_rect().width()) == WIDTHS[0]
+    ui.ctx().content_rect().width() >= ROOM_FOR_WORDS
 }
