@@ -77,7 +77,8 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     let rows = named(&flow, "remove: ");
     assert_eq!(rows.len(), 10);
     // One line below the other, all within the panel, each with its name before its button.
-    let left = rail::WIDTH..=rail::WIDTH + Sizes::default().get(PanelEdge::Left);
+    let rail = rail::width(flow.window.ctx.content_rect().width());
+    let left = rail..=rail + Sizes::default().get(PanelEdge::Left);
     for pair in rows.windows(2) {
         let step = pair[1].1.top() - pair[0].1.top();
         assert!((20.0..=32.0).contains(&step), "{pair:?}");
