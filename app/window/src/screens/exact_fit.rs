@@ -24,7 +24,7 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
 fn row_ui(ui: &mut Ui, text: &ParameterText) {
     let tokens = tokens_of(ui);
     value_ui(ui, &text.name, &text.value, tokens.text, &text.unit);
-    let intervals = [("95 %", &text.interval), ("total", &text.total)];
+    let intervals = [("95 %", &text.interval), ("total 95 %", &text.total)];
     for (name, interval) in intervals.into_iter().filter(|(_, interval)| !interval.is_empty()) {
         ui.horizontal(|ui| {
             cell(ui, NAME_WIDTH, |ui| {
