@@ -7,9 +7,11 @@ use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
+use crate::theme::icon_text;
 use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
-use eframe::egui::{Button, Ui, vec2};
+use eframe::egui::{Button, RichText, Ui, vec2};
+use lucide_icons::Icon;
 use palpate_model::signal::track::SignalTrack;
 
 /// Points that the axes beside and below a plot take of it.
@@ -29,10 +31,7 @@ impl ReviewScreen {
         }
         match self.view {
             View::OverTime | View::OverDepth => {
-                ui.horizontal_wrapped(|ui| {
-                    self.figure_ui(ui);
-                    self.remarks_ui(ui);
-                });
+                self.remarks_ui(ui);
                 self.readout_ui(ui);
                 match self.view {
                     View::OverTime => self.over_time_ui(ui),
@@ -46,40 +45,49 @@ impl ReviewScreen {
         }
     }
 
-    /// Views, and on the right what the pointer and the keys can do in them.
+    /// The views, and below them what the pointer and the keys can do in the one that is shown.
     fn head_ui(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            ui.spacing_mut().button_padding.x = 6.0;
             for view in View::ALL {
                 ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
             }
-            if self.subjects.is_empty() || !self.view.has_axes() {
-                return;
-            }
-            ui.separator();
-            for (text, name, key, to) in [
-                ("+", "Zoom in", "+", ViewMove::ZoomIn),
-                ("-", "Zoom out", "-", ViewMove::ZoomOut),
-                ("<", "Pan left", "left arrow", ViewMove::PanLeft),
-                (">", "Pan right", "right arrow", ViewMove::PanRight),
-                ("All", "Reset view", "Home", ViewMove::Reset),
-                ("A", "Cursor A", "A, or a click", ViewMove::Cursor(0)),
-                ("B", "Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
-                ("Clear", "Clear cursors", "Delete", ViewMove::ClearCursors),
-            ] {
-                // Cursors stand in time, which the view of cycles does not have.
-                let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
-                if is_cursor && self.view == View::Cycles {
-                    continue;
-                }
-                let button = ui.add(Button::new(text).min_size(vec2(26.0, 0.0)));
-                let button = button.accessible_name(name).named(name);
-                if button.on_hover_text(format!("{name}: {key}")).clicked() {
-                    self.go(to);
-                }
-            }
         });
+        if !self.subjects.is_empty() && self.view.has_axes() {
+            ui.horizontal_wrapped(|ui| self.tools_ui(ui));
+        }
+    }
+
+    fn tools_ui(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        let word = |text: &str| RichText::new(text);
+        for (text, name, key, to) in [
+            (icon_text(Icon::ZoomIn), "Zoom in", "+", ViewMove::ZoomIn),
+            (icon_text(Icon::ZoomOut), "Zoom out", "-", ViewMove::ZoomOut),
+            (icon_text(Icon::ChevronLeft), "Pan left", "left arrow", ViewMove::PanLeft),
+            (icon_text(Icon::ChevronRight), "Pan right", "right arrow", ViewMove::PanRight),
+            (icon_text(Icon::Maximize), "Reset view", "Home", ViewMove::Reset),
+            (word("A"), "Cursor A", "A, or a click", ViewMove::Cursor(0)),
+            (word("B"), "Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
+            (icon_text(Icon::X), "Clear cursors", "Delete", ViewMove::ClearCursors),
+        ] {
+            // Cursors stand in time, which the view of cycles does not have.
+            let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
+            if is_cursor && self.view == View::Cycles {
+                continue;
+            }
+            if to == ViewMove::Cursor(0) {
+                ui.separator();
+            }
+            let button = ui.add(Button::new(text).min_size(vec2(34.0, 30.0)));
+            let button = button.accessible_name(name).named(name);
+            if button.on_hover_text(format!("{name}: {key}")).clicked() {
+                self.go(to);
+            }
+        }
+        if matches!(self.view, View::OverTime | View::OverDepth) {
+            ui.separator();
+            self.figure_ui(ui);
+        }
     }
 
     /// What a reader of the plots must know.
