@@ -14,6 +14,7 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::TimeScale;
 use palpate_sessions::Session;
 use palpate_sessions::contacts::contacts;
+use palpate_test_support::wait::Deadline;
 use palpate_tests::flow::{FRAME, WindowFlow};
 use palpate_tests::recorded_runs::record_specimen;
 use palpate_window::shell::rail;
@@ -177,26 +178,7 @@ fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
     // The plots stay where they are.
     assert_eq!(heads(&flow)[2].0, third.0);
     // The view as a picture on the clipboard, drawn for paper.
-    flow.click("Copy figure");
-    let mut copied = None;
-    for _ in 0..2000 {
-        flow.window.step();
-        let commands = &flow.window.output().platform_output.commands;
-        copied = commands.iter().find_map(|command| match command {
-            OutputCommand::CopyImage(image) => Some(image.clone()),
-            _ => None,
-        });
-        if copied.is_some() {
-            break;
-        }
-        std::thread::sleep(FRAME);
-    }
-    let image = copied.expect("a picture");
-    assert_eq!(image.size[0], 1920);
-    // Every ink of a session is in it.
-    for ink in Tokens::of(false).sessions {
-        assert!(image.pixels.iter().filter(|pixel| **pixel == ink).count() > 20, "{ink:?}");
-    }
+    copies_figure(&mut flow);
     // Over depth, by protocol and in one group.
     flow.click("Force over depth");
     flow.click("group by protocol");
@@ -206,7 +188,34 @@ fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
     flow.window.hover_at(at);
     flow.window.run_steps(3);
     assert!(flow.says(" mm, where each session first reaches it"));
+    copies_figure(&mut flow);
+    flow.click("Over depth");
+    copies_figure(&mut flow);
     flow.window.check_accessibility();
+}
+
+/// Copies the view and finds the ink of every session in the picture.
+fn copies_figure(flow: &mut WindowFlow) {
+    flow.click("Copy figure");
+    let mut copied = None;
+    let end = Deadline::new();
+    while copied.is_none() {
+        assert!(!end.is_over(), "nothing is copied");
+        flow.window.step();
+        let commands = &flow.window.output().platform_output.commands;
+        copied = commands.iter().find_map(|command| match command {
+            OutputCommand::CopyImage(image) => Some(image.clone()),
+            _ => None,
+        });
+        std::thread::sleep(FRAME);
+    }
+    let picture = copied.unwrap();
+    assert_eq!(picture.size[0], 1920);
+    for ink in Tokens::of(false).sessions {
+        let count = picture.pixels.iter().filter(|pixel| **pixel == ink).count();
+        // More than the line of a legend: 40 px of 2 px, twice as fine.
+        assert!(count > 1000, "{ink:?}: {count}");
+    }
 }
 
 /// Forces in N that the lines above the plots of sessions of a name say.

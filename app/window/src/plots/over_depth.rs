@@ -145,8 +145,7 @@ impl DepthLines {
         self.job.is_busy()
     }
 
-    /// What was found of a line; nothing where it is drawn as pixels.
-    pub fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
+    fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
         let lines = self.found.as_ref().map_or(&[][..], |found| &found.lines);
         let own = lines.iter().find(|line| line.id == id);
         own.map_or(&[], |line| &line.stretches)
@@ -211,6 +210,20 @@ impl DepthLines {
             }
         }
     }
+}
+
+/// The whole of a line for a figure of so many pixels each way: as many points as it takes.
+#[must_use]
+pub fn loop_for_figure(
+    track: &SignalTrack,
+    [depth, force]: [[f64; 2]; 2],
+    pixels: [f64; 2],
+) -> Vec<Vec<PlotPoint>> {
+    let rows = [0, track.len()];
+    let line = DepthLineKey { id: 0, version: 0, rows, color: Color32::TRANSPARENT };
+    let key = Key { depth, force, pixels, lines: vec![line] };
+    let found = reduce(key, std::slice::from_ref(track), usize::MAX, &AtomicBool::new(false));
+    found.into_iter().flat_map(|found| found.lines).flat_map(|line| line.stretches).collect()
 }
 
 fn reduce(

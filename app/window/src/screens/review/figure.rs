@@ -4,6 +4,7 @@ use super::groups::groups;
 use super::side_by_side::fitted_over_depth;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
+use crate::plots::over_depth::loop_for_figure;
 use crate::plots::stretches::Stretches;
 use crate::widgets::{NamedControl, alarm_ui, quiet_ui};
 use crate::workers::review::{Quantity, ReviewRecording};
@@ -15,11 +16,17 @@ use palpate_analysis::session_actions::{ActionReport, SessionDocument, write_doc
 use palpate_figures::drawing::Drawing;
 use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries, PlotStretch};
 use palpate_figures::raster::{Raster, raster};
+use palpate_figures::tokens::LIGHT;
+use palpate_model::signal::track::SignalTrack;
 use std::path::PathBuf;
 
 /// Columns of a figure of plots side by side.
 const COLUMNS: usize = 3;
+/// Width of a line in px, and room above for the names of phases as a share of the height of lines.
 const WIDTH: f64 = 1.3;
+const NAMES: f64 = 0.1;
+/// Loops are drawn for a plot of this size: finer than any of the figure.
+const LOOP_PIXELS: [f64; 2] = [900.0, 400.0];
 
 /// Copies and saves under way.
 #[derive(Default)]
@@ -27,7 +34,7 @@ pub(super) struct FigureExport {
     copy: Job<Result<Raster, String>>,
     dialog: Dialog<PathBuf>,
     /// The figure that waits for the name of its file.
-    waiting: Option<Drawing>,
+    waiting: Option<PendingFigure>,
     save: BackgroundTask<ActionReport>,
     copied: Option<Result<(), String>>,
 }
@@ -41,24 +48,25 @@ impl FigureExport {
             }));
         }
         if let Some(to) = self.dialog.poll()
-            && let Some(drawing) = self.waiting.take()
+            && let Some(figure) = self.waiting.take()
         {
-            let document = SessionDocument::Drawing(Box::new(drawing));
-            self.save
-                .start("figure", ctx, move |progress| write_document(&document, &to, progress));
+            self.save.start("figure", ctx, move |progress| {
+                let document = SessionDocument::Drawing(Box::new(figure.drawing()));
+                write_document(&document, &to, progress)
+            });
         }
     }
 
-    fn copy(&mut self, drawing: Drawing, ctx: &Context) {
+    fn copy(&mut self, figure: PendingFigure, ctx: &Context) {
         self.copied = None;
-        let work = move || raster(&drawing).map_err(|err| err.to_string());
+        let work = move || raster(&figure.drawing()).map_err(|err| err.to_string());
         if let Err(err) = self.copy.start("copy-figure", ctx, work) {
             self.copied = Some(Err(err.to_string()));
         }
     }
 
-    fn save(&mut self, drawing: Drawing, ctx: &Context) {
-        self.waiting = Some(drawing);
+    fn save(&mut self, figure: PendingFigure, ctx: &Context) {
+        self.waiting = Some(figure);
         let opened = self.dialog.open(ctx, |dialog| {
             let dialog = dialog.set_title("Save figure").set_file_name("figure.svg");
             dialog.add_filter("figures", &["svg", "png"]).save_file()
@@ -75,6 +83,27 @@ impl FigureExport {
             (_, Some(Ok(done))) => quiet_ui(ui, &done.sentence),
             (None, None) => {}
         }
+    }
+}
+
+/// A figure whose loops are still to be found, away from the window's thread.
+struct PendingFigure {
+    panels: FigurePanels,
+    /// Loops of sessions, those in front first: each with its plot and ink.
+    loops: Vec<(usize, SignalTrack, Ink)>,
+    /// Depths and forces shown.
+    shown: [[f64; 2]; 2],
+}
+
+impl PendingFigure {
+    fn drawing(mut self) -> Drawing {
+        for (plot, track, ink) in self.loops {
+            let found = loop_for_figure(&track, self.shown, LOOP_PIXELS);
+            let found = within(found.iter().map(Vec::as_slice), self.shown);
+            // Behind what is there: fits, and sessions in front.
+            self.panels.plots[plot].series.splice(0..0, lines(found, ink));
+        }
+        self.panels.drawing()
     }
 }
 
@@ -100,6 +129,11 @@ fn over_time(stretches: &Stretches, x: [f64; 2], ink: Ink) -> impl Iterator<Item
     lines(within(stretches.parts(), [x, EVERYWHERE]), ink)
 }
 
+/// The ink of a fit over its session, as on the screen: the second session's own is too close to the usual one.
+fn fitted_ink(subject: &ReviewSubject) -> Ink {
+    if subject.id % LIGHT.sessions.len() as u64 == 1 { Ink::Text } else { Ink::Limit }
+}
+
 fn ink_of(subject: &ReviewSubject) -> Ink {
     Ink::Session(usize::try_from(subject.id).unwrap_or_default())
 }
@@ -108,43 +142,57 @@ impl ReviewScreen {
     /// Draws the buttons, where the view has a figure.
     pub(super) fn figure_ui(&mut self, ui: &mut Ui) {
         if ui.button("Copy figure").named("Copy figure").clicked() {
-            let drawing = self.figure().drawing();
-            self.figure.copy(drawing, ui.ctx());
+            let figure = self.pending_figure();
+            self.figure.copy(figure, ui.ctx());
         }
         if ui.button("Save figure...").named("Save figure").clicked() {
-            let drawing = self.figure().drawing();
-            self.figure.save(drawing, ui.ctx());
+            let figure = self.pending_figure();
+            self.figure.save(figure, ui.ctx());
         }
         self.figure.answer_ui(ui);
     }
 
-    fn figure(&self) -> FigurePanels {
-        let has_fit = self.subjects.iter().any(|one| one.fitted().is_some());
-        let fitted = || has_fit.then(|| ("fitted".to_owned(), Ink::Limit)).into_iter();
+    fn pending_figure(&self) -> PendingFigure {
+        let mut panels = FigurePanels { columns: 1, ..FigurePanels::default() };
+        let mut loops = Vec::new();
+        let track = |one: &ReviewSubject| one.recording.track.clone();
         let named = self.subjects.iter().map(|one| (one.name.clone(), ink_of(one)));
+        let fitted = |is_drawn: bool, name: &str, ink| is_drawn.then(|| (name.to_owned(), ink));
         match self.view {
-            View::SideBySide => FigurePanels {
-                title: "Sessions side by side".into(),
-                words: format!("force of {} sessions, all with the same axes", self.subjects.len()),
-                plots: self.plots_side_by_side(),
-                columns: COLUMNS,
-                legend: fitted().collect(),
-            },
-            View::OverTime => FigurePanels {
-                title: "Sessions over time".into(),
-                words: format!("time from {}", self.time_origin.name()),
-                plots: self.plots_over_time(),
-                columns: 1,
-                legend: named.chain(fitted()).collect(),
-            },
-            _ => FigurePanels {
-                title: "Sessions over depth".into(),
-                words: "force over depth from contact".into(),
-                plots: vec![self.plot_over_depth()],
-                columns: 1,
-                legend: named.collect(),
-            },
+            View::SideBySide => {
+                let order: Vec<(usize, String)> = self.titles_side_by_side();
+                panels.title = "Sessions side by side".into();
+                panels.words = format!("{} sessions, all with the same axes", order.len());
+                panels.columns = COLUMNS;
+                let has = |ink| {
+                    let mut fits = self.subjects.iter().filter(|one| one.fitted().is_some());
+                    fits.any(|one| fitted_ink(one) == ink)
+                };
+                panels.legend.extend(fitted(has(Ink::Limit), "fitted", Ink::Limit));
+                panels.legend.extend(fitted(has(Ink::Text), "fitted, over orange", Ink::Text));
+                if self.side.is_over_depth {
+                    let tracks = order.iter().map(|(index, _)| &self.subjects[*index]).enumerate();
+                    loops = tracks.map(|(plot, one)| (plot, track(one), ink_of(one))).collect();
+                }
+                panels.plots = order.into_iter().map(|one| self.plot_side_by_side(one)).collect();
+            }
+            View::OverTime => {
+                panels.title = "Sessions over time".into();
+                panels.words = format!("time from {}", self.time_origin.name());
+                panels.plots = self.plots_over_time();
+                let is_fitted = self.front().is_some_and(|front| front.fitted().is_some());
+                panels.legend = named.chain(fitted(is_fitted, "fitted", Ink::Limit)).collect();
+            }
+            _ => {
+                panels.title = "Sessions over depth".into();
+                panels.words = "force over depth from contact".into();
+                let [x, y] = self.depth_axes();
+                panels.plots = vec![Plot::new("", x, y)];
+                panels.legend = named.collect();
+                loops = self.subjects.iter().map(|one| (0, track(one), ink_of(one))).collect();
+            }
         }
+        PendingFigure { panels, loops, shown: [self.depth.shown(), self.force.shown()] }
     }
 
     fn time_axis(&self) -> PlotAxis {
@@ -183,10 +231,18 @@ impl ReviewScreen {
             if place == Quantity::Force as usize && front.fitted().is_some() {
                 series.extend(over_time(&front.lines[LINE_MODELLED], shown, Ink::Limit));
             }
+            let values = || series.iter().flat_map(|one| &one.points).map(|point| point[1]);
+            let (low, high) = values()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), one| {
+                    (low.min(one), high.max(one))
+                });
+            // Room for the names of phases.
+            let room = (low <= high).then_some(high + NAMES * (high - low));
+            let y = PlotAxis::linear(axis).with_visible_values(room.as_slice());
             Plot {
                 stretches: phases.clone(),
                 x_levels: cursors.clone(),
-                ..Plot::new("", self.time_axis(), PlotAxis::linear(axis)).with(series)
+                ..Plot::new("", self.time_axis(), y).with(series)
             }
         };
         wanted.into_iter().map(plot).collect()
@@ -197,18 +253,8 @@ impl ReviewScreen {
         [depth, PlotAxis::linear("force (N)").with_range(self.force.shown())]
     }
 
-    /// Loops of more points than a frame can draw are pixels, which this figure does not have.
-    fn plot_over_depth(&self) -> Plot {
-        let shown = [self.depth.shown(), self.force.shown()];
-        let series = self.subjects.iter().rev().flat_map(|one| {
-            let parts = self.depth_lines.stretches(one.id).iter().map(Vec::as_slice);
-            lines(within(parts, shown), ink_of(one))
-        });
-        let [x, y] = self.depth_axes();
-        Plot::new("", x, y).with(series)
-    }
-
-    fn plots_side_by_side(&self) -> Vec<Plot> {
+    /// Places and titles of the sessions side by side, group by group.
+    fn titles_side_by_side(&self) -> Vec<(usize, String)> {
         let groups = groups(&self.subjects, self.grouping);
         let titled = groups.iter().flat_map(|group| {
             let short = group.short_names(&self.subjects).into_iter();
@@ -218,33 +264,24 @@ impl ReviewScreen {
             };
             group.members.iter().copied().zip(short.map(title))
         });
+        titled.collect()
+    }
+
+    /// The plot of a session; over depth its own line comes later.
+    fn plot_side_by_side(&self, (index, title): (usize, String)) -> Plot {
+        let subject = &self.subjects[index];
         let [depth, force] = self.depth_axes();
         let y = self.force.shown();
-        let plot = |(index, title): (usize, String)| {
-            let subject = &self.subjects[index];
-            let ink = ink_of(subject);
-            let (x, series) = match self.side.is_over_depth {
-                true => {
-                    let shown = [self.depth.shown(), y];
-                    let over = fitted_over_depth(subject);
-                    let own = within(self.side.stretches(subject.id).into_iter(), shown);
-                    let fitted = within(std::iter::once(over.as_slice()), shown);
-                    let series = lines(own, ink).chain(lines(fitted, Ink::Limit));
-                    (depth.clone(), series.collect::<Vec<_>>())
-                }
-                false => {
-                    let shown = [self.time.shown(), y];
-                    let own = within(subject.lines[Quantity::Force as usize].parts(), shown);
-                    let series = lines(own, ink);
-                    let fitted = subject.fitted().map(|_| &subject.lines[LINE_MODELLED]);
-                    let fitted = fitted.into_iter().flat_map(|one| within(one.parts(), shown));
-                    let series = series.chain(lines(fitted.collect(), Ink::Limit));
-                    (self.time_axis(), series.collect())
-                }
-            };
-            Plot::new(&title, x, force.clone()).with(series)
-        };
-        titled.map(plot).collect()
+        if self.side.is_over_depth {
+            let over = fitted_over_depth(subject);
+            let over = within(std::iter::once(over.as_slice()), [self.depth.shown(), y]);
+            return Plot::new(&title, depth, force).with(lines(over, fitted_ink(subject)));
+        }
+        let shown = [self.time.shown(), y];
+        let own = within(subject.lines[Quantity::Force as usize].parts(), shown);
+        let over = subject.fitted().map(|_| within(subject.lines[LINE_MODELLED].parts(), shown));
+        let over = lines(over.unwrap_or_default(), fitted_ink(subject));
+        Plot::new(&title, self.time_axis(), force).with(lines(own, ink_of(subject)).chain(over))
     }
 }
 

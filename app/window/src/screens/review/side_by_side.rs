@@ -39,12 +39,6 @@ impl SideBySide {
     pub fn is_busy(&self) -> bool {
         self.depth_lines.values().any(DepthLines::is_busy)
     }
-
-    /// What was found of the line of a session over depth.
-    pub fn stretches(&self, id: u64) -> Vec<&[PlotPoint]> {
-        let found = self.depth_lines.get(&id).map_or(&[][..], |lines| lines.stretches(id));
-        found.iter().map(Vec::as_slice).collect()
-    }
 }
 
 /// A plot that was drawn, with what stands above it.
