@@ -9,6 +9,7 @@ use super::parameters::parameters_ui;
 use super::results_panel::{cycles_ui, facts_ui};
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::today;
+use super::weighing::weighing_ui;
 use crate::shell::activity::run_in_progress;
 use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, require, section_ui};
 use crate::workers::fit::Refit;
@@ -81,13 +82,21 @@ impl Screen for ResultScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
-        workbench.plots_ui(ui);
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        match workbench.run().filter(|run| has_weighed(run)) {
+            Some(run) => {
+                let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
+                weighing_ui(ui, run, signal, &workbench.bench, commands);
+            }
+            None => workbench.plots_ui(ui),
+        }
     }
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
         let run = workbench.run();
-        found_ui(ui, run, workbench.latest_run.refit(run));
+        if !run.is_some_and(has_weighed) {
+            found_ui(ui, run, workbench.latest_run.refit(run));
+        }
         if let Some(run) = run {
             section_ui(ui, "Measured");
             facts_ui(ui, run);
@@ -108,6 +117,11 @@ impl Screen for ResultScreen {
         let accept = PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun);
         vec![accept.if_ok(verdict)]
     }
+}
+
+/// Whether the run measured a calibration, which has readings in place of a curve.
+fn has_weighed(run: &RunView) -> bool {
+    !run.planned_weights.is_empty()
 }
 
 /// The parameters of the exact fit, or the live ones with the reason.
