@@ -171,6 +171,17 @@ pub fn control_sentence(found: Option<(ControlLimits, Option<ControlSignal>)>) -
     (words, true)
 }
 
+/// What the control charts of weight and zero show: a sentence each, and whether it is to be looked at.
+#[must_use]
+pub fn trends(past: &[PastCheck]) -> [(String, bool); 2] {
+    let chart = |name: &str, measured: fn(&PastCheck) -> Option<DailyCheckDeviation>| {
+        let readings: Vec<_> = past.iter().filter_map(measured).collect();
+        let (words, is_warning) = control_sentence(control_limits(&readings));
+        (format!("{name}: {words}"), is_warning)
+    };
+    [chart("weight", |one| one.weight), chart("zero", |one| one.zero)]
+}
+
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let (volts, DailyCheckDeviation { newtons, limit }) = zero_of(calibration, records)?;
     let is_passed = newtons.abs() <= limit;

@@ -1,6 +1,7 @@
 //! What a technician asks first: was the rig checked today, which calibration is in use, is there space, what was measured.
 
 use crate::catalog_search::{CatalogSearch, search, update};
+use crate::daily::{past_checks, trends};
 use crate::progress::Progress;
 use chrono::{DateTime, Local, NaiveTime, Utc};
 use palpate_sessions::catalog::{CatalogEntry, CatalogOrder, CatalogQuery};
@@ -8,6 +9,8 @@ use palpate_sessions::checks::{DailyCheck, read_checks};
 use palpate_sessions::folder::free_bytes;
 use std::path::Path;
 
+/// Checks from which control limits are found: two months of working days.
+const CHECKS_MAX: usize = 40;
 /// Sessions of a day that are listed.
 const SESSIONS_MAX: usize = 200;
 
@@ -15,6 +18,8 @@ const SESSIONS_MAX: usize = 200;
 pub struct TodayFacts {
     /// The rig's last daily check, and whether it is of today.
     pub check: Option<(DailyCheck, bool)>,
+    /// What the control charts of the daily checks warn of.
+    pub warnings: Vec<String>,
     /// Free space in bytes on the disk of the library.
     pub free_bytes: u64,
     /// Sessions that began today, newest first.
@@ -32,6 +37,9 @@ pub fn read_today(
     let day = |at: DateTime<Utc>| at.with_timezone(&Local).date_naive();
     let check = checks.last().map(|check| (check.clone(), day(check.at) == day(now)));
     update(library, progress)?;
+    let past = past_checks(library, rig, CHECKS_MAX, progress)?;
+    let warnings = trends(&past).into_iter().filter(|(_, is_warning)| *is_warning);
+    let warnings = warnings.map(|(words, _)| words).collect();
     let midnight = day(now).and_time(NaiveTime::MIN).and_local_timezone(Local);
     let query = CatalogQuery {
         // Where clocks change at midnight the day has no start; then the last 24 h count.
@@ -45,5 +53,5 @@ pub fn read_today(
     };
     let found = search(&CatalogSearch { library: library.to_owned(), query, page: SESSIONS_MAX })?;
     let free_bytes = free_bytes(library).map_err(|err| err.to_string())?;
-    Ok(TodayFacts { check, free_bytes, sessions: found.first })
+    Ok(TodayFacts { check, warnings, free_bytes, sessions: found.first })
 }

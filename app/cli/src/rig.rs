@@ -29,6 +29,9 @@ pub struct BenchArgs {
     /// Simulated rig: seed of its random numbers; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Simulated rig: repeat of the run on the same specimen, with noise and drift of its own; 0 for the first run
+    #[arg(long, default_value_t = 0, value_name = "NUMBER")]
+    pub repeat: u64,
     /// Simulated rig: largest loss of elastic force after deeper loading, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
@@ -62,6 +65,7 @@ impl BenchArgs {
             profile: self.profile,
             cell: self.load_cell,
             seed: self.seed,
+            repeat: self.repeat,
             softening: self.softening,
             noise: self.noise,
             stiffness: self.stiffness,

@@ -48,8 +48,8 @@ pub struct ReportLink {
 }
 
 impl ReportLink {
-    pub fn new(seed: u64) -> Self {
-        Self { random: Random::new(seed, RandomStream::Link), newest: None }
+    pub fn new(seed: u64, repeat: u64) -> Self {
+        Self { random: Random::of_repeat(seed, repeat, RandomStream::Link), newest: None }
     }
 
     /// Arrival at the host of a report sent at `sent`, later than every arrival before it.
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn arrivals_keep_their_order_and_bounds() {
-        let mut link = ReportLink::new(3);
+        let mut link = ReportLink::new(3, 0);
         let mut before = Nanos::ZERO;
         let mut longest = 0;
         for i in 0..10_000 {

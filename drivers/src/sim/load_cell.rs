@@ -73,9 +73,10 @@ impl LoadCell {
         let curve = calibration(settings.profile)
             .curve()
             .expect("a built-in calibration table rises from step to step");
+        let of_run = |cause| Random::of_repeat(settings.seed, settings.repeat, cause);
         let error = match settings.profile {
             SimProfile::Lab => {
-                let mut drift = Random::new(settings.seed, RandomStream::Drift);
+                let mut drift = of_run(RandomStream::Drift);
                 let rate = drift.between(-DRIFT_RATE_MAX, DRIFT_RATE_MAX);
                 let step_minutes = WANDER_TICKS as f64 * tick.0 / 60.0;
                 CellError::Lab {
@@ -90,7 +91,7 @@ impl LoadCell {
         };
         let own = OwnCell::of(settings, &curve);
         let curve = own.as_ref().map_or(curve, |own| own.curve.clone());
-        Self { curve, own, noise: Random::new(settings.seed, RandomStream::Noise), error }
+        Self { curve, own, noise: of_run(RandomStream::Noise), error }
     }
 
     /// Volts of newtons as they truly are.

@@ -123,7 +123,7 @@ impl SimRig {
     pub fn named(name: &str, settings: SimSettings) -> Self {
         let description = describe(name, &settings);
         let tick = description.tick();
-        let mut machine = Random::new(settings.seed, RandomStream::Machine);
+        let mut machine = Random::of_repeat(settings.seed, settings.repeat, RandomStream::Machine);
         let slider = Slider::new(&description, &mut machine);
         let bench = SimBench::new(&settings, slider.counter_zero());
         // The controller was switched on up to a minute and a half before the host looked.
@@ -131,7 +131,7 @@ impl SimRig {
         Self {
             tick,
             clock: TickClock::new(tick_count, description.tick_nanos),
-            link: ReportLink::new(settings.seed),
+            link: ReportLink::new(settings.seed, settings.repeat),
             load_cell: LoadCell::new(&settings, tick),
             sensors: Sensors::new(&settings),
             slider,

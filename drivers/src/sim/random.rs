@@ -30,6 +30,14 @@ impl Random {
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), u128::from(cause)))
     }
 
+    /// The generator of a cause that differs from run to run on one rig and specimen; repeat 0 is the first run.
+    pub fn of_repeat(seed: u64, repeat: u64, cause: RandomStream) -> Self {
+        match repeat {
+            0 => Self::new(seed, cause),
+            _ => Self::new(seed ^ scramble(repeat), cause),
+        }
+    }
+
     /// The generator that draws the specimen with a number; number 0 is the rig's own.
     pub fn of_specimen(seed: u64, specimen: u64) -> Self {
         match specimen {

@@ -61,6 +61,8 @@ pub struct SimSettings {
     pub profile: SimProfile,
     pub cell: SimCell,
     pub seed: u64,
+    /// Repeat of the run on the same specimen, with noise and drift of its own; 0 for the first run.
+    pub repeat: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
     pub rate: SimRate,
@@ -98,7 +100,7 @@ impl SimSettings {
     }
 
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
-    /// are not the usual ones, `cell`, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
+    /// are not the usual ones, `repeat`, `cell`, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
     /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C)
     /// and `input` (s).
     pub fn to_map(&self) -> BTreeMap<String, String> {
@@ -109,6 +111,7 @@ impl SimSettings {
         ]);
         let usual = Self::default();
         let amounts = [
+            ("repeat", self.repeat.to_string(), usual.repeat.to_string()),
             ("cell", self.cell.to_string(), usual.cell.to_string()),
             ("rate", self.rate.to_string(), usual.rate.to_string()),
             ("softening", self.softening.to_string(), usual.softening.to_string()),
@@ -170,6 +173,7 @@ mod tests {
             profile: "ideal".parse().unwrap(),
             cell: "own".parse().unwrap(),
             seed: u64::MAX - 3,
+            repeat: 2,
             clock: "galil".parse().unwrap(),
             rate: "20000".parse().unwrap(),
             softening: "40".parse().unwrap(),
@@ -193,6 +197,7 @@ mod tests {
             ("preconditioning", "10"),
             ("profile", "ideal"),
             ("rate", "20000"),
+            ("repeat", "2"),
             ("seed", "18446744073709551612"),
             ("softening", "40"),
             ("stiffness", "200"),

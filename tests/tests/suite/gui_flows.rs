@@ -1,9 +1,10 @@
 //! Flows through the window by accessible name: no display, no graphics card, no pixels.
 
+use eframe::egui::accesskit::Live;
 use eframe::egui::epaint::Primitive;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_analysis::report::budget::BUDGET_TITLE;
 use palpate_analysis::report::text;
 use palpate_model::rig::Phase;
@@ -341,4 +342,20 @@ fn what_a_crash_left_is_recovered_and_reported_when_the_window_opens() {
     assert!(flow.window.query_by_label_contains(&expected).is_some(), "{expected}");
     // The original is as it was.
     assert_eq!(std::fs::read(crashed.join("000.mcap")).unwrap(), bytes[..bytes.len() / 2]);
+}
+
+#[test]
+fn a_screen_reader_is_told_state_and_numbers_as_they_change() {
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
+    flow.click("Start  F5");
+    flow.wait_for_phase(Phase::Hold);
+    flow.window.step();
+    let live = |words: &str| {
+        let node = flow.window.get_by_label_contains(words);
+        node.accesskit_node().live()
+    };
+    assert_eq!(live("State: HOLD"), Live::Assertive);
+    assert_eq!(live(" N, depth "), Live::Polite);
+    // What merely stands there is read when somebody comes to it.
+    assert_eq!(live("depth (mm)"), Live::Off);
 }

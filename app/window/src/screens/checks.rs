@@ -10,8 +10,7 @@ use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
 use eframe::egui::{Context, Key, Ui, vec2};
 use palpate_analysis::daily::{
-    DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, control_limits, control_sentence,
-    past_checks,
+    DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, control_limits, past_checks, trends,
 };
 use palpate_analysis::report::live::deviation_plot;
 use std::path::PathBuf;
@@ -130,10 +129,7 @@ impl Screen for ChecksScreen {
             if part.is_passed { quiet_ui(ui, &part.sentence) } else { alarm_ui(ui, &part.sentence) }
         }
         section_ui(ui, "Trend");
-        for (name, measured) in [("weight", PLOTS[0].1), ("zero", PLOTS[1].1)] {
-            let readings: Vec<DailyCheckDeviation> = checks.iter().filter_map(measured).collect();
-            let (words, is_warning) = control_sentence(control_limits(&readings));
-            let words = format!("{name}: {words}");
+        for (words, is_warning) in trends(checks) {
             if is_warning { alarm_ui(ui, words) } else { quiet_ui(ui, words) }
         }
         let failed = checks.iter().filter(|one| !one.check.is_passed).count();

@@ -1,7 +1,8 @@
 //! Small shapes that stand before a word, so that a state is more than a colour; the state badge and the list of steps.
 
-use super::text::tokens_of;
+use super::text::{announce, tokens_of};
 use crate::shell::activity::{Activity, StateTone};
+use eframe::egui::accesskit::Live;
 use eframe::egui::{
     Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Role, Sense, Shape, Stroke,
     StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
@@ -95,6 +96,7 @@ pub fn badge_ui(ui: &mut Ui, activity: &Activity, size: Vec2) {
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let name = format!("State: {}", activity.word);
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &name));
+    announce(&response, Live::Assertive);
     let (painter, border) = (ui.painter(), Stroke::new(1.0, tokens.line));
     painter.rect(rect, CornerRadius::same(4), fill, border, StrokeKind::Inside);
     let left = rect.left_center();

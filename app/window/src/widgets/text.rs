@@ -1,7 +1,8 @@
 //! Words in panels: headings, facts in two columns, remarks and what is wrong.
 
 use crate::theme::Tokens;
-use eframe::egui::{Align, Color32, Label, Layout, RichText, Sense, Ui, vec2};
+use eframe::egui::accesskit::Live;
+use eframe::egui::{Align, Color32, Label, Layout, Response, RichText, Sense, Ui, vec2};
 
 /// Width of the names of facts in points.
 pub const NAME_WIDTH: f32 = 80.0;
@@ -75,7 +76,13 @@ pub fn quiet_ui(ui: &mut Ui, words: impl Into<String>) {
 /// A sentence about what is wrong.
 pub fn alarm_ui(ui: &mut Ui, words: impl Into<String>) {
     let ink = tokens_of(ui).alarm_text;
-    colored_ui(ui, RichText::new(words), ink);
+    let shown = ui.add(Label::new(RichText::new(words).color(ink)).wrap());
+    announce(&shown, Live::Assertive);
+}
+
+/// Has a screen reader say what stands there, whenever it changes.
+pub fn announce(shown: &Response, live: Live) {
+    shown.ctx.accesskit_node_builder(shown.id, |node| node.set_live(live));
 }
 
 /// What is wrong with a field, below it in small letters.

@@ -159,3 +159,24 @@ fn nothing_comes_before_its_time() {
     assert!((1_000_000..=1_500_000).contains(&first.at.0));
     assert_eq!(rig.next_event(first.at), None);
 }
+
+#[test]
+fn a_repeat_has_the_specimen_of_the_first_run_and_noise_of_its_own() {
+    let readings = |repeat| {
+        let mut rig = SimRig::new(SimSettings { seed: 7, repeat, ..SimSettings::default() });
+        let volts: Vec<f64> = (0..4000).map(|_| next_reading(&mut rig).1.volts.0).collect();
+        let mean = volts.iter().sum::<f64>() / volts.len() as f64;
+        (rig.truth().body, volts.into_iter().map(|one| one - mean).collect::<Vec<f64>>())
+    };
+    let (body, first) = readings(0);
+    assert_eq!(readings(0).1, first);
+    let square = |one: &[f64]| one.iter().map(|value| value * value).sum::<f64>();
+    for repeat in [1, 2] {
+        let (same, other) = readings(repeat);
+        assert_eq!(same, body);
+        let product: f64 = first.iter().zip(&other).map(|(a, b)| a * b).sum();
+        let correlation = product / (square(&first) * square(&other)).sqrt();
+        // Five standard errors of 1 / sqrt(4000).
+        assert!(correlation.abs() < 0.08, "{correlation}");
+    }
+}

@@ -84,7 +84,7 @@ impl ReviewScreen {
                 self.go(to);
             }
         }
-        if matches!(self.view, View::OverTime | View::OverDepth) {
+        if self.view != View::Cycles {
             ui.separator();
             self.figure_ui(ui);
         }

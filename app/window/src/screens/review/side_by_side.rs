@@ -130,8 +130,6 @@ impl ReviewScreen {
             }
             ui.separator();
             self.grouping_ui(ui);
-            ui.separator();
-            self.figure_ui(ui);
         });
         let groups = groups(&self.subjects, self.grouping);
         // What the cursor says is known only after the plots.

@@ -52,6 +52,7 @@ pub(super) fn facts_ui(
         }
         None => placeholder_ui(ui, "this rig had none yet"),
     }
+    facts.warnings.iter().for_each(|words| alarm_ui(ui, words));
     quiet_ui(ui, format!("'{DAILY_CHECK_COMMAND}' runs it."));
     link_ui(ui, "Show the checks", checks::SCREEN.name, commands);
     section_ui(ui, "Disk");
