@@ -131,17 +131,13 @@ fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64)
     let font = TextStyle::Small.resolve(ui.style());
     let count = f64::from((ground.width() / NUMBER).clamp(1.0, 5.0));
     let step = round_up((high - low) / count);
-    let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
     let mut free = ground.left();
     for mark in first..=last {
         let value = mark as f64 * step;
         let x = across(value);
         ui.painter().vline(x, ground.y_range(), Stroke::new(1.0, tokens.line));
-        let text = match decimals {
-            0..=4 => format!("{value:.decimals$}"),
-            _ => format!("{value:.0e}"),
-        };
+        let text = number_text(value, step);
         let at = pos2(x, ground.bottom() + 2.0);
         let galley = ui.painter().layout_no_wrap(text, font.clone(), tokens.text_quiet);
         let own = Align2::CENTER_TOP.anchor_size(at, galley.size());
@@ -153,10 +149,29 @@ fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64)
     }
 }
 
+/// A multiple of a step with as many digits as tell it from the next.
+fn number_text(value: f64, step: f64) -> String {
+    let place = |one: f64| (one.abs().log10() + 1e-9).floor();
+    let decimals = (-place(step)).max(0.0) as usize;
+    if decimals <= 4 || value == 0.0 {
+        return format!("{value:.*}", decimals.min(4));
+    }
+    format!("{value:.*e}", (place(value) - place(step)).max(0.0) as usize)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::theme::Tokens;
+
+    #[test]
+    fn neighbouring_numbers_differ() {
+        let of = |marks: [i32; 3], step: f64| marks.map(|n| number_text(f64::from(n) * step, step));
+        assert_eq!(of([6, 7, 8], 5e-5), ["3.0e-4", "3.5e-4", "4.0e-4"]);
+        assert_eq!(of([-1, 0, 1], 1e-5), ["-1e-5", "0.0000", "1e-5"]);
+        assert_eq!(of([19, 20, 21], 0.05), ["0.95", "1.00", "1.05"]);
+        assert_eq!(of([1, 2, 3], 10.0), ["10", "20", "30"]);
+    }
 
     fn dot(value: f64, ends: Option<[f64; 2]>) -> DistributionDot {
         let color = Tokens::of(false).series;
