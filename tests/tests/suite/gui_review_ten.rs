@@ -136,6 +136,8 @@ fn fit_all(flow: &mut WindowFlow) {
 #[test]
 fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
     let (mut flow, paths) = ten_sessions();
+    // All ten are in sight.
+    flow.window.set_size(vec2(1600.0, 1200.0));
     flow.click("contact");
     flow.click("Side by side");
     flow.window.run_steps(3);
