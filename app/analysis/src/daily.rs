@@ -54,7 +54,8 @@ pub fn past_checks(
     let mut past = Vec::with_capacity(count);
     for (done, check) in checks.into_iter().enumerate() {
         if progress.report(done, count, "reading the sessions of the daily checks").is_break() {
-            break;
+            // The newest come last: a part of them would be taken for all.
+            return Err("cancelled".into());
         }
         let folder = folders.get(&check.session_id);
         let [zero, weight] = folder.map_or([None; 2], |folder| deviations(&library.join(folder)));
@@ -135,11 +136,15 @@ fn zero_of(
     Ok((volts, deviation))
 }
 
+/// Checks from which control limits are found: two months of working days.
+pub const CONTROLLED: usize = 40;
+
 /// Control limits of the deviations before the last, and what the last ones show; `None` of too few.
 #[must_use]
 pub fn control_limits(
     known: &[DailyCheckDeviation],
 ) -> Option<(ControlLimits, Option<ControlSignal>)> {
+    let known = &known[known.len().saturating_sub(CONTROLLED)..];
     let readings: Vec<f64> = known.iter().map(|one| one.newtons).collect();
     let (_, before) = readings.split_last()?;
     let limits = ControlLimits::of(before)?;

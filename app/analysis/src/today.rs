@@ -1,16 +1,15 @@
 //! What a technician asks first: was the rig checked today, which calibration is in use, is there space, what was measured.
 
 use crate::catalog_search::{CatalogSearch, search, update};
-use crate::daily::{past_checks, trends};
+use crate::daily::{CONTROLLED, past_checks, trends};
 use crate::progress::Progress;
 use chrono::{DateTime, Local, NaiveTime, Utc};
+use palpate_model::control_chart::READINGS_MIN;
 use palpate_sessions::catalog::{CatalogEntry, CatalogOrder, CatalogQuery};
 use palpate_sessions::checks::{DailyCheck, read_checks};
 use palpate_sessions::folder::free_bytes;
 use std::path::Path;
 
-/// Checks from which control limits are found: two months of working days.
-const CHECKS_MAX: usize = 40;
 /// Sessions of a day that are listed.
 const SESSIONS_MAX: usize = 200;
 
@@ -37,7 +36,11 @@ pub fn read_today(
     let day = |at: DateTime<Utc>| at.with_timezone(&Local).date_naive();
     let check = checks.last().map(|check| (check.clone(), day(check.at) == day(now)));
     update(library, progress)?;
-    let past = past_checks(library, rig, CHECKS_MAX, progress)?;
+    // Fewer have no limits, and their sessions need not be read.
+    let past = match checks.len() > READINGS_MIN {
+        true => past_checks(library, rig, CONTROLLED, progress)?,
+        false => Vec::new(),
+    };
     let warnings = trends(&past).into_iter().filter(|(_, is_warning)| *is_warning);
     let warnings = warnings.map(|(words, _)| words).collect();
     let midnight = day(now).and_time(NaiveTime::MIN).and_local_timezone(Local);

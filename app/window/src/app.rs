@@ -18,7 +18,7 @@ use crate::shell::sizes::{PanelEdge, STEP, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::shell::tour::Tour;
 use crate::theme;
-use crate::widgets::places;
+use crate::widgets::{places, require};
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
@@ -186,7 +186,8 @@ impl WorkbenchApp {
 
     /// Takes an open rig in place of the present one, whose link is closed. Nothing moves.
     fn take_rig(&mut self, ctx: &Context, request: WorkbenchRequest) {
-        if let Err(reason) = self.workbench.free_verdict() {
+        let is_written = require(!self.workbench.queue.is_busy(), "a verdict is being written");
+        if let Err(reason) = self.workbench.free_verdict().and(is_written) {
             self.workbench.refusal = Some(format!("the rig was not connected, because {reason}"));
             return;
         }
@@ -223,7 +224,10 @@ impl WorkbenchApp {
         let now = &mut self.settings.now;
         let form = &self.workbench.form;
         if self.screens.shown() != start_page::SCREEN.name {
-            now.screen = self.screens.shown().to_owned();
+            // The result of a run is gone with the window.
+            let shown = self.screens.shown();
+            let shown = if shown == result::SCREEN.name { run::SCREEN.name } else { shown };
+            now.screen = shown.to_owned();
         }
         now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);

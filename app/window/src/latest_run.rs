@@ -2,7 +2,7 @@
 
 use crate::plots::PlotCache;
 use crate::screens::form::RunSetup;
-use crate::workers::fit::{Refit, Refitter};
+use crate::workers::fit::{Refit, Refitter, has_result};
 use eframe::egui::{Context, Ui};
 use palpate_model::assessment::Assessment;
 use palpate_model::calibration::Calibration;
@@ -17,6 +17,8 @@ pub struct LatestRun {
     refitter: Refitter,
     /// The session whose end was told.
     told: Option<PathBuf>,
+    /// Specimen and protocol of the last start.
+    asked: Option<[String; 2]>,
 }
 
 impl LatestRun {
@@ -26,6 +28,7 @@ impl LatestRun {
             plotted: 0,
             refitter: Refitter::default(),
             told: None,
+            asked: None,
         }
     }
 
@@ -50,12 +53,26 @@ impl LatestRun {
 
     /// Whether a run that has a result has just ended: true once for each.
     pub fn take_ended(&mut self, run: Option<&RunView>) -> bool {
-        let ended = run.filter(|run| run.outcome.is_some() && self.refitter.is_of(Some(run)));
+        let ended = run.filter(|run| run.outcome.is_some() && has_result(run));
         let Some(ended) = ended.filter(|run| self.told.as_ref() != Some(&run.folder)) else {
             return false;
         };
         self.told = Some(ended.folder.clone());
         true
+    }
+
+    pub fn set_asked(&mut self, asked: [String; 2]) {
+        self.asked = Some(asked);
+    }
+
+    /// Specimen and protocol of the last start.
+    pub fn asked(&self) -> Option<&[String; 2]> {
+        self.asked.as_ref()
+    }
+
+    /// Why the checks of this run could not be made.
+    pub fn failure(&self, run: Option<&RunView>) -> Option<&str> {
+        self.refitter.failure(run)
     }
 
     pub fn plots(&self) -> &PlotCache {

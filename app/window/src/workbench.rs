@@ -326,6 +326,23 @@ impl Workbench {
         self.latest_run.take_ended(run)
     }
 
+    /// Whether the run that waits for its verdict in the queue is the one that was checked last.
+    pub fn is_open_run_shown(&self) -> bool {
+        let checked = self.library.as_ref().ok().zip(self.latest_run.assessed(self.run()));
+        let queue = self.queue.queue();
+        checked.is_some_and(|(library, session)| queue.open_run_of(library, session).is_some())
+    }
+
+    /// Whether the run shown may be repeated now, or why not: the form has what it would start.
+    pub fn repeat_verdict(&self) -> Result<(), String> {
+        self.start_verdict()?;
+        let is_same = self.latest_run.asked() == Some(&self.form.asked());
+        require(
+            is_same,
+            "the form of Run asks for another specimen or protocol now; start it there",
+        )
+    }
+
     /// Draws the plots of the run.
     pub fn plots_ui(&mut self, ui: &mut Ui) {
         self.latest_run.plots_ui(ui, self.snapshot.run.as_ref());
@@ -379,12 +396,14 @@ impl Workbench {
         if !is_safe {
             self.operator(Operator::Stop);
         }
-        is_safe
+        is_safe && !self.queue.is_busy()
     }
 
     /// Whether a window that waited for the axis to rest may close now.
     pub fn may_close(&self) -> bool {
-        self.is_closing && (self.is_at_rest() || !self.runner.is_alive())
+        let is_safe = self.is_at_rest() || !self.runner.is_alive();
+        // A verdict that is being written is not lost.
+        self.is_closing && is_safe && !self.queue.is_busy()
     }
 
     fn is_at_rest(&self) -> bool {

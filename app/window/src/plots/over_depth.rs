@@ -81,19 +81,24 @@ pub struct DepthLines {
 }
 
 impl DepthLines {
-    /// Fetches the lines that were found, and starts a search where the view or the samples have changed.
-    pub fn update(
-        &mut self,
-        ctx: &Context,
-        lines: &[DepthLine<'_>],
-        [depth, force]: [&AxisRange; 2],
-    ) {
+    /// Fetches the lines that were found.
+    pub fn poll(&mut self, ctx: &Context) {
         if let Some(Some(mut found)) = self.job.poll() {
             let picture = found.picture.take();
             self.texture = picture
                 .map(|picture| ctx.load_texture("review-loops", picture, TextureOptions::LINEAR));
             self.found = Some(found);
         }
+    }
+
+    /// The same, and starts a search where the view or the samples have changed.
+    pub fn update(
+        &mut self,
+        ctx: &Context,
+        lines: &[DepthLine<'_>],
+        [depth, force]: [&AxisRange; 2],
+    ) {
+        self.poll(ctx);
         let Some(pixels) = self.pixels else { return };
         let key = Key {
             depth: depth.shown(),

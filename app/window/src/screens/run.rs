@@ -4,12 +4,12 @@ use super::after_stop::after_stop_ui;
 use super::approach::Approach;
 use super::form::CheckedPlan;
 use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
-use super::result;
 use super::results_panel::findings_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::weighing::weighing_ui;
+use super::{result, today};
 use crate::plots::course::CourseLimits;
 use crate::widgets::require;
 use crate::workers::{BackgroundTask, PathPurpose};
@@ -64,6 +64,7 @@ impl RunScreen {
     fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
+            workbench.latest_run.set_asked(workbench.form.asked());
             workbench.set_next_run(request);
         }
     }
@@ -107,6 +108,20 @@ impl RunScreen {
         };
         ProtocolFacts { library: &self.library, recovered }
     }
+}
+
+/// Refuses a start, on the page on which the run that has no verdict yet can be judged.
+fn refuse(workbench: &mut Workbench, reason: String) -> Reaction {
+    if workbench.queue.queue().open_run().is_none() {
+        workbench.refusal = Some(reason);
+        return Reaction::Show;
+    }
+    if workbench.is_open_run_shown() {
+        workbench.refusal = Some(reason);
+        return Reaction::ShowOther(result::SCREEN.name);
+    }
+    workbench.queue.refusal = Some(reason);
+    Reaction::ShowOther(today::SCREEN.name)
 }
 
 impl Screen for RunScreen {
@@ -189,13 +204,7 @@ impl Screen for RunScreen {
                 let request = workbench.ready_run();
                 let queue = &mut workbench.queue;
                 match request.map(|request| queue.start(&specimen, &protocol).map(|()| request)) {
-                    Some(Err(reason)) => {
-                        let is_unjudged = queue.queue().open_run().is_some();
-                        workbench.refusal = Some(reason);
-                        if is_unjudged {
-                            return Reaction::ShowOther(result::SCREEN.name);
-                        }
-                    }
+                    Some(Err(reason)) => return refuse(workbench, reason),
                     request => self.begin(request.and_then(Result::ok), workbench),
                 }
                 // What moves is to be seen.

@@ -146,13 +146,16 @@ pub fn numbers_ui(ui: &mut Ui, snapshot: &RunnerSnapshot) {
 
 /// Has a screen reader say force and depth of a run in progress now and then. Nothing is drawn.
 fn say_numbers(ui: &mut Ui, snapshot: &RunnerSnapshot) {
-    let Some(run) = run_in_progress(snapshot) else { return };
+    let id = Id::unique("said numbers");
+    let Some(run) = run_in_progress(snapshot) else {
+        return ui.data_mut(|data| data.remove::<SaidNumbers>(id));
+    };
     let number = |value: Option<f64>| number(value, 2);
     let force = number(run.derived.force.map(|force| force.0));
     let depth = number(run.derived.depth.map(|depth| depth.0));
     let now = ui.input(|input| input.time);
     let said = ui.data_mut(|data| {
-        let said = data.get_temp_mut_or_default::<SaidNumbers>(Id::unique("said numbers"));
+        let said = data.get_temp_mut_or_default::<SaidNumbers>(id);
         if said.words.is_empty() || now - said.at >= SAY_EVERY_SECS {
             *said = SaidNumbers { at: now, words: format!("force {force} N, depth {depth} mm") };
         }

@@ -77,7 +77,7 @@ pub fn quiet_ui(ui: &mut Ui, words: impl Into<String>) {
 pub fn alarm_ui(ui: &mut Ui, words: impl Into<String>) {
     let ink = tokens_of(ui).alarm_text;
     let shown = ui.add(Label::new(RichText::new(words).color(ink)).wrap());
-    announce(&shown, Live::Assertive);
+    announce(&shown, Live::Polite);
 }
 
 /// Has a screen reader say what stands there, whenever it changes.

@@ -57,7 +57,7 @@ impl Refitter {
     /// Fetches an answer, and starts when a run has ended. `library` has the daily checks of the rig.
     pub fn update(&mut self, ctx: &Context, run: Option<&RunView>, library: Option<&PathBuf>) {
         self.answer.poll();
-        let ended = run.filter(|run| run.outcome.is_some() && (has_ramp(run) || has_weighed(run)));
+        let ended = run.filter(|run| run.outcome.is_some() && has_result(run));
         let folder = ended.map(|run| &run.folder);
         if self.answer.is_busy() || self.session.as_ref() == folder {
             return;
@@ -70,8 +70,7 @@ impl Refitter {
         }
     }
 
-    /// Whether this run has ended and is or was checked.
-    pub fn is_of(&self, run: Option<&RunView>) -> bool {
+    fn is_of(&self, run: Option<&RunView>) -> bool {
         let ended = run.filter(|run| run.outcome.is_some()).map(|run| &run.folder);
         ended.is_some() && ended == self.session.as_ref()
     }
@@ -93,6 +92,11 @@ impl Refitter {
         self.answer.answer().filter(|_| self.is_of(run))?.as_ref().ok()
     }
 
+    /// Why the checks of this run could not be made.
+    pub fn failure(&self, run: Option<&RunView>) -> Option<&str> {
+        self.answer.answer().filter(|_| self.is_of(run))?.as_ref().err().map(String::as_str)
+    }
+
     /// The checks of this run, once they are made.
     pub fn quality(&self, run: Option<&RunView>) -> Option<&Assessment> {
         self.answer_of(run).map(|answer| &answer.quality)
@@ -102,6 +106,11 @@ impl Refitter {
     pub fn assessed(&self, run: Option<&RunView>) -> Option<&Path> {
         self.answer_of(run).and(self.session.as_deref())
     }
+}
+
+/// Whether a run pressed or weighed anything, and so has something to be judged.
+pub fn has_result(run: &RunView) -> bool {
+    has_ramp(run) || has_weighed(run)
 }
 
 /// Whether a run indented anything: nothing else can be fitted.

@@ -210,6 +210,11 @@ impl ProtocolForm {
     }
 
     /// Name or file of the protocol, as the queue has it.
+    /// Specimen and protocol that a start would run.
+    pub fn asked(&self) -> [String; 2] {
+        [self.specimen().to_owned(), self.source_name()]
+    }
+
     pub fn source_name(&self) -> String {
         match (&self.file, &self.protocol) {
             (Some(file), _) => file.display().to_string(),

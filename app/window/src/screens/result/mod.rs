@@ -57,6 +57,9 @@ impl ResultScreen {
 
 impl Screen for ResultScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        if let Some(reason) = &workbench.refusal {
+            alarm_ui(ui, reason);
+        }
         let Some(run) = workbench.run() else {
             section_ui(ui, "Result");
             placeholder_ui(ui, "no run yet; choose a protocol on the screen Run and start it");
@@ -69,13 +72,13 @@ impl Screen for ResultScreen {
             quiet_ui(ui, "the run is in progress; its result comes when it has ended");
             return;
         }
-        if let Some(reason) = &workbench.refusal {
-            alarm_ui(ui, reason);
-        }
         ended_ui(ui, run, quality, commands);
+        if let Some(reason) = latest.failure(Some(run)) {
+            alarm_ui(ui, format!("the run could not be checked: {reason}"));
+        }
         if let Some(session) = latest.assessed(Some(run)) {
-            let may_start = workbench.start_verdict();
-            self.verdict.ui(ui, session, &workbench.queue, &may_start, commands);
+            let may_repeat = workbench.repeat_verdict();
+            self.verdict.ui(ui, session, &workbench.queue, &may_repeat, commands);
         }
         if let Some(quality) = quality {
             quality::quality_ui(ui, quality);

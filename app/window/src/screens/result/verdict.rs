@@ -26,13 +26,13 @@ impl RunVerdict {
         &self.reason
     }
 
-    /// Draws it for a run that has ended; `may_start` says why it cannot be repeated now.
+    /// Draws it for a run that has ended; `may_repeat` says why it cannot be repeated now.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
         session: &Path,
         queue: &QueueDesk,
-        may_start: &Result<(), String>,
+        may_repeat: &Result<(), String>,
         commands: &mut Commands,
     ) {
         if self.session.as_deref() != Some(session) {
@@ -52,7 +52,7 @@ impl RunVerdict {
         let has_reason =
             require(!self.reason.trim().is_empty(), "to reject a run, give the reason");
         let can_reject = is_free.clone().and(has_reason);
-        let can_repeat = can_reject.clone().and_then(|()| may_start.clone());
+        let can_repeat = can_reject.clone().and_then(|()| may_repeat.clone());
         ui.horizontal(|ui| {
             if button_ui(ui, "Accept", "Ctrl+Enter", is_free.is_ok()) {
                 commands.push(UiCommand::AcceptRun);

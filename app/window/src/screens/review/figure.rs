@@ -123,6 +123,8 @@ fn lines(parts: Vec<Vec<[f64; 2]>>, ink: Ink) -> impl Iterator<Item = PlotSeries
     parts.into_iter().map(move |points| PlotSeries::line("", ink, WIDTH, points))
 }
 
+/// Columns of a small plot in a figure.
+const PLOT_PIXELS: f64 = 600.0;
 const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 fn over_time(stretches: &Stretches, x: [f64; 2], ink: Ink) -> impl Iterator<Item = PlotSeries> {
@@ -139,13 +141,27 @@ fn ink_of(subject: &ReviewSubject) -> Ink {
 }
 
 impl ReviewScreen {
+    /// Brings the lines over time of plots that are scrolled out of sight up to date.
+    fn update_hidden(&mut self) {
+        if self.view != View::SideBySide || self.side.is_over_depth {
+            return;
+        }
+        for subject in &mut self.subjects {
+            let window = subject.line_window(self.time.shown(), PLOT_PIXELS, self.time_origin);
+            subject.update(Quantity::Force, window);
+            subject.update_fit(window);
+        }
+    }
+
     /// Draws the buttons, where the view has a figure.
     pub(super) fn figure_ui(&mut self, ui: &mut Ui) {
         if ui.button("Copy figure").named("Copy figure").clicked() {
+            self.update_hidden();
             let figure = self.pending_figure();
             self.figure.copy(figure, ui.ctx());
         }
         if ui.button("Save figure...").named("Save figure").clicked() {
+            self.update_hidden();
             let figure = self.pending_figure();
             self.figure.save(figure, ui.ctx());
         }

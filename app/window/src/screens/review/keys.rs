@@ -51,13 +51,11 @@ impl ReviewScreen {
 
     /// Reads them; those that move a view only where there is one.
     pub(super) fn read_keys(&mut self, ctx: &Context, has_moves: bool) {
-        if ctx.egui_wants_keyboard_input() {
-            return;
-        }
-        if ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
+        let is_typing = ctx.text_edit_focused();
+        if !is_typing && ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
             self.undo();
         }
-        if !has_moves {
+        if !has_moves || ctx.egui_wants_keyboard_input() {
             return;
         }
         // The modifiers are the event's own: those of the frame may have been let go already.

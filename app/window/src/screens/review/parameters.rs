@@ -95,6 +95,11 @@ struct Row {
     rmse_mn: f64,
 }
 
+/// What was kept at a value is not a finding.
+fn is_finding(parameter: &FittedParameter) -> bool {
+    !parameter.is_fixed && parameter.value.is_finite()
+}
+
 /// The sessions that are fitted, group by group, and the parameters of the first.
 struct Parameters {
     names: Vec<FittedParameter>,
@@ -117,8 +122,7 @@ impl Parameters {
             for name in &names {
                 let found: Vec<Option<&FittedParameter>> =
                     fitted.iter().map(|(_, report)| report.parameter(&name.name)).collect();
-                // What was kept at a value is not a finding.
-                let known = |one: &&FittedParameter| !one.is_fixed && one.value.is_finite();
+                let known = |one: &&FittedParameter| is_finding(one);
                 let values: Vec<f64> =
                     found.iter().flatten().copied().filter(known).map(|one| one.value).collect();
                 let mut far = deviations(&values).unwrap_or_default().into_iter();
@@ -145,15 +149,16 @@ impl Parameters {
 
     /// The rows sorted by a column; those without a value there come last either way.
     fn sort(&mut self, subjects: &[ReviewSubject], by: Option<(usize, bool)>) {
-        let Some((column, is_reversed)) = by else { return };
-        let order = |order: Ordering| if is_reversed { order.reverse() } else { order };
         let last = self.names.len() + 2;
+        // The fits of another model may have fewer parameters.
+        let Some((column, is_reversed)) = by.filter(|(column, _)| *column <= last) else { return };
+        let order = |order: Ordering| if is_reversed { order.reverse() } else { order };
         self.rows.sort_by(|a, b| match column {
             0 => order(a.group.cmp(&b.group)),
             1 => order(subjects[a.index].name.cmp(&subjects[b.index].name)),
             column if column == last => order(a.rmse_mn.total_cmp(&b.rmse_mn)),
             column => {
-                let value = |row: &Row| Some(row.values[column - 2].as_ref()?.parameter.value);
+                let value = |row: &Row| Some(row.values.get(column - 2)?.as_ref()?.parameter.value);
                 match (value(a), value(b)) {
                     (Some(a), Some(b)) => order(a.total_cmp(&b)),
                     (a, b) => b.is_some().cmp(&a.is_some()),
@@ -235,7 +240,8 @@ impl ReviewScreen {
                 .iter()
                 .map(|rows| {
                     let known = rows.iter().filter_map(|row| row.values[number].as_ref());
-                    let known: Vec<f64> = known.map(|one| one.parameter.value).collect();
+                    let known = known.map(|one| &one.parameter).filter(|one| is_finding(one));
+                    let known: Vec<f64> = known.map(|one| one.value).collect();
                     let median = median(&known).filter(|_| known.len() > 2);
                     let dots = rows.iter().map(|row| self.dot(row, number, tokens)).collect();
                     DistributionLane { dots, median }

@@ -167,6 +167,8 @@ impl ReviewScreen {
         let space = ui.available_size() - vec2(ui.spacing().scroll.allocated_width(), 4.0);
         let grid = SmallGrid::new(space, &counts, heading, axes);
         self.side.depth_lines.retain(|id, _| self.subjects.iter().any(|one| one.id == *id));
+        // Those out of sight too: a search that has ended makes room for the next.
+        self.side.depth_lines.values_mut().for_each(|lines| lines.poll(ui.ctx()));
         let mut cells = Vec::new();
         ScrollArea::vertical()
             .id_salt("side_by_side")

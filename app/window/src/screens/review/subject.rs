@@ -94,7 +94,10 @@ impl ReviewSubject {
 
     /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
     pub fn fifths(&self) -> u64 {
-        if self.is_settled() { u64::MAX } else { (self.recording.share() * 5.0) as u64 }
+        match self.is_settled() {
+            true => (1 << 63) | self.recording.version,
+            false => (self.recording.share() * 5.0) as u64,
+        }
     }
 
     /// Takes a fit that was made of it.
