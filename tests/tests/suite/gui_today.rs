@@ -9,7 +9,7 @@ use palpate_sessions::specimen_queue::{
 };
 use palpate_sessions::{DataQuality, Edits, SessionSummary};
 use palpate_tests::flow::WindowFlow;
-use palpate_window::screens::{run, today};
+use palpate_window::screens::{result, run, today};
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
@@ -218,4 +218,35 @@ fn a_refused_change_does_not_hold_up_the_day_and_a_blinded_label_is_not_shown() 
     assert_eq!(queue(&flow).open_run().unwrap().wanted.specimen, "pig 1");
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
     flow.wait_for_words("Accepted.");
+}
+
+#[test]
+fn a_start_that_waits_for_a_verdict_leads_to_the_run_that_it_is_about() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    show_today(&mut flow);
+    flow.type_into("names", "pig 1, pig 2");
+    flow.click("Add");
+    flow.wait_for_words("2 waiting");
+    flow.click("Measure the next specimen");
+    flow.window.run_steps(3);
+    shorten(&mut flow);
+    start(&mut flow);
+    // The form asks for something else now, and Repeat would start that.
+    flow.show(&run::SCREEN);
+    flow.type_into("specimen", "guest");
+    flow.show(&result::SCREEN);
+    flow.type_into("reason", "the specimen slipped");
+    assert!(flow.is_enabled("Reject") && !flow.is_enabled("Repeat"));
+    assert!(flow.says("another specimen or protocol"));
+    start(&mut flow);
+    // The page of the guest cannot judge the pig.
+    flow.show(&run::SCREEN);
+    flow.type_into("specimen", "pig 1");
+    flow.window.key_press(Key::F5);
+    flow.window.run_steps(3);
+    assert!(flow.says("the run of pig 1 has no verdict yet"));
+    assert!(flow.says("Measured, without a verdict"));
+    flow.click("Accept");
+    flow.wait_for_words("1 waiting, 1 accepted");
+    assert_eq!(queue(&flow).find("pig 1").unwrap().state, SpecimenState::Accepted);
 }

@@ -366,3 +366,23 @@ fn refusals_ui(ui: &mut Ui, subjects: &[ReviewSubject]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model with fewer parameters leaves the order of a column that is gone.
+    #[test]
+    fn a_column_that_is_gone_sorts_nothing() {
+        let mut found = Parameters { names: Vec::new(), rows: Vec::new() };
+        for (index, rmse_mn) in [(0, 2.0), (1, 1.0)] {
+            let (group, short) = (String::new(), String::new());
+            found.rows.push(Row { index, group, short, values: Vec::new(), rmse_mn });
+        }
+        let order = |found: &Parameters| found.rows.iter().map(|row| row.index).collect::<Vec<_>>();
+        found.sort(&[], Some((9, false)));
+        assert_eq!(order(&found), [0, 1]);
+        found.sort(&[], Some((2, false)));
+        assert_eq!(order(&found), [1, 0], "by the residual, the last column");
+    }
+}
