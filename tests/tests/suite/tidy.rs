@@ -7,10 +7,11 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 14] = [
+const PACKAGES: [&str; 15] = [
     "model",
     "model/rheology",
     "model/haptics",
+    "model/indentation",
     "drivers",
     "drivers/emulators",
     "sessions",
