@@ -165,7 +165,10 @@ impl SpecimenQueue {
             QueueChange::Begun { number, session } => self.begin(*number, session)?,
             QueueChange::Judged { number, verdict } => self.judge(*number, *verdict)?,
         }
-        if let (true, Some(number)) = (change.needs_reason(), number_of(change)) {
+        // The reason of an earlier rejection is not one for accepting.
+        let is_accepted =
+            matches!(change, QueueChange::Judged { verdict: QueueVerdict::Accept, .. });
+        if let (true, Some(number)) = (change.needs_reason() || is_accepted, number_of(change)) {
             let index = self.index(number)?;
             record.reason.clone_into(&mut self.items[index].reason);
         }

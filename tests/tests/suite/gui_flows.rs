@@ -359,3 +359,22 @@ fn a_screen_reader_is_told_state_and_numbers_as_they_change() {
     // What merely stands there is read when somebody comes to it.
     assert_eq!(live("depth (mm)"), Live::Off);
 }
+
+#[test]
+fn what_is_typed_into_a_number_that_was_clicked_takes_its_place() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    for (name, text) in [("hold", "30"), ("speed", "1.5")] {
+        flow.window.get_by_label(name).click();
+        flow.window.run_steps(3);
+        flow.window.get_by_label(name).type_text(text);
+        flow.window.run_steps(2);
+        assert_eq!(flow.window.get_by_label(name).value().as_deref(), Some(text));
+    }
+    // A second click places the caret as usual.
+    flow.window.get_by_label("speed").click();
+    flow.window.run_steps(3);
+    flow.window.get_by_label("speed").type_text("0");
+    flow.window.run_steps(2);
+    let value = flow.window.get_by_label("speed").value().unwrap();
+    assert!(value.len() == 4 && value.contains('0'), "{value}");
+}

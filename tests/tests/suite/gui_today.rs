@@ -73,7 +73,7 @@ fn a_day_of_specimens_is_measured_repeated_rejected_and_counted() {
     flow.window.key_press(Key::F5);
     flow.window.run_steps(3);
     assert!(flow.says("has no verdict yet"));
-    // Accepted: the day goes on with the next one.
+    // Accepted: the day goes on with the next one, with the values that were typed.
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Enter);
     flow.wait_for_words("2 waiting, 1 accepted");
     // A start by a slip is refused, for this specimen is done.
@@ -84,7 +84,7 @@ fn a_day_of_specimens_is_measured_repeated_rejected_and_counted() {
     // The scanner's field has the keys, without a click.
     scan(&mut flow, "pig 2");
     assert_eq!(flow.window.get_by_label("specimen").value().as_deref(), Some("pig 2"));
-    shorten(&mut flow);
+    assert_eq!(flow.window.get_by_label("hold").value().as_deref(), Some("1"));
     start(&mut flow);
     assert!(!flow.is_enabled("Repeat"));
     flow.type_into("reason", "the specimen slipped");

@@ -5,8 +5,8 @@ use super::preview_view::{acknowledgement_ui, preview_ui};
 use super::run_panes::RunPane;
 use crate::command::{Commands, UiCommand};
 use crate::widgets::{
-    NamedControl, alarm_ui, form_label, quiet_ui, reason_button, section_ui, small_alarm_ui,
-    small_ui, tick_box, tokens_of,
+    NamedControl, alarm_ui, form_label, quiet_ui, reason_button, section_ui, select_on_entry,
+    small_alarm_ui, small_ui, tick_box, tokens_of,
 };
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
@@ -109,6 +109,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             };
             let is_optional = field.parameter.default.content == ValueContent::None;
             let input = ui.add(input.hint_text(if is_optional { "none" } else { "" }));
+            select_on_entry(&input, &field.text);
             let input = input.labelled_by(label.id).named(&field.parameter.name);
             let input = input.on_hover_text(&hint);
             if !is_wide {

@@ -82,6 +82,11 @@ impl RunScreen {
         workbench.queue.refusal = None;
         workbench.form.take_labels(&item.wanted, workbench.queue.queue().is_blinded);
         let protocol = &item.wanted.protocol;
+        // Values that were typed for it stay: the queue says that it takes the protocol as it is on Run.
+        if workbench.form.source_name() == *protocol && workbench.form.protocol.is_ok() {
+            self.middle = RunPane::Course;
+            return Reaction::Show;
+        }
         match BUILT_IN.iter().find(|(name, _)| name == protocol) {
             Some((name, _)) => self.take_protocol(name, workbench),
             None => self.read(Some(Path::new(protocol)), ctx, workbench),

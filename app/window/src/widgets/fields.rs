@@ -3,6 +3,9 @@
 use super::buttons::steady;
 use super::places::NamedControl;
 use super::text::{quiet_ui, small_alarm_ui, tokens_of};
+use eframe::egui::text::CCursor;
+use eframe::egui::text::CCursorRange;
+use eframe::egui::text_edit::TextEditState;
 use eframe::egui::{
     Align, Align2, ComboBox, Key, Label, Layout, Response, RichText, TextEdit, Ui, vec2,
 };
@@ -94,6 +97,7 @@ pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityFiel
         let label = form_label(ui, name);
         let input = TextEdit::singleline(&mut field.text).desired_width(76.0).char_limit(24);
         let input = ui.add(input.align(Align2::RIGHT_CENTER));
+        select_on_entry(&input, &field.text);
         ui.label(RichText::new(unit).color(tokens.text_quiet));
         input.labelled_by(label.id).named(name).changed()
     };
@@ -102,6 +106,25 @@ pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityFiel
         small_alarm_ui(ui, reason);
     }
     has_changed
+}
+
+/// Selects all of a field that has just been entered, by key or by a click, so that what is typed takes its place.
+pub fn select_on_entry(input: &Response, text: &str) {
+    let (ctx, id) = (&input.ctx, input.id.with("entered"));
+    if input.gained_focus() {
+        ctx.data_mut(|data| data.insert_temp(id, true));
+    }
+    // A press places the caret, and its release ends that.
+    let is_entered = ctx.data(|data| data.get_temp::<bool>(id).is_some());
+    if !is_entered || ctx.input(|input| input.pointer.any_down()) {
+        return;
+    }
+    ctx.data_mut(|data| data.remove::<bool>(id));
+    if let Some(mut state) = TextEditState::load(ctx, input.id) {
+        let all = CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count()));
+        state.cursor.set_char_range(Some(all));
+        state.store(ctx, input.id);
+    }
 }
 
 /// A label of fixed width, so that inputs stand in one column.

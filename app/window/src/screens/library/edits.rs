@@ -135,6 +135,13 @@ impl EditPanel {
     }
 
     /// Draws the fields and buttons; `sessions` are the folders of those chosen.
+    /// Takes the operator of Run for the author, until another name is typed.
+    pub fn offer_author(&mut self, operator: &str) {
+        if !operator.is_empty() && self.by == author(None) {
+            operator.clone_into(&mut self.by);
+        }
+    }
+
     pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Edit sessions");

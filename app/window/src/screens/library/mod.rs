@@ -263,7 +263,8 @@ impl Screen for LibraryScreen {
         }
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        self.edits.offer_author(workbench.form.label_text("operator"));
         let chosen = self.chosen();
         if chosen.is_empty() {
             section_ui(ui, "Session");

@@ -59,6 +59,13 @@ impl AnalysesPanel {
         Self { library: library.ok(), by: author(None), ..Self::default() }
     }
 
+    /// Takes the operator of Run for the author, until another name is typed.
+    pub fn offer_author(&mut self, operator: &str) {
+        if !operator.is_empty() && self.by == author(None) {
+            operator.clone_into(&mut self.by);
+        }
+    }
+
     /// Fetches what threads have answered.
     pub fn poll(&mut self, ctx: &Context) {
         self.own.poll();

@@ -266,7 +266,8 @@ impl Screen for ReviewScreen {
         self.draw_middle(ui);
     }
 
-    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        self.analyses.offer_author(workbench.form.label_text("operator"));
         self.draw_right(ui);
         let shown: Vec<ReviewSource> = self.subjects.iter().map(|one| one.source.clone()).collect();
         self.analyses.set_shown(&shown);

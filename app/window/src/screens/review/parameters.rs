@@ -181,7 +181,7 @@ impl ReviewScreen {
         let strips = ScrollArea::vertical().id_salt("strips").auto_shrink([false, true]);
         let strips = strips.max_height(0.5 * ui.available_height());
         let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, &groups, &found)).inner;
-        let words = "blue is below and orange above the median of its group; a triangle or ring is an outlier";
+        let words = "blue is below and orange above the median of its group; a triangle or red ring is an outlier, a black ring is in front";
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
         ui.add(Label::new(words).truncate()).on_hover_text(MEANING);
         found.sort(&self.subjects, self.parameter_table.sorted);

@@ -3,6 +3,7 @@
 use super::super::report::{BudgetEntry, FitReport, JointReport};
 use super::{JointChange, StatedTerms, SystematicError, SystematicUncertainty};
 use palpate_model::calibration::UncertaintyTerm;
+use palpate_model::estimate::FittedParameter;
 
 /// Half of the 95 % interval of a standard normal error.
 const NORMAL975: f64 = 1.959_963_985;
@@ -103,7 +104,23 @@ impl FitReport {
     pub fn with_systematic(mut self, systematic: &SystematicUncertainty) -> Self {
         self.add_systematic(systematic);
         self.findings.push(systematic.sentence());
+        self.findings.extend(self.displaced_sentence());
         self
+    }
+
+    /// Which estimates lie outside of their own total interval, because it uses what the record tells of the calibration.
+    fn displaced_sentence(&self) -> Option<String> {
+        let is_outside = |one: &&FittedParameter| {
+            one.total95.is_some_and(|[low, high]| one.value < low || one.value > high)
+        };
+        let names = self.parameters.iter().filter(is_outside).map(|one| one.name.as_str());
+        let names: Vec<&str> = names.collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "taken with an exact calibration, {} would be outside of the total 95 % interval: this record shows an error of the calibration, and the interval and its middle allow for it; quote the middle, or calibrate the load cell again",
+                names.join(", ")
+            )
+        })
     }
 
     fn add_systematic(&mut self, systematic: &SystematicUncertainty) {
@@ -138,6 +155,8 @@ impl JointReport {
     pub fn with_systematic(mut self, systematic: &[SystematicUncertainty]) -> Self {
         for (record, own) in self.records.iter_mut().zip(systematic) {
             record.report.add_systematic(own);
+            let displaced = record.report.displaced_sentence();
+            record.report.findings.extend(displaced);
         }
         self
     }
