@@ -117,7 +117,7 @@ impl FitReport {
         let names: Vec<&str> = names.collect();
         (!names.is_empty()).then(|| {
             format!(
-                "taken with an exact calibration, {} would be outside of the total 95 % interval: this record shows an error of the calibration, and the interval and its middle allow for it; quote the middle, or calibrate the load cell again",
+                "the values of {} take the calibration as exact and lie outside of their total 95 % intervals, which use what this record shows of the calibration's error; quote the middle of the total interval, or calibrate the load cell again",
                 names.join(", ")
             )
         })
