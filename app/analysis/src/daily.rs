@@ -137,14 +137,14 @@ fn zero_of(
 }
 
 /// Checks from which control limits are found: two months of working days.
-pub const CONTROLLED: usize = 40;
+pub const CONTROL_CHECKS: usize = 40;
 
 /// Control limits of the deviations before the last, and what the last ones show; `None` of too few.
 #[must_use]
 pub fn control_limits(
     known: &[DailyCheckDeviation],
 ) -> Option<(ControlLimits, Option<ControlSignal>)> {
-    let known = &known[known.len().saturating_sub(CONTROLLED)..];
+    let known = &known[known.len().saturating_sub(CONTROL_CHECKS)..];
     let readings: Vec<f64> = known.iter().map(|one| one.newtons).collect();
     let (_, before) = readings.split_last()?;
     let limits = ControlLimits::of(before)?;

@@ -1,7 +1,7 @@
 //! What a technician asks first: was the rig checked today, which calibration is in use, is there space, what was measured.
 
 use crate::catalog_search::{CatalogSearch, search, update};
-use crate::daily::{CONTROLLED, past_checks, trends};
+use crate::daily::{CONTROL_CHECKS, past_checks, trends};
 use crate::progress::Progress;
 use chrono::{DateTime, Local, NaiveTime, Utc};
 use palpate_model::control_chart::READINGS_MIN;
@@ -38,7 +38,7 @@ pub fn read_today(
     update(library, progress)?;
     // Fewer have no limits, and their sessions need not be read.
     let past = match checks.len() > READINGS_MIN {
-        true => past_checks(library, rig, CONTROLLED, progress)?,
+        true => past_checks(library, rig, CONTROL_CHECKS, progress)?,
         false => Vec::new(),
     };
     let warnings = trends(&past).into_iter().filter(|(_, is_warning)| *is_warning);

@@ -15,10 +15,10 @@ pub struct LatestRun {
     /// The start that the plots are of.
     plotted: u64,
     refitter: Refitter,
-    /// The session whose end was told.
-    told: Option<PathBuf>,
+    /// The session whose end was reported.
+    reported_end: Option<PathBuf>,
     /// Specimen and protocol of the last start.
-    asked: Option<[String; 2]>,
+    last_start: Option<[String; 2]>,
 }
 
 impl LatestRun {
@@ -27,8 +27,8 @@ impl LatestRun {
             plots: PlotCache::for_calibration(calibration),
             plotted: 0,
             refitter: Refitter::default(),
-            told: None,
-            asked: None,
+            reported_end: None,
+            last_start: None,
         }
     }
 
@@ -54,20 +54,21 @@ impl LatestRun {
     /// Whether a run that has a result has just ended: true once for each.
     pub fn take_ended(&mut self, run: Option<&RunView>) -> bool {
         let ended = run.filter(|run| run.outcome.is_some() && has_result(run));
-        let Some(ended) = ended.filter(|run| self.told.as_ref() != Some(&run.folder)) else {
+        let Some(ended) = ended.filter(|run| self.reported_end.as_ref() != Some(&run.folder))
+        else {
             return false;
         };
-        self.told = Some(ended.folder.clone());
+        self.reported_end = Some(ended.folder.clone());
         true
     }
 
-    pub fn set_asked(&mut self, asked: [String; 2]) {
-        self.asked = Some(asked);
+    pub fn set_last_start(&mut self, start: [String; 2]) {
+        self.last_start = Some(start);
     }
 
     /// Specimen and protocol of the last start.
-    pub fn asked(&self) -> Option<&[String; 2]> {
-        self.asked.as_ref()
+    pub fn last_start(&self) -> Option<&[String; 2]> {
+        self.last_start.as_ref()
     }
 
     /// Why the checks of this run could not be made.

@@ -336,7 +336,7 @@ impl Workbench {
     /// Whether the run shown may be repeated now, or why not: the form has what it would start.
     pub fn repeat_verdict(&self) -> Result<(), String> {
         self.start_verdict()?;
-        let is_same = self.latest_run.asked() == Some(&self.form.asked());
+        let is_same = self.latest_run.last_start() == Some(&self.form.next_start());
         require(
             is_same,
             "the form of Run asks for another specimen or protocol now; start it there",

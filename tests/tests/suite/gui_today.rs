@@ -30,6 +30,16 @@ fn scan(flow: &mut WindowFlow, name: &str) {
     flow.window.run_steps(3);
 }
 
+/// Puts two specimens into the queue and the first of them into the form of Run.
+fn take_first_of_two(flow: &mut WindowFlow) {
+    show_today(flow);
+    flow.type_into("names", "pig 1, pig 2");
+    flow.click("Add");
+    flow.wait_for_words("2 waiting");
+    flow.click("Measure the next specimen");
+    flow.window.run_steps(3);
+}
+
 /// A ramp and hold that is soon over.
 fn shorten(flow: &mut WindowFlow) {
     for (name, text) in [("speed", "3"), ("depth", "6"), ("hold", "1")] {
@@ -146,12 +156,7 @@ fn specimens_added_elsewhere_are_there_when_the_page_is_shown() {
 #[test]
 fn a_window_that_ends_in_mid_run_leaves_the_specimen_to_be_judged() {
     let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
-    show_today(&mut flow);
-    flow.type_into("names", "pig 1, pig 2");
-    flow.click("Add");
-    flow.wait_for_words("2 waiting");
-    flow.click("Measure the next specimen");
-    flow.window.run_steps(3);
+    take_first_of_two(&mut flow);
     flow.window.key_press(Key::F5);
     flow.wait_for_phase(Phase::Contact);
     flow.wait("the line of the journal", |_| true);
@@ -223,12 +228,7 @@ fn a_refused_change_does_not_hold_up_the_day_and_a_blinded_label_is_not_shown() 
 #[test]
 fn a_start_that_waits_for_a_verdict_leads_to_the_run_that_it_is_about() {
     let mut flow = WindowFlow::open(TimeScale::Max);
-    show_today(&mut flow);
-    flow.type_into("names", "pig 1, pig 2");
-    flow.click("Add");
-    flow.wait_for_words("2 waiting");
-    flow.click("Measure the next specimen");
-    flow.window.run_steps(3);
+    take_first_of_two(&mut flow);
     shorten(&mut flow);
     start(&mut flow);
     // The form asks for something else now, and Repeat would start that.

@@ -64,7 +64,7 @@ impl RunScreen {
     fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
-            workbench.latest_run.set_asked(workbench.form.asked());
+            workbench.latest_run.set_last_start(workbench.form.next_start());
             workbench.set_next_run(request);
         }
     }

@@ -27,7 +27,7 @@ pub fn top_bar_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, activity: &Activity, s
         badge_ui(ui, activity, vec2(146.0, HEIGHT));
         ui.add_space(6.0);
         run_ui(ui, snapshot.run.as_ref(), specimen);
-        say_numbers(ui, snapshot);
+        announce_numbers(ui, snapshot);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let stop = stop_ui(ui, is_motion_possible(snapshot));
             let buttons = StopButtons { stop, halt: halt_ui(ui) };
@@ -145,36 +145,37 @@ pub fn numbers_ui(ui: &mut Ui, snapshot: &RunnerSnapshot) {
 }
 
 /// Has a screen reader say force and depth of a run in progress now and then. Nothing is drawn.
-fn say_numbers(ui: &mut Ui, snapshot: &RunnerSnapshot) {
-    let id = Id::unique("said numbers");
+fn announce_numbers(ui: &mut Ui, snapshot: &RunnerSnapshot) {
+    let id = Id::unique("announced numbers");
     let Some(run) = run_in_progress(snapshot) else {
-        return ui.data_mut(|data| data.remove::<SaidNumbers>(id));
+        return ui.data_mut(|data| data.remove::<AnnouncedNumbers>(id));
     };
     let number = |value: Option<f64>| number(value, 2);
     let force = number(run.derived.force.map(|force| force.0));
     let depth = number(run.derived.depth.map(|depth| depth.0));
     let now = ui.input(|input| input.time);
-    let said = ui.data_mut(|data| {
-        let said = data.get_temp_mut_or_default::<SaidNumbers>(id);
-        if said.words.is_empty() || now - said.at >= SAY_EVERY_SECS {
-            *said = SaidNumbers { at: now, words: format!("force {force} N, depth {depth} mm") };
+    let words = ui.data_mut(|data| {
+        let said = data.get_temp_mut_or_default::<AnnouncedNumbers>(id);
+        if said.words.is_empty() || now - said.at >= ANNOUNCE_EVERY_SECS {
+            *said =
+                AnnouncedNumbers { at: now, words: format!("force {force} N, depth {depth} mm") };
         }
         said.words.clone()
     });
     let response = ui.allocate_response(Vec2::ZERO, Sense::empty());
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &words));
     announce(&response, Live::Polite);
 }
 
-/// What was said last, and when in s of the window's clock.
+/// What was announced last, and when in s of the window's clock.
 #[derive(Clone, Debug, Default)]
-struct SaidNumbers {
+struct AnnouncedNumbers {
     at: f64,
     words: String,
 }
 
 /// A sentence of two numbers takes a screen reader about four seconds.
-const SAY_EVERY_SECS: f64 = 8.0;
+const ANNOUNCE_EVERY_SECS: f64 = 8.0;
 
 /// A number of fixed decimals, or dashes where there is none. Minus zero is zero.
 fn number(value: Option<f64>, decimals: usize) -> String {

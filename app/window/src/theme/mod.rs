@@ -38,7 +38,7 @@ fn fonts() -> FontDefinitions {
     fonts
 }
 
-/// An icon as text; whatever has it needs an accessible name, since nobody can read an icon aloud.
+/// An icon as text; whatever has it needs an accessible name, since a screen reader cannot read an icon.
 #[must_use]
 pub fn icon_text(icon: Icon) -> RichText {
     let font = FontId::new(ICON_SIZE, FontFamily::Name(ICONS.into()));

@@ -211,7 +211,7 @@ impl ProtocolForm {
 
     /// Name or file of the protocol, as the queue has it.
     /// Specimen and protocol that a start would run.
-    pub fn asked(&self) -> [String; 2] {
+    pub fn next_start(&self) -> [String; 2] {
         [self.specimen().to_owned(), self.source_name()]
     }
 
