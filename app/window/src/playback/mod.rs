@@ -5,7 +5,7 @@ mod transport;
 
 use crate::command::{Commands, UiCommand};
 use crate::plots::PlotCache;
-use crate::screens::results_panel::findings_ui;
+use crate::screens::live_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
 use crate::shell::event_log::{EventLog, FOLDED_HEIGHT};
 use crate::shell::panels::frame;

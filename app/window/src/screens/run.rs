@@ -3,8 +3,8 @@
 use super::after_stop::after_stop_ui;
 use super::approach::Approach;
 use super::form::CheckedPlan;
+use super::live_panel::findings_ui;
 use super::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
-use super::results_panel::findings_ui;
 use super::rig_panel::rig_ui;
 use super::run_panes::{Chooser, RunPane, expected_ui, first_view, is_offered, views_ui};
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};

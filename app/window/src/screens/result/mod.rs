@@ -5,8 +5,8 @@ mod verdict;
 
 use super::after_stop::ended_ui;
 use super::exact_fit::exact_ui;
+use super::live_panel::{cycles_ui, facts_ui};
 use super::parameters::parameters_ui;
-use super::results_panel::{cycles_ui, facts_ui};
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::today;
 use super::weighing::weighing_ui;
