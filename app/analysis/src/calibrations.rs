@@ -13,7 +13,7 @@ use thiserror::Error;
 
 /// Calibrations of the library with their assessment, and the one just stored.
 pub struct CalibrationOverview {
-    /// The rig's own first, then those of the library by identifier.
+    /// The rig's own first, where it was opened with that, then those of the library by identifier.
     pub calibrations: Vec<CalibrationView>,
     /// Reasons for each calibration that cannot be read.
     pub unreadable: Vec<String>,
@@ -29,6 +29,8 @@ pub struct CalibrationView {
     pub details: Result<(CalibrationDetails, [Plot; 4]), String>,
     /// Reasons against using it on its rig.
     pub doubts: Vec<String>,
+    /// It is not from the library.
+    pub comes_with_rig: bool,
 }
 
 impl CalibrationView {
@@ -46,11 +48,12 @@ impl CalibrationView {
             }),
             entry,
             calibration,
+            comes_with_rig: false,
         }
     }
 }
 
-/// Reads the library. `own` is the rig's own calibration.
+/// Reads the library. `own` is the calibration with which the rig was opened: its own, or one of the library.
 pub fn read(
     library: &Path,
     own: (Calibration, String),
@@ -59,12 +62,17 @@ pub fn read(
     let (own, rig) = own;
     let now = wall_now();
     let shelf = CalibrationStore::open(library);
-    let entry = CalibrationEntry::built_in(&own);
-    let mut shown = vec![CalibrationView {
-        // The calibration that comes with the rig needs no date.
-        doubts: Vec::new(),
-        ..CalibrationView::of(entry, own, &rig)
-    }];
+    let is_kept = shelf.documents.iter().any(|stored| stored.document == own);
+    let mut shown = Vec::new();
+    if !is_kept {
+        let entry = CalibrationEntry::built_in(&own);
+        shown.push(CalibrationView {
+            // The calibration that comes with the rig needs no date.
+            doubts: Vec::new(),
+            comes_with_rig: true,
+            ..CalibrationView::of(entry, own, &rig)
+        });
+    }
     shown.extend(shelf.documents.iter().map(|stored| {
         let age = age_days(&stored.document, now.into());
         CalibrationView::of(

@@ -43,7 +43,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     };
     let plan = plan(args.mass, &labels)?;
     let bench = super::rig::open(&args.rig)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let refusal = bench.calibration.check_refusal(args.mass);
     if let Some(reason) = refusal.map_err(Failure::usage)? {
         return Err(Failure::usage(reason));

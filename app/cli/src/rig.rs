@@ -95,7 +95,8 @@ pub struct RigArgs {
     /// Furthest position from home, in mm; set it a little before the base, so that no search meets it
     #[arg(long, value_name = "MM")]
     pub travel_max: Option<f64>,
-    /// Read forces with this calibration: a name or id of the library, or a file
+    /// Read forces with this calibration: a name or id of the library, or a file; without it the one in force for the rig,
+    /// or the rig's own
     #[arg(long, value_name = "NAME|FILE")]
     pub calibration: Option<String>,
     /// Simulated rig: write the true parameters, contact position and load-cell curve to this new file at the end
@@ -132,6 +133,8 @@ pub struct OpenRig {
     pub calibration: Calibration,
     /// Reasons to doubt that calibration, one sentence each.
     pub doubts: Vec<String>,
+    /// Says which calibration of the library it is, where nobody named one.
+    pub from_library: Option<String>,
     /// Interlock thresholds.
     pub limits: Limits,
     /// Lock a named rig against other programs.
@@ -161,16 +164,30 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         None => Vec::new(),
     };
     let limits = Limits::for_travel(travel(args, rig.description().travel)?);
-    // The built-in one belongs to its rig.
-    let (calibration, doubts) = match &args.calibration {
+    // The cell of the ideal rig is straight: a curve that the library has is not of it.
+    let (source, unreadable) = match (&args.calibration, settings.profile) {
+        (None, SimProfile::Ideal) => (None, Vec::new()),
+        (name, _) => CalibrationSource::wanted(name.as_deref(), &rig.description().name)?,
+    };
+    let from_library = remark(args, source.as_ref());
+    let (calibration, mut doubts) = match source {
         None => (palpate_drivers::sim::calibration(settings.profile), Vec::new()),
-        Some(name) => {
-            let source = CalibrationSource::find(name)?;
+        Some(source) => {
             let doubts = source.doubts(&rig.description().name);
             (source.calibration, doubts)
         }
     };
-    Ok(OpenRig { rig, calibration, doubts, limits, locks })
+    doubts.extend(unreadable);
+    Ok(OpenRig { rig, calibration, doubts, from_library, limits, locks })
+}
+
+fn remark(args: &RigArgs, source: Option<&CalibrationSource>) -> Option<String> {
+    let source = source.filter(|_| args.calibration.is_none())?;
+    Some(format!(
+        "forces are read with '{}' ({}), the calibration in force for this rig; --calibration takes another",
+        source.calibration.name,
+        source.id.as_deref().unwrap_or_default()
+    ))
 }
 
 /// Opens the rig that a file describes.
@@ -184,35 +201,23 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         ));
     }
     // A wrong name is refused before anything is opened.
-    let source = args.calibration.as_deref().map(CalibrationSource::find).transpose()?;
-    let (rig, locks) = open_rig_file(&args.rig)?;
-    let missing = || {
-        format!("the load cell of {} has no calibration; give --calibration NAME or FILE", args.rig)
-    };
-    calibrated(args, rig, locks, source, missing)
-}
-
-/// Opens a rig by the name that was chosen in a window. If its load cell is not calibrated, the calibration in force for
-/// that rig is used.
-pub(super) fn open_in_window(name: &str) -> Result<OpenRig, Failure> {
-    let args = RigArgs { rig: name.to_owned(), ..RigArgs::default() };
-    if !palpate_drivers::is_rig_file(name) {
-        return open(&args);
+    if let Some(name) = &args.calibration {
+        CalibrationSource::find(name)?;
     }
-    let (rig, locks) = open_rig_file(name)?;
-    let is_calibrated = rig.newtons_per_volt().is_some();
-    let (source, unreadable) = match is_calibrated {
-        true => (None, Vec::new()),
-        false => CalibrationSource::in_force(&rig.description().name)?,
+    let (rig, locks) = open_rig_file(&args.rig)?;
+    // A load cell that is calibrated itself needs no other calibration, but may have one.
+    let (source, unreadable) = match (&args.calibration, rig.newtons_per_volt()) {
+        (None, Some(_)) => (None, Vec::new()),
+        (name, _) => CalibrationSource::wanted(name.as_deref(), &rig.description().name)?,
     };
-    let missing = || {
-        format!(
-            "the library has no calibration of this rig; start 'palpate window --rig {name} --calibration thesis' and measure one with weights"
-        )
-    };
-    let mut bench = calibrated(&args, rig, locks, source, missing)?;
+    let mut bench = calibrated(args, rig, locks, source)?;
     bench.doubts.extend(unreadable);
     Ok(bench)
+}
+
+/// Opens a rig by the name that was chosen in a window.
+pub(super) fn open_in_window(name: &str) -> Result<OpenRig, Failure> {
+    open(&RigArgs { rig: name.to_owned(), ..RigArgs::default() })
 }
 
 /// Gives an open rig the calibration of this source, or that of its own load cell.
@@ -221,10 +226,10 @@ fn calibrated(
     rig: Box<dyn Rig>,
     locks: Vec<HolderLock>,
     source: Option<CalibrationSource>,
-    missing: impl FnOnce() -> String,
 ) -> Result<OpenRig, Failure> {
     let description = rig.description();
     let mut limits = Limits::for_travel(travel(args, description.travel)?);
+    let from_library = remark(args, source.as_ref());
     let full_scale = description.adc.map(|adc| f64::from(adc.counts_max) * adc.volts_per_count);
     let (calibration, doubts) = match (source, rig.newtons_per_volt(), full_scale) {
         (Some(source), ..) => {
@@ -243,9 +248,14 @@ fn calibrated(
             );
             (own, Vec::new())
         }
-        (None, ..) => return Err(Failure::Usage(missing())),
+        (None, ..) => {
+            let name = &args.rig;
+            return Err(Failure::Usage(format!(
+                "the library has no calibration of rig {name}; give --calibration NAME or FILE, or start 'palpate window --rig {name} --calibration thesis' and measure one with weights"
+            )));
+        }
     };
-    Ok(OpenRig { rig, calibration, doubts, limits, locks })
+    Ok(OpenRig { rig, calibration, doubts, from_library, limits, locks })
 }
 
 /// Opens the rig of a file and locks it against other programs.

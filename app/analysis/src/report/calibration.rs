@@ -63,8 +63,8 @@ impl CalibrationEntry {
         match (&self.superseded_by, is_old, self.is_in_force) {
             (Some(by), _, _) => format!("superseded by {by}"),
             (None, true, _) => "expired".to_owned(),
-            (None, false, true) => "in use".to_owned(),
-            (None, false, false) => "older than the calibration in use".to_owned(),
+            (None, false, true) => "in force".to_owned(),
+            (None, false, false) => "older than the calibration in force".to_owned(),
         }
     }
 }

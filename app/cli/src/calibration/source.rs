@@ -35,10 +35,15 @@ impl CalibrationSource {
         }
     }
 
-    /// The one of the library that is in force for a rig; and a sentence for each document that cannot be read, since it
-    /// might be a newer one of that rig.
-    pub fn in_force(rig: &str) -> Result<(Option<Self>, Vec<String>), Failure> {
-        let shelf = CalibrationStore::open(&library_folder().map_err(Failure::usage)?);
+    /// The one that is named, or else the one of the library that is in force for a rig; and a sentence for each document
+    /// that cannot be read, since it might be a newer one of that rig.
+    pub fn wanted(name: Option<&str>, rig: &str) -> Result<(Option<Self>, Vec<String>), Failure> {
+        if let Some(name) = name {
+            return Ok((Some(Self::find(name)?), Vec::new()));
+        }
+        // A computer without a library has no calibration in it.
+        let Ok(library) = library_folder() else { return Ok((None, Vec::new())) };
+        let shelf = CalibrationStore::open(&library);
         let unreadable = shelf.unreadable.iter().map(ToString::to_string).collect();
         Ok((shelf.in_force(rig).map(Self::from_library), unreadable))
     }

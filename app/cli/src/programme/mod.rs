@@ -94,7 +94,7 @@ pub(super) fn run(
             new_programme_folder(&library, &programme.name, wall_now().into())
         }
     };
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let answers = if is_virtual { PromptResponder::Confirm } else { PromptResponder::Operator };
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {

@@ -238,7 +238,7 @@ fn request(
     output: &Output,
 ) -> Result<(RunRequest, Preview, DailyCheckGate), Failure> {
     let gate = gate(&plan, bench)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let (answers, after_stop) = match bench.rig.is_virtual() {
         true => (PromptResponder::Confirm, AfterStop::Close),
         false => (PromptResponder::Operator, AfterStop::Ask),

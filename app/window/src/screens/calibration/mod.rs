@@ -12,7 +12,6 @@ use eframe::egui::{Button, Context, Key, TextEdit, Ui, vec2};
 use palpate_analysis::calibrations::{
     CalibrationOverview, CalibrationView, read, store_calibration,
 };
-use palpate_analysis::report::calibration::CalibrationEntry;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -29,7 +28,7 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 
 pub struct CalibrationScreen {
     library: Result<PathBuf, String>,
-    /// The rig's own, which needs no library, and the rig's name.
+    /// The one with which the rig was opened, and the rig's name.
     own: (Calibration, String),
     shelved: BackgroundTask<CalibrationOverview>,
     chosen: usize,
@@ -103,9 +102,8 @@ impl Screen for CalibrationScreen {
                 if ui.add(button).clicked() {
                     self.chosen = index;
                 }
-                // The first one comes with the rig.
                 let is_used = one.calibration == workbench.bench.calibration;
-                quiet_ui(ui, state_words(&one.entry, index == 0, is_used));
+                quiet_ui(ui, state_words(one, is_used));
             }
             shelved.unreadable.iter().for_each(|reason| small_alarm_ui(ui, reason));
         }
@@ -176,14 +174,20 @@ impl Screen for CalibrationScreen {
         one.doubts.iter().for_each(|doubt| alarm_ui(ui, doubt));
     }
 
-    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
-        if self.shelved.poll()
-            && let Some(Ok(CalibrationOverview {
-                stored: Some(Ok(id)), calibrations: shown, ..
-            })) = self.shelved.answer()
-        {
-            self.chosen = shown.iter().position(|one| one.entry.id == *id).unwrap_or(0);
+    fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+        if !self.shelved.poll() {
+            return;
         }
+        // The one just stored, or the one in use.
+        let Some(Ok(CalibrationOverview { stored, calibrations, .. })) = self.shelved.answer()
+        else {
+            return;
+        };
+        let is_it = |one: &CalibrationView| match stored {
+            Some(Ok(id)) => one.entry.id == *id,
+            _ => one.calibration == workbench.bench.calibration,
+        };
+        self.chosen = calibrations.iter().position(is_it).unwrap_or(0);
     }
 
     fn shown(&mut self, ctx: &Context) {
@@ -224,7 +228,8 @@ impl Screen for CalibrationScreen {
 }
 
 /// Age and state, and whether it is in use.
-fn state_words(entry: &CalibrationEntry, is_own: bool, is_used: bool) -> String {
+fn state_words(one: &CalibrationView, is_used: bool) -> String {
+    let entry = &one.entry;
     let mut words = Vec::new();
     if is_used {
         words.push("IN USE".to_owned());
@@ -233,6 +238,6 @@ fn state_words(entry: &CalibrationEntry, is_own: bool, is_used: bool) -> String 
         words.push(format!("rig {}", entry.rig));
     }
     words.extend(entry.age_days.map(|age| format!("{age} d old")));
-    words.push(if is_own { "comes with the rig".into() } else { entry.state() });
+    words.push(if one.comes_with_rig { "comes with the rig".into() } else { entry.state() });
     words.join(", ")
 }
