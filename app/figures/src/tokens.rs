@@ -37,8 +37,9 @@ pub struct Tokens {
     pub series: Color32,
     /// Interlock limits in plots: Okabe-Ito vermilion.
     pub limit: Color32,
-    /// Sessions laid over each other, in turn: Okabe-Ito, darkened where a lit ground needs it, and the ink.
-    pub sessions: [Color32; 6],
+    /// Sessions laid over each other, in turn: Okabe-Ito, darkened where a lit ground needs it, the ink, and what is
+    /// furthest from these for eyes with and without red-green blindness.
+    pub sessions: [Color32; 10],
     /// Shading of every other phase in plots; translucent, so the grid shows through.
     pub phase_band: Color32,
     /// The part of [`viridis`] that stands out from `canvas` as a line.
@@ -76,6 +77,10 @@ pub const LIGHT: Tokens = Tokens {
         Color32::from_rgb(0xA8, 0x4E, 0x80),
         Color32::from_rgb(0x8A, 0x66, 0x00),
         grey(0x1C),
+        Color32::from_rgb(0x77, 0x66, 0xFF),
+        Color32::from_rgb(0x66, 0x22, 0x00),
+        Color32::from_rgb(0x00, 0x00, 0xB0),
+        Color32::from_rgb(0x5E, 0x82, 0x00),
     ],
     phase_band: Color32::from_black_alpha(14),
     ordered: [0.0, 0.45],
@@ -108,6 +113,10 @@ pub const DARK: Tokens = Tokens {
         Color32::from_rgb(0xCC, 0x79, 0xA7),
         Color32::from_rgb(0xF0, 0xE4, 0x42),
         grey(0xE8),
+        Color32::from_rgb(0x4D, 0x7D, 0xFF),
+        Color32::from_rgb(0xAA, 0xFF, 0x99),
+        Color32::from_rgb(0xA0, 0x80, 0xFF),
+        Color32::from_rgb(0xBB, 0xAA, 0x66),
     ],
     phase_band: Color32::from_rgba_premultiplied(14, 14, 14, 14),
     ordered: [0.5, 1.0],

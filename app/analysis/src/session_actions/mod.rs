@@ -105,7 +105,10 @@ pub fn write_document(
         SessionDocument::Drawing(drawing) => FigureFormat::of(to)?.bytes(drawing)?,
     };
     write_new(to, &bytes)?;
-    Ok(ActionReport { sentence: format!("written: {}", to.display()), ..ActionReport::default() })
+    // A name alone does not tell the folder.
+    let place = std::path::absolute(to).unwrap_or_else(|_| to.to_owned());
+    let sentence = format!("written: {}", place.display());
+    Ok(ActionReport { sentence, ..ActionReport::default() })
 }
 
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {

@@ -7,8 +7,8 @@ use eframe::egui::{
 };
 use palpate_figures::drawing::round_up;
 
-/// Heights of a value's line and of what a lane has around its values, in points.
-const LINE: f32 = 9.0;
+/// Least and usual height of a value's line, and of what a lane has around its values, in points.
+const LINE: [f32; 2] = [5.5, 9.0];
 const LANE_ROOM: f32 = 9.0;
 /// Height of the numbers below.
 const NUMBERS: f32 = 20.0;
@@ -16,6 +16,7 @@ const NUMBERS: f32 = 20.0;
 const NUMBER: f32 = 46.0;
 const EDGE: f32 = 8.0;
 const RADIUS: f32 = 3.5;
+const ARROW: f32 = 3.0;
 /// Part of the width of all values that an interval may add on either side; wider ones are cut.
 const INTERVAL_SHARE: f64 = 0.35;
 
@@ -39,14 +40,24 @@ pub struct DistributionLane {
     pub median: Option<f64>,
 }
 
-fn lane_height(count: usize) -> f32 {
-    count.max(1) as f32 * LINE + LANE_ROOM
+/// Height of a lane of so many values, whose lines have a height.
+#[must_use]
+pub fn lane_height(count: usize, line: f32) -> f32 {
+    count.max(1) as f32 * line + LANE_ROOM
 }
 
 /// Height of lanes of so many values with the numbers below.
 #[must_use]
-pub fn height(counts: impl Iterator<Item = usize>) -> f32 {
-    counts.map(lane_height).sum::<f32>() + NUMBERS
+pub fn height(counts: impl Iterator<Item = usize>, line: f32) -> f32 {
+    counts.map(|count| lane_height(count, line)).sum::<f32>() + NUMBERS
+}
+
+/// Height of a line with which lanes fit into a room, as far as dots can be told apart.
+#[must_use]
+pub fn line_height(counts: impl Iterator<Item = usize> + Clone, room: f32) -> f32 {
+    let lines: usize = counts.clone().map(|count| count.max(1)).sum();
+    let own = (room - height(counts, 0.0)) / lines.max(1) as f32;
+    own.clamp(LINE[0], LINE[1])
 }
 
 /// Lower and upper end of all values, with their intervals where these are not much wider.
@@ -75,6 +86,7 @@ pub fn distribution_ui(
     ui: &mut Ui,
     id: Id,
     place: Rect,
+    line: f32,
     lanes: &[DistributionLane],
 ) -> Option<[usize; 2]> {
     let tokens = tokens_of(ui);
@@ -89,7 +101,7 @@ pub fn distribution_ui(
     numbers_ui(ui, [low, high], ground, &across);
     let (mut top, mut clicked) = (ground.top(), None);
     for (number, lane) in lanes.iter().enumerate() {
-        let below = top + lane_height(lane.dots.len());
+        let below = top + lane_height(lane.dots.len(), line);
         if number > 0 {
             ui.painter().hline(ground.x_range(), top, Stroke::new(1.0, tokens.line));
         }
@@ -101,16 +113,27 @@ pub fn distribution_ui(
             if !dot.value.is_finite() {
                 continue;
             }
-            let y = top + 0.5 * LANE_ROOM + (index as f32 + 0.5) * LINE;
+            let y = top + 0.5 * LANE_ROOM + (index as f32 + 0.5) * line;
             let at = pos2(across(dot.value), y);
-            let own = Rect::from_center_size(at, vec2(3.0 * RADIUS, LINE));
+            let own = Rect::from_center_size(at, vec2(3.0 * RADIUS, line));
             let response = ui.interact(own, id.with((number, index)), Sense::CLICK);
             response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &dot.words));
             if let Some([from, to]) = dot.ends {
                 let stroke = Stroke::new(if dot.is_front { 2.5 } else { 1.5 }, dot.color);
                 ui.painter().hline(across(from)..=across(to), y, stroke);
+                // An interval that goes on beyond the strip ends in an arrow.
+                let beyond = [(from < low, inner.left(), -1.0), (to > high, inner.right(), 1.0)];
+                for (_, x, way) in beyond.into_iter().filter(|(is_beyond, ..)| *is_beyond) {
+                    let tip = pos2(x + way * (EDGE - 2.0), y);
+                    for side in [-ARROW, ARROW] {
+                        let end = tip - vec2(way * ARROW, side);
+                        ui.painter().line_segment([tip, end], stroke);
+                    }
+                    ui.painter().hline(x..=tip.x, y, stroke);
+                }
             }
-            let radius = if response.hovered() { RADIUS + 1.5 } else { RADIUS };
+            let radius = RADIUS.min(0.5 * line + 0.5);
+            let radius = if response.hovered() { radius + 1.5 } else { radius };
             ui.painter().circle_filled(at, radius, dot.color);
             if dot.is_outlier || dot.is_front {
                 let ink = if dot.is_outlier { tokens.alarm_text } else { tokens.text };
@@ -177,6 +200,15 @@ mod tests {
         let color = Tokens::of(false).series;
         let words = String::new();
         DistributionDot { value, ends, color, is_front: false, is_outlier: false, words }
+    }
+
+    #[test]
+    fn lines_become_lower_where_there_is_little_room_and_stay_apart() {
+        let counts = [8, 5].into_iter();
+        let line = line_height(counts.clone(), 120.0);
+        assert!((height(counts.clone(), line) - 120.0).abs() < 1e-3 && line > LINE[0]);
+        assert_eq!(line_height(counts.clone(), 1e3), LINE[1]);
+        assert_eq!(line_height(counts, 10.0), LINE[0]);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A figure as data, painted on the screen: the same that pages and pictures show.
 
-use super::style::{quiet, round_marks};
+use super::style::{name_up, quiet, round_marks};
 use crate::theme::Tokens;
 use crate::widgets::tokens_of;
 use eframe::egui::{Align2, Color32, Id, Role, Sense, TextStyle, Ui, WidgetInfo, vec2};
@@ -72,10 +72,11 @@ fn show(
 ) -> [f64; 2] {
     let tokens = tokens_of(ui);
     let (x_text, y_unit) = (look.x_text, unit(&plot.y));
+    let has_axis_below = look.shown.is_none() || !plot.x.name.is_empty();
     let mut drawn = quiet(ui, egui_plot::Plot::new(id.to_owned()), tokens)
         .x_axis_label(plot.x.name.as_str())
-        .y_axis_label(plot.y.name.as_str())
-        .show_axes([look.shown.is_none() || !plot.x.name.is_empty(), true])
+        .y_axis_label(name_up(ui, &plot.y.name, has_axis_below))
+        .show_axes([has_axis_below, true])
         .auto_bounds([look.shown.is_none(), true])
         .allow_drag([look.shown.is_none(), true])
         .label_formatter(move |hover| match hover {

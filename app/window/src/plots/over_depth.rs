@@ -2,7 +2,7 @@
 //! than a frame can draw become a picture.
 
 use super::navigate::{AxisRange, Gesture, gesture};
-use super::style::still;
+use super::style::{name_up, still};
 use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
@@ -168,7 +168,7 @@ impl DepthLines {
         let (x, y) = (depth.shown(), force.shown());
         let plot = still(ui, Plot::new("review_force_depth"), tokens)
             .x_axis_label("depth from contact (mm)")
-            .y_axis_label("force above tare (N)");
+            .y_axis_label(name_up(ui, "force above tare (N)", true));
         let response = plot.show(ui, |plot_ui| {
             plot_ui.set_plot_bounds_x(x[0]..=x[1]);
             plot_ui.set_plot_bounds_y(y[0]..=y[1]);

@@ -1,7 +1,7 @@
 //! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
 
 use crate::theme::Tokens;
-use eframe::egui::{Rangef, Ui, Vec2, vec2};
+use eframe::egui::{Rangef, TextStyle, Ui, Vec2, vec2};
 use egui_plot::{GridInput, GridMark, Plot};
 use palpate_figures::drawing::round_up;
 
@@ -44,6 +44,20 @@ pub(super) fn still<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         .show_x(false)
         .show_y(false)
         .label_formatter(|_| None)
+}
+
+/// Height in points of the numbers and the name below a plot.
+const AXIS_BELOW: f32 = 40.0;
+
+/// The name of an axis that goes up a plot filling the space there is, or only its unit where the name is longer than
+/// the axis.
+pub(super) fn name_up(ui: &Ui, name: &str, has_axis_below: bool) -> String {
+    let axis = ui.available_height() - if has_axis_below { AXIS_BELOW } else { 0.0 };
+    let font = TextStyle::Body.resolve(ui.style());
+    let ink = ui.visuals().text_color();
+    let length = ui.painter().layout_no_wrap(name.to_owned(), font, ink).size().x;
+    let unit = name.rfind('(').filter(|_| length > axis && name.ends_with(')'));
+    unit.map_or(name, |at| &name[at + 1..name.len() - 1]).to_owned()
 }
 
 /// Labelled steps that a plot of a size in points has room for, across and up.

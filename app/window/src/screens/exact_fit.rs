@@ -1,6 +1,8 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{NAME_WIDTH, cell, number_ui, symbol_ui, tight, value_ui};
+use super::parameters::{
+    NAME_WIDTH, VALUE_WIDTH, cell, number_ui, symbol_job, symbol_ui, tight, value_ui,
+};
 use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
@@ -8,12 +10,21 @@ use palpate_analysis::report::text::{ParameterText, quality, typeset};
 use palpate_model::estimate::FittedParameter;
 use palpate_rheology::fit::FitReport;
 
+/// Width in points from which intervals stand beside their value.
+const WIDE: f32 = 500.0;
+/// Of a symbol with its unit, and of an interval, where they stand beside each other.
+const SYMBOL_WIDTH: f32 = 110.0;
+const INTERVAL_WIDTH: f32 = 180.0;
+
 /// Draws the report: parameters with their intervals and their budget, quality, every sentence.
 pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
     section_ui(ui, "Exact fit");
+    let texts: Vec<ParameterText> = report.parameters.iter().map(ParameterText::of).collect();
     tight(ui, |ui| {
-        for parameter in &report.parameters {
-            row_ui(ui, &ParameterText::of(parameter));
+        if ui.available_width() > WIDE {
+            table_ui(ui, &texts);
+        } else {
+            texts.iter().for_each(|text| row_ui(ui, text));
         }
     });
     budget_ui(ui, BUDGET_TITLE, &report.parameters);
@@ -21,11 +32,51 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
     report.sentences().for_each(|sentence| sentence_ui(ui, sentence));
 }
 
-fn row_ui(ui: &mut Ui, text: &ParameterText) {
+/// Draws a line for each parameter, with as many of its intervals as have room; the total one is the one that counts.
+fn table_ui(ui: &mut Ui, texts: &[ParameterText]) {
+    let tokens = tokens_of(ui);
+    let gap = ui.spacing().item_spacing.x;
+    let room = ui.available_width() - SYMBOL_WIDTH - VALUE_WIDTH - 2.0 * gap;
+    let count = ((room + gap) / (INTERVAL_WIDTH + gap)).floor().max(1.0) as usize;
+    let names = ["total 95 %", "95 %"].into_iter();
+    let known = names.filter(|name| texts.iter().any(|text| !interval(text, name).is_empty()));
+    let names: Vec<&str> = known.take(count).collect();
+    ui.horizontal(|ui| {
+        cell(ui, SYMBOL_WIDTH, |_| ());
+        cell(ui, VALUE_WIDTH, |ui| quiet_ui(ui, "value"));
+        for name in &names {
+            cell(ui, INTERVAL_WIDTH, |ui| quiet_ui(ui, *name));
+        }
+    });
+    for text in texts {
+        ui.horizontal(|ui| {
+            cell(ui, SYMBOL_WIDTH, |ui| {
+                let symbol = ui.label(symbol_job(ui, &text.name, &text.unit));
+                symbol.on_hover_text(format!("{}, 95 %: {}", text.name, text.interval));
+            });
+            cell(ui, VALUE_WIDTH, |ui| number_ui(ui, &text.value, tokens.text));
+            for name in &names {
+                cell(ui, INTERVAL_WIDTH, |ui| {
+                    number_ui(ui, interval(text, name), tokens.text_quiet)
+                });
+            }
+        });
+    }
+}
+
+fn interval<'a>(text: &'a ParameterText, name: &str) -> &'a str {
+    if name == "95 %" { &text.interval } else { &text.total }
+}
+
+/// Draws a parameter with its intervals below.
+pub fn row_ui(ui: &mut Ui, text: &ParameterText) {
     let tokens = tokens_of(ui);
     value_ui(ui, &text.name, &text.value, tokens.text, &text.unit);
-    let intervals = [("95 %", &text.interval), ("total 95 %", &text.total)];
-    for (name, interval) in intervals.into_iter().filter(|(_, interval)| !interval.is_empty()) {
+    for name in ["95 %", "total 95 %"] {
+        let interval = interval(text, name);
+        if interval.is_empty() {
+            continue;
+        }
         ui.horizontal(|ui| {
             cell(ui, NAME_WIDTH, |ui| {
                 ui.label(RichText::new(name).color(tokens.text_quiet).small())

@@ -10,7 +10,9 @@ use palpate_protocols::preview::Preview;
 pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let Some(checked) = form.checked() else {
         placeholder_ui(ui, "The preview appears when the protocol and its values are correct");
-        for problem in form.problems() {
+        // What is about one field stands there.
+        let is_elsewhere = |words: &str| form.fields.iter().any(|field| field.is_named_in(words));
+        for problem in form.problems().iter().filter(|one| !is_elsewhere(&one.message)) {
             alarm_ui(ui, problem.to_string());
         }
         return;

@@ -121,7 +121,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     if is_focused {
         quiet_ui(ui, &hint);
     }
-    if let Err(reason) = &field.value {
+    if let Some(reason) = field.value.as_ref().err().or(field.objection.as_ref()) {
         small_alarm_ui(ui, reason);
     }
 }

@@ -93,7 +93,7 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
         ui.add(Label::new(specimen).truncate());
         let line = run.map_or_else(|| "no run yet".into(), run_line);
         ui.add(Label::new(RichText::new(line).color(tokens.text_quiet)).truncate());
-        if let Some(run) = run {
+        if let Some(run) = run.filter(|run| run.outcome.is_none()) {
             share_ui(ui, run.fraction);
         }
     });
@@ -106,7 +106,9 @@ fn run_line(run: &RunView) -> String {
         _ => format!("step {} of {}", (run.step_index + 1).min(run.steps.len()), run.steps.len()),
     };
     match (&run.outcome, &run.holding) {
-        (Some(outcome), _) => format!("{} after {}", outcome.ending, clock(run.now.seconds().0)),
+        (Some(outcome), _) => {
+            format!("last run {}, {}", outcome.ending, clock(run.now.seconds().0))
+        }
         (None, Some(_)) => format!("{step}, waiting for Retract or Close session"),
         (None, None) => format!("{step}, {}, {} left", run.phase, clock(run.time_left.0)),
     }

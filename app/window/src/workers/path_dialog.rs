@@ -5,6 +5,7 @@ use crate::widgets::{alarm_ui, quiet_ui};
 use eframe::egui::{Button, Context, Ui};
 use rfd::FileDialog;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,16 +30,21 @@ pub enum PathPurpose {
     Specimens,
 }
 
+/// Nobody cancels a dialog in less time.
+const SEEN: Duration = Duration::from_millis(400);
+const NO_DIALOG: &str = "this desktop shows no file dialog (on Linux it needs xdg-desktop-portal or zenity); type the path into the field instead";
+
 /// A dialog that may be open, and gives a `T`.
 #[derive(Debug)]
 pub struct Dialog<T> {
     job: Job<Option<T>>,
+    opened: Option<Instant>,
     refusal: Option<String>,
 }
 
 impl<T> Default for Dialog<T> {
     fn default() -> Self {
-        Self { job: Job::default(), refusal: None }
+        Self { job: Job::default(), opened: None, refusal: None }
     }
 }
 
@@ -54,13 +60,26 @@ impl<T: Send + 'static> Dialog<T> {
         ctx: &Context,
         pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
     ) -> Result<(), String> {
+        self.refusal = None;
+        self.opened = Some(Instant::now());
         let opened = self.job.start("dialog", ctx, move || pick(FileDialog::new()));
         opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
 
     /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
     pub fn poll(&mut self) -> Option<T> {
-        self.job.poll().flatten()
+        let answer = self.job.poll()?;
+        // The library for dialogs does not say why it showed none.
+        let is_unseen = self.opened.is_some_and(|opened| opened.elapsed() < SEEN);
+        if answer.is_none() && is_unseen {
+            self.refusal = Some(NO_DIALOG.to_owned());
+        }
+        answer
+    }
+
+    /// Why the last dialog was not shown, once.
+    pub fn take_refusal(&mut self) -> Option<String> {
+        self.refusal.take()
     }
 
     /// Draws the button that opens the dialog.

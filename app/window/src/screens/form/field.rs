@@ -15,6 +15,8 @@ pub struct ParamField {
     pub unit: &'static str,
     /// As the protocol takes it, or what is wrong.
     pub value: Result<String, String>,
+    /// What the protocol has against the value.
+    pub objection: Option<String>,
 }
 
 impl ParamField {
@@ -32,10 +34,10 @@ impl ParamField {
             ValueContent::List(_) => usual.text.clone(),
             _ => number,
         };
-        Self { value: Ok(usual.text.clone()), text, unit, parameter }
+        Self { value: Ok(usual.text.clone()), objection: None, text, unit, parameter }
     }
 
-    /// Reads the text again; a speed must be one that the rig makes.
+    /// Reads the text again; the rig must be able to make the speed and have the travel.
     pub fn check(&mut self, rig: &RigDescription) {
         self.value = self.read(rig);
     }
@@ -55,7 +57,7 @@ impl ParamField {
             (_, false) => self.with_unit(&plain_text(text).map_err(|err| err.to_string())?),
         };
         let given = self.parameter.read(&value)?;
-        check_speeds(&given, rig)?;
+        check_reach(&given, rig)?;
         Ok(value)
     }
 
@@ -64,6 +66,12 @@ impl ParamField {
         let plain = plain_text(text).map_err(|err| err.to_string())?;
         let values = plain.split([',', ';']).map(|one| self.with_unit(one));
         Ok(values.collect::<Vec<_>>().join(", "))
+    }
+
+    /// Whether a sentence of the protocol is about this field.
+    pub fn is_named_in(&self, words: &str) -> bool {
+        let mut words = words.split(|one: char| !(one.is_alphanumeric() || "_-".contains(one)));
+        words.any(|word| word == self.parameter.name)
     }
 
     /// A number without a unit gets the one of the field.
@@ -103,10 +111,15 @@ impl ParamField {
     }
 }
 
-fn check_speeds(given: &ProtocolValue, rig: &RigDescription) -> Result<(), String> {
+/// Speeds and lengths that no protocol can ask of this rig.
+fn check_reach(given: &ProtocolValue, rig: &RigDescription) -> Result<(), String> {
     match &given.content {
         ValueContent::Number(QuantityKind::Speed, speed) => rig.check_speed(MmPerS(*speed)),
-        ValueContent::List(items) => items.iter().try_for_each(|item| check_speeds(item, rig)),
+        ValueContent::Number(QuantityKind::Length, mm) if *mm > rig.travel.0 => Err(format!(
+            "{mm} mm is beyond the travel of rig {}, which ends at {}; give less",
+            rig.name, rig.travel
+        )),
+        ValueContent::List(items) => items.iter().try_for_each(|item| check_reach(item, rig)),
         _ => Ok(()),
     }
 }

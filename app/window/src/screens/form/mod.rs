@@ -156,6 +156,7 @@ impl ProtocolForm {
             return;
         }
         let Some(values) = &key.0 else {
+            self.fields.iter_mut().for_each(|field| field.objection = None);
             self.checked = Some((key, Err(Vec::new())));
             return;
         };
@@ -169,6 +170,11 @@ impl ProtocolForm {
                 plan: written.plan,
             }
         });
+        let problems = checked.as_ref().err().map_or(&[][..], Vec::as_slice);
+        for field in &mut self.fields {
+            let own = problems.iter().find(|problem| field.is_named_in(&problem.message));
+            field.objection = own.map(|problem| problem.message.clone());
+        }
         self.checked = Some((key, checked));
     }
 
@@ -209,12 +215,12 @@ impl ProtocolForm {
         self.read_labels();
     }
 
-    /// Name or file of the protocol, as the queue has it.
     /// Specimen and protocol that a start would run.
     pub fn next_start(&self) -> [String; 2] {
         [self.specimen().to_owned(), self.source_name()]
     }
 
+    /// Name or file of the protocol, as the queue has it.
     pub fn source_name(&self) -> String {
         match (&self.file, &self.protocol) {
             (Some(file), _) => file.display().to_string(),
@@ -317,6 +323,9 @@ impl ProtocolForm {
         let missing = missing.filter(|field| field.is_required && field.text.trim().is_empty());
         let missing: Vec<&str> = missing.map(|field| field.key.name).collect();
         require(missing.is_empty(), format!("fill in {} first", missing.join(", ")))?;
+        if let Some(field) = self.fields.iter().find(|field| field.objection.is_some()) {
+            return Err(format!("correct the {} first", field.parameter.name));
+        }
         if let Some(problem) = self.problems().first() {
             return Err(problem.to_string());
         }

@@ -36,6 +36,7 @@ pub(super) struct FigureExport {
     /// The figure that waits for the name of its file.
     waiting: Option<PendingFigure>,
     save: BackgroundTask<ActionReport>,
+    /// What came of the last copy, or why the last figure was not saved.
     copied: Option<Result<(), String>>,
 }
 
@@ -47,7 +48,11 @@ impl FigureExport {
                 ctx.copy_image(ColorImage::from_rgb(picture.size, &picture.rgb));
             }));
         }
-        if let Some(to) = self.dialog.poll()
+        let chosen = self.dialog.poll();
+        if let Some(reason) = self.dialog.take_refusal() {
+            self.copied = Some(Err(reason));
+        }
+        if let Some(to) = chosen
             && let Some(figure) = self.waiting.take()
         {
             self.save.start("figure", ctx, move |progress| {
@@ -66,6 +71,7 @@ impl FigureExport {
     }
 
     fn save(&mut self, figure: PendingFigure, ctx: &Context) {
+        self.copied = None;
         self.waiting = Some(figure);
         let opened = self.dialog.open(ctx, |dialog| {
             let dialog = dialog.set_title("Save figure").set_file_name("figure.svg");
@@ -78,9 +84,9 @@ impl FigureExport {
 
     fn answer_ui(&self, ui: &mut Ui) {
         match (&self.copied, self.save.answer()) {
-            (Some(Err(reason)), _) | (_, Some(Err(reason))) => alarm_ui(ui, reason),
-            (Some(Ok(())), None) => quiet_ui(ui, "copied"),
-            (_, Some(Ok(done))) => quiet_ui(ui, &done.sentence),
+            (Some(Err(reason)), _) | (None, Some(Err(reason))) => alarm_ui(ui, reason),
+            (Some(Ok(())), _) => quiet_ui(ui, "copied"),
+            (None, Some(Ok(done))) => quiet_ui(ui, &done.sentence),
             (None, None) => {}
         }
     }

@@ -59,10 +59,17 @@ impl ReviewScreen {
         let verdict = require(!self.path.trim().is_empty(), "type the path of a session's folder");
         let is_pressed = reason_button(ui, "Add to view", vec2(0.0, 22.0), &verdict);
         if is_pressed || (is_entered && verdict.is_ok()) {
-            let path = PathBuf::from(std::mem::take(&mut self.path).trim());
-            self.add(path, ui.ctx());
-            // The keys of the plots are next.
-            ui.memory_mut(|memory| memory.stop_text_input());
+            let path = PathBuf::from(self.path.trim());
+            self.is_path_wrong = !path.is_dir();
+            if !self.is_path_wrong {
+                self.path.clear();
+                self.add(path, ui.ctx());
+                // The keys of the plots are next.
+                ui.memory_mut(|memory| memory.stop_text_input());
+            }
+        }
+        if self.is_path_wrong {
+            alarm_ui(ui, "there is no such folder; type the path of a session's folder");
         }
     }
 

@@ -103,6 +103,8 @@ pub struct ReviewScreen {
     /// Only the first and the last loop are drawn.
     has_ends_only: bool,
     path: String,
+    /// What was entered as a path leads to no folder.
+    is_path_wrong: bool,
     next_id: u64,
     /// The most samples that share a lowest and a highest one in the plots over time.
     thinned: usize,

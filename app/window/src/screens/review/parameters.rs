@@ -3,9 +3,11 @@
 use super::ReviewScreen;
 use super::deviation::{OUTLIER, deviations, median};
 use super::groups::{Grouping, SessionGroup, groups};
-use super::session_list::color_of;
+use super::session_list::{color_of, doubt_of};
 use super::subject::ReviewSubject;
-use crate::plots::distribution::{DistributionDot, DistributionLane, distribution_ui, height};
+use crate::plots::distribution::{
+    DistributionDot, DistributionLane, distribution_ui, height, lane_height, line_height,
+};
 use crate::screens::parameters::symbol_job;
 use crate::theme::Tokens;
 use crate::widgets::{
@@ -179,8 +181,9 @@ impl ReviewScreen {
         };
         // The table has at least half of the height.
         let strips = ScrollArea::vertical().id_salt("strips").auto_shrink([false, true]);
-        let strips = strips.max_height(0.5 * ui.available_height());
-        let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, &groups, &found)).inner;
+        let room = 0.5 * ui.available_height();
+        let strips = strips.max_height(room);
+        let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, room, &groups, &found)).inner;
         let words = "blue is below and orange above the median of its group; a triangle or red ring is an outlier, a black ring is in front";
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
         ui.add(Label::new(words).truncate()).on_hover_text(MEANING);
@@ -191,8 +194,14 @@ impl ReviewScreen {
         }
     }
 
-    /// Draws a strip for each parameter; returns the session whose dot was clicked.
-    fn strips_ui(&self, ui: &mut Ui, groups: &[SessionGroup], found: &Parameters) -> Option<usize> {
+    /// Draws a strip for each parameter, so low that they fill a height where their dots allow that; returns the session whose dot was clicked.
+    fn strips_ui(
+        &self,
+        ui: &mut Ui,
+        room: f32,
+        groups: &[SessionGroup],
+        found: &Parameters,
+    ) -> Option<usize> {
         let tokens = tokens_of(ui);
         let has_names = self.grouping != Grouping::None;
         let names = groups.iter().map(|group| group.name.clone());
@@ -211,12 +220,14 @@ impl ReviewScreen {
             values.any(|value| !value.parameter.is_fixed)
         };
         let shown: Vec<usize> = (0..found.names.len()).filter(is_found).collect();
-        let high = height(lanes.iter().map(Vec::len)) + STRIP_HEAD;
         let width = ui.available_width();
         let columns = (((width - left) / STRIP_MIN) as usize).clamp(1, shown.len().max(1));
         // Rows of equal length.
         let count = shown.len().div_ceil(columns).max(1);
         let columns = shown.len().div_ceil(count).max(1);
+        let counts = || lanes.iter().map(Vec::len);
+        let dot_line = line_height(counts(), room / count as f32 - STRIP_HEAD);
+        let high = height(counts(), dot_line) + STRIP_HEAD;
         let own = (width - left) / columns as f32;
         let (whole, _) = ui.allocate_exact_size(vec2(width, high * count as f32), Sense::hover());
         let mut chosen = None;
@@ -227,7 +238,7 @@ impl ReviewScreen {
             let place = Rect::from_min_size(whole.min + corner, vec2(own - 6.0, high));
             if column == 0 && has_names {
                 let names = pos2(whole.left(), place.top() + STRIP_HEAD);
-                lane_names_ui(ui, names, left, &lanes);
+                lane_names_ui(ui, names, left, dot_line, &lanes);
             }
             let head = Rect::from_min_size(place.min, vec2(place.width(), STRIP_HEAD));
             let mut line = ui.new_child(UiBuilder::new().max_rect(head));
@@ -249,7 +260,7 @@ impl ReviewScreen {
                 .collect();
             let strip = Rect::from_min_max(pos2(place.left(), head.bottom()), place.max);
             let id = Id::unique(("distribution", name.name.as_str()));
-            if let Some([lane, dot]) = distribution_ui(ui, id, strip, &values) {
+            if let Some([lane, dot]) = distribution_ui(ui, id, strip, dot_line, &values) {
                 chosen = Some(lanes[lane][dot].index);
             }
         }
@@ -346,10 +357,10 @@ fn name_galley(ui: &Ui, name: String) -> Arc<Galley> {
 }
 
 /// Draws the names of groups, each beside its lane.
-fn lane_names_ui(ui: &Ui, corner: Pos2, width: f32, lanes: &[Vec<&Row>]) {
+fn lane_names_ui(ui: &Ui, corner: Pos2, width: f32, line: f32, lanes: &[Vec<&Row>]) {
     let mut top = corner.y;
     for rows in lanes {
-        let high = height(std::iter::once(rows.len())) - height(std::iter::empty());
+        let high = lane_height(rows.len(), line);
         let place = Rect::from_min_size(pos2(corner.x, top), vec2(width - 6.0, high));
         let name = name_galley(ui, rows.first().map_or(String::new(), |row| row.group.clone()));
         let at = Align2::LEFT_CENTER.anchor_size(place.left_center(), name.size());
@@ -361,9 +372,10 @@ fn lane_names_ui(ui: &Ui, corner: Pos2, width: f32, lanes: &[Vec<&Row>]) {
 
 fn refusals_ui(ui: &mut Ui, subjects: &[ReviewSubject]) {
     for subject in subjects {
-        if let Some(Err(reason)) = &subject.fit {
-            alarm_ui(ui, format!("{}: no fit: {reason}", subject.name));
-        }
+        let Some(Err(reason)) = &subject.fit else { continue };
+        let words = format!("{}: no fit: {reason}", subject.name);
+        // That a rejected session is left out is as it should be.
+        if doubt_of(subject).is_some() { quiet_ui(ui, words) } else { alarm_ui(ui, words) }
     }
 }
 

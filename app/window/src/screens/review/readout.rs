@@ -4,7 +4,7 @@ use super::ReviewScreen;
 use super::subject::ReviewSubject;
 use crate::widgets::quiet_ui;
 use crate::workers::review::Quantity;
-use eframe::egui::{RichText, Ui};
+use eframe::egui::{Grid, RichText, Role, Ui, WidgetInfo, vec2};
 
 /// Decimals of a quantity: a tenth of a millinewton, a tenth of a micrometre, a microvolt.
 const fn decimals(quantity: Quantity) -> usize {
@@ -34,21 +34,25 @@ impl CursorReadout {
         }
     }
 
-    /// One text for each label.
-    fn words(&self) -> Vec<String> {
-        let mut words = Vec::new();
-        let mut add = |name: &str, unit: &str, digits: usize, ends: [Option<f64>; 2]| {
-            for (cursor, value) in ["A", "B"].into_iter().zip(ends) {
-                if let Some(value) = value {
-                    words.push(format!("{name} at {cursor} {value:.digits$} {unit}"));
-                }
-            }
-            if let [Some(a), Some(b)] = ends {
-                let name = if name.len() == 1 { format!("d{name}") } else { format!("d {name}") };
-                words.push(format!("{name} {:+.digits$} {unit}", b - a));
-            }
+    /// What is known of each quantity; those of which nothing is known are left out.
+    fn columns(&self) -> Vec<ReadoutColumn> {
+        let column = |name: &'static str, unit, digits: usize, ends: [Option<f64>; 2]| {
+            let at = |cursor: &str, value: f64| {
+                let number = format!("{value:.digits$}");
+                let words = format!("{name} at {cursor} {number} {unit}");
+                (number, words)
+            };
+            let [a, b] = ends;
+            let difference = a.zip(b).map(|(a, b)| {
+                let number = format!("{:+.digits$}", b - a);
+                let gap = if name.len() == 1 { "" } else { " " };
+                let words = format!("d{gap}{name} {number} {unit}");
+                (number, words)
+            });
+            let cells = [a.map(|a| at("A", a)), b.map(|b| at("B", b)), difference];
+            ReadoutColumn { name, unit, cells }
         };
-        add("t", "s", 4, self.t);
+        let mut columns = vec![column("t", "s", 4, self.t)];
         for quantity in Quantity::ALL {
             let name = match quantity {
                 Quantity::Force => "F",
@@ -56,30 +60,72 @@ impl CursorReadout {
                 Quantity::Volts => "signal",
                 Quantity::Position => "position",
             };
-            add(name, quantity.unit(), decimals(quantity), self.values[quantity as usize]);
+            let values = self.values[quantity as usize];
+            columns.push(column(name, quantity.unit(), decimals(quantity), values));
         }
-        words
+        columns.retain(|column| column.cells.iter().any(Option::is_some));
+        columns
+    }
+
+    /// One text for each value, to be copied.
+    fn words(&self) -> Vec<String> {
+        let columns = self.columns().into_iter();
+        columns.flat_map(|column| column.cells).flatten().map(|(_, words)| words).collect()
     }
 }
 
+/// A quantity at cursor A, at B, and its difference: each as a number and in words.
+struct ReadoutColumn {
+    name: &'static str,
+    unit: &'static str,
+    cells: [Option<(String, String)>; 3],
+}
+
+/// Width of a column in points.
+const COLUMN: f32 = 104.0;
+
 impl ReviewScreen {
+    /// Draws a line for each cursor and one for their difference, a column for each quantity.
     pub(super) fn readout_ui(&self, ui: &mut Ui) {
         let Some(front) = self.front() else { return };
         if self.cursors == [None; 2] {
             quiet_ui(ui, "set cursors A and B to read values and differences");
             return;
         }
-        let words = CursorReadout::of(front, self.cursors, front.shift(self.time_origin)).words();
-        ui.horizontal_wrapped(|ui| {
-            for word in &words {
-                ui.label(RichText::new(word).monospace());
-                ui.add_space(4.0);
+        let readout = CursorReadout::of(front, self.cursors, front.shift(self.time_origin));
+        let columns = readout.columns();
+        let is_wide = columns.len() as f32 * COLUMN + 200.0 < ui.available_width();
+        Grid::new("readout").min_col_width(40.0).spacing(vec2(14.0, 2.0)).show(ui, |ui| {
+            ui.label("");
+            for column in &columns {
+                quiet_ui(ui, format!("{} ({})", column.name, column.unit));
             }
-            if ui.button("Copy readout").clicked() {
-                let lines = words.join("\n");
-                ui.ctx().copy_text(format!("{}\n{lines}\n", front.name));
+            if is_wide {
+                self.copy_ui(ui, &front.name, &readout);
+            }
+            ui.end_row();
+            for (line, name) in ["A", "B", "B \u{2212} A"].into_iter().enumerate() {
+                if columns.iter().all(|column| column.cells[line].is_none()) {
+                    continue;
+                }
+                quiet_ui(ui, name);
+                for column in &columns {
+                    let (number, words) = column.cells[line].clone().unwrap_or_default();
+                    let number = ui.label(RichText::new(number).monospace());
+                    number.widget_info(|| WidgetInfo::labeled(Role::Label, true, &words));
+                }
+                ui.end_row();
             }
         });
+        if !is_wide {
+            self.copy_ui(ui, &front.name, &readout);
+        }
+    }
+
+    fn copy_ui(&self, ui: &mut Ui, session: &str, readout: &CursorReadout) {
+        if ui.button("Copy readout").clicked() {
+            ui.ctx().copy_text(format!("{session}\n{}\n", readout.words().join("\n")));
+        }
     }
 }
 

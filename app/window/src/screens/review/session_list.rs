@@ -10,6 +10,8 @@ use eframe::egui::{
     pos2, vec2,
 };
 use palpate_analysis::report::session::SessionNameParts;
+use palpate_model::calibration::Calibration;
+use palpate_sessions::DataQuality;
 
 /// Height of a line in points.
 const ROW: f32 = 26.0;
@@ -27,8 +29,6 @@ enum SessionAction {
 
 /// A change of the list that can be undone.
 pub(super) enum ListChange {
-    /// A session came to the front from this place.
-    Front(usize),
     /// A session was at this place.
     Removed(usize, Box<ReviewSubject>),
     /// These were shown, in this order.
@@ -41,7 +41,6 @@ const UNDO_MAX: usize = 50;
 impl ListChange {
     fn words(&self) -> String {
         match self {
-            Self::Front(_) => "front".into(),
             Self::Removed(_, subject) => format!("remove {}", subject.name),
             Self::Cleared(subjects) => format!("clear {} sessions", subjects.len()),
         }
@@ -113,6 +112,25 @@ fn pressable(ui: &Ui, response: &Response, name: &str) {
     }
 }
 
+/// A verdict that is not the usual one, and its reason.
+pub(super) fn doubt_of(subject: &ReviewSubject) -> Option<&(DataQuality, String)> {
+    let verdict = subject.recording.facts.as_ref()?.verdict.as_ref();
+    verdict.filter(|(verdict, _)| *verdict != DataQuality::Valid)
+}
+
+/// Names of the calibrations by which the sessions are read, where they are not all read by the same one.
+fn mixed_calibrations(subjects: &[ReviewSubject]) -> Vec<&str> {
+    let facts = subjects.iter().filter_map(|one| one.recording.facts.as_ref());
+    let mut found: Vec<&Calibration> = Vec::new();
+    for calibration in facts.filter_map(|facts| facts.calibration.as_ref()) {
+        if !found.contains(&calibration) {
+            found.push(calibration);
+        }
+    }
+    let names = found.iter().map(|one| one.name.as_str());
+    if found.len() > 1 { names.collect() } else { Vec::new() }
+}
+
 /// Draws a line; returns whether its session is to come to the front, and whether it is to be removed.
 fn row_ui(ui: &mut Ui, subject: &ReviewSubject, short: &str, is_front: bool) -> [bool; 2] {
     let tokens = tokens_of(ui);
@@ -128,14 +146,23 @@ fn row_ui(ui: &mut Ui, subject: &ReviewSubject, short: &str, is_front: bool) -> 
     };
     let row = ui.interact(place, id, Sense::click());
     pressable(ui, &row, &name);
-    let row = row.named(&name).on_hover_text(&subject.name);
+    let doubt = doubt_of(subject);
+    let hint = match doubt {
+        Some((verdict, reason)) => format!("{}\n{verdict}: {reason}", subject.name),
+        None => subject.name.clone(),
+    };
+    let row = row.named(&name).on_hover_text(hint);
     let middle = place.center().y;
     let swatch =
         Rect::from_center_size(pos2(place.left() + 0.5 * SWATCH, middle), vec2(10.0, 14.0));
     ui.painter().rect_filled(swatch, 2.0, color_of(tokens, subject.id));
     let font = TextStyle::Body.resolve(ui.style());
     let mut job =
-        LayoutJob::single_section(short.to_owned(), TextFormat::simple(font, tokens.text));
+        LayoutJob::single_section(short.to_owned(), TextFormat::simple(font.clone(), tokens.text));
+    if let Some((verdict, _)) = doubt {
+        let words = format!("  {verdict}");
+        job.append(&words, 0.0, TextFormat::simple(font, tokens.alarm_text));
+    }
     job.wrap = TextWrapping::truncate_at_width(place.width() - SWATCH - 2.0);
     let galley = ui.fonts_mut(|fonts| fonts.layout_job(job));
     let at = pos2(place.left() + SWATCH, middle);
@@ -201,6 +228,11 @@ impl ReviewScreen {
         if !words.is_empty() {
             quiet_ui(ui, format!("all {}: {words}", self.subjects.len()));
         }
+        let mixed = mixed_calibrations(&self.subjects);
+        if !mixed.is_empty() {
+            let names = mixed.join(", ");
+            alarm_ui(ui, format!("read by {} calibrations: {names}", mixed.len()));
+        }
         let mut pressed = None;
         let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
         for (index, subject) in self.subjects.iter().enumerate() {
@@ -240,7 +272,6 @@ impl ReviewScreen {
     pub(super) fn bring_to_front(&mut self, index: usize) {
         if (1..self.subjects.len()).contains(&index) {
             self.subjects[..=index].rotate_right(1);
-            self.note(ListChange::Front(index));
         }
     }
 
@@ -269,9 +300,6 @@ impl ReviewScreen {
             subjects.iter().any(|shown| shown.source.session == one.source.session)
         };
         match self.changes.pop() {
-            Some(ListChange::Front(index)) if index < self.subjects.len() => {
-                self.subjects[..=index].rotate_left(1);
-            }
             Some(ListChange::Removed(index, subject)) if !is_shown(&self.subjects, &subject) => {
                 self.subjects.insert(index.min(self.subjects.len()), *subject);
             }

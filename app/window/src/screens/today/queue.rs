@@ -19,6 +19,9 @@ use palpate_sessions::specimen_queue::{
 
 /// Large enough for a gloved finger, in points.
 const BUTTON: Vec2 = vec2(130.0, 48.0);
+const NEXT_BUTTON: Vec2 = vec2(260.0, 56.0);
+/// Beside the button a name has so much room in points, or it stands above.
+const NAME_WIDTH_MIN: f32 = 240.0;
 
 /// What is typed on the page.
 #[derive(Default)]
@@ -164,7 +167,7 @@ impl QueueForm {
         let has_reason =
             require(!self.reason.trim().is_empty(), "to reject a run, give the reason");
         let can_reject = is_free.clone().and(has_reason);
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             for (words, verdict, can) in [
                 ("Accept", QueueVerdict::Accept, &is_free),
                 ("Reject", QueueVerdict::Reject, &can_reject),
@@ -188,12 +191,12 @@ impl QueueForm {
 
     /// The field that a barcode scanner types into.
     fn scan_ui(&mut self, ui: &mut Ui, workbench: &Workbench, commands: &mut Commands) {
-        section_ui(ui, "Scan or type a specimen");
+        ui.add_space(6.0);
         // What stands above changes with a verdict; the field keeps the keys.
         let row = |ui: &mut Ui| {
             let label = form_label(ui, "scan here");
             let input = TextEdit::singleline(&mut self.scanned).char_limit(200);
-            let input = input.desired_width(320.0).hint_text("name, then Enter");
+            let input = input.desired_width(320.0).hint_text("scan or type a name, then Enter");
             let input = ui.add(input).labelled_by(label.id).named("scan here");
             if std::mem::take(&mut self.is_to_focus) {
                 input.request_focus();
@@ -255,19 +258,20 @@ impl QueueForm {
         workbench: &Workbench,
         commands: &mut Commands,
     ) {
-        let chosen = items.iter().find(|item| Some(item.number) == self.chosen);
-        let words = chosen.map_or("none chosen".to_owned(), |item| {
-            format!("{}: {}", item.wanted.specimen, item.state)
-        });
+        let Some(chosen) = items.iter().find(|item| Some(item.number) == self.chosen) else {
+            quiet_ui(
+                ui,
+                "Choose a specimen in the list to move it, to skip it or to let it wait again.",
+            );
+            return;
+        };
+        let words = format!("{}: {}", chosen.wanted.specimen, chosen.state);
         ui.add(Label::new(RichText::new(words).strong()).truncate());
         text_row(ui, "why", "to skip, to move, to let it wait again", &mut self.reason);
         let is_free = require(!workbench.queue.is_busy(), "the queue is being written");
-        let chosen = chosen.ok_or_else(|| "choose a specimen in the list".to_owned());
         let has_reason = require(!self.reason.trim().is_empty(), "give the reason; it is kept");
-        let state = chosen.as_ref().map(|item| item.state).map_err(Clone::clone);
-        let number = chosen.as_ref().map_or(0, |item| item.number);
+        let (state, number) = (chosen.state, chosen.number);
         let waits = |wanted: bool| {
-            let state = state.clone()?;
             let is_so =
                 (state == SpecimenState::Waiting) == wanted && state != SpecimenState::Begun;
             require(
@@ -278,7 +282,7 @@ impl QueueForm {
             has_reason.clone()
         };
         let mut refusals = Vec::new();
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             for (words, can, change) in [
                 ("Make it the next", waits(true), QueueChange::Moved { number, place: 1 }),
                 ("Skip", waits(true), QueueChange::Skipped { number }),
@@ -335,6 +339,31 @@ fn next_ui(
     commands: &mut Commands,
 ) {
     section_ui(ui, "Next specimen");
+    let verdict = next.clone().map(|_| ());
+    let mut button_ui = |ui: &mut Ui| {
+        if reason_button(ui, "Measure the next specimen", NEXT_BUTTON, &verdict)
+            && let Ok(number) = next
+        {
+            commands.push(UiCommand::TakeSpecimen(*number));
+        }
+    };
+    let space = ui.available_width() - NEXT_BUTTON.x - ui.spacing().item_spacing.x;
+    if space < NAME_WIDTH_MIN {
+        waiting_ui(ui, workbench);
+        button_ui(ui);
+        return;
+    }
+    ui.horizontal_top(|ui| {
+        ui.vertical(|ui| {
+            ui.set_width(space);
+            waiting_ui(ui, workbench);
+        });
+        ui.vertical(button_ui);
+    });
+}
+
+/// Draws the specimen that comes next.
+fn waiting_ui(ui: &mut Ui, workbench: &Workbench) {
     let queue = workbench.queue.queue();
     match queue.next() {
         Some(item) => {
@@ -346,12 +375,6 @@ fn next_ui(
             ui,
             "No specimen waits. Add some on the left, or go to the screen Run for a single one.",
         ),
-    }
-    let verdict = next.clone().map(|_| ());
-    if reason_button(ui, "Measure the next specimen", vec2(260.0, 56.0), &verdict)
-        && let Ok(number) = next
-    {
-        commands.push(UiCommand::TakeSpecimen(*number));
     }
 }
 

@@ -2,14 +2,15 @@
 
 use super::super::ReviewSource;
 use super::OwnFit;
-use crate::screens::exact_fit::budget_ui;
+use crate::screens::exact_fit::{budget_ui, row_ui};
 use crate::widgets::{
     NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::budget::BUDGET_TITLE;
 use palpate_analysis::report::session_text;
-use palpate_analysis::report::{stored_analysis, text};
+use palpate_analysis::report::stored_analysis;
+use palpate_analysis::report::text::ParameterText;
 use palpate_analysis::session_actions::{SessionAction, SessionActionContext};
 use palpate_sessions::analyses::{Analysis, AnalysisContent};
 
@@ -59,11 +60,10 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     let AnalysisContent::Fit { results, .. } = &one.what else { return false };
     let parameters = stored_analysis::parameters(results);
     for parameter in &parameters {
-        let unit = text::typeset(&parameter.unit);
-        fact_ui(ui, &parameter.name, format!("{} {unit}", text::cell(parameter)));
+        row_ui(ui, &ParameterText::of(parameter));
         let mut own = own.iter().flat_map(|own| &own.parameters);
         if let Some(same) = own.find(|own| own.name == parameter.name) {
-            fact_ui(ui, "", format!("session: {}", text::cell(same)));
+            fact_ui(ui, "session", ParameterText::of(same).value);
         }
     }
     budget_ui(ui, &format!("{BUDGET_TITLE} of '{}'", one.name), &parameters);

@@ -37,14 +37,11 @@ impl NewFile {
         source: &ReviewSource,
     ) {
         text_row(ui, &format!("{} file", name.to_lowercase()), hint, &mut self.path);
-        if ui.button(format!("{name}...")).clicked() {
-            let file = format!("{}.{ending}", folder_name(&source.session));
-            // Without a dialog the path is typed.
-            let _ = self.dialog.open(ui.ctx(), move |dialog| {
-                let dialog = dialog.set_title(name).set_file_name(file);
-                dialog.add_filter(ending, &[ending]).save_file()
-            });
-        }
+        let file = format!("{}.{ending}", folder_name(&source.session));
+        self.dialog.button_ui(ui, &format!("{name}..."), move |dialog| {
+            let dialog = dialog.set_title(name).set_file_name(file);
+            dialog.add_filter(ending, &[ending]).save_file()
+        });
     }
 
     /// Draws the button that writes the file, and the last answer.
