@@ -43,7 +43,14 @@ impl Draft {
             // Like any new file, subject to the user's umask.
             #[cfg(unix)]
             builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-            let file = builder.tempfile_in(folder_of(path)).map_err(without_hidden_name)?;
+            let folder = folder_of(path);
+            let file = builder.tempfile_in(folder).map_err(|err| match err.kind() {
+                io::ErrorKind::NotFound => {
+                    let words = format!("there is no folder {}", folder.display());
+                    io::Error::new(io::ErrorKind::NotFound, words)
+                }
+                _ => without_hidden_name(err),
+            })?;
             // Between creation and lock, a sweep may have deleted it as abandoned.
             match file.as_file().try_lock() {
                 Err(TryLockError::WouldBlock) => continue,

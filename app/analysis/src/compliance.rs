@@ -301,12 +301,12 @@ impl ComplianceCorrection {
         let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
         if self.is_applied {
             format!(
-                "depths are corrected for machine compliance {id}, by {um:.0} ± {:.1} um at {peak:.2} N",
+                "depths are corrected for machine compliance {id}, by {um:.0} ± {:.1} µm at {peak:.2} N",
                 self.at_peak_std_error_um
             )
         } else {
             format!(
-                "depths are not corrected; machine compliance {id} would reduce them by {um:.0} um at {peak:.2} N"
+                "depths are not corrected; machine compliance {id} would reduce them by {um:.0} µm at {peak:.2} N"
             )
         }
     }

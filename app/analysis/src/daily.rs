@@ -8,9 +8,9 @@ use palpate_model::calibration::{Calibration, KnownWeight, WeightCheck};
 use palpate_model::control_chart::{ControlLimits, ControlSignal, READINGS_MIN};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
-use palpate_protocols::plans::{Plan, Step};
+use palpate_protocols::plans::{Plan, RampHold, Step};
 use palpate_protocols::weight_readings::{WeightReading, WeightReadings};
-use palpate_sessions::checks::{CheckPart, DailyCheck, last_check_of_day, read_checks};
+use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, last_check_of_day, read_checks};
 use palpate_sessions::{ChainError, Session};
 use std::path::Path;
 use std::time::SystemTime;
@@ -100,6 +100,55 @@ pub fn assess_daily_check(session: &Session) -> Result<Vec<CheckPart>, SourceErr
     };
     parts.extend(unfinished.map(|reason| part("run", Err(reason))));
     Ok(parts)
+}
+
+/// A session of the daily check with its judgement.
+pub fn judge_daily_check(session: &Session, now: SystemTime) -> Result<DailyCheck, SourceError> {
+    let parts = assess_daily_check(session)?;
+    let manifest = &session.manifest;
+    Ok(DailyCheck {
+        at: now.into(),
+        rig: manifest.rig.as_ref().map_or_else(String::new, |rig| rig.name.clone()),
+        by: manifest.operator.clone(),
+        session_id: manifest.session_id.clone(),
+        calibration: calibration_of(session)?.name,
+        is_passed: parts.iter().all(|part| part.is_passed),
+        parts,
+    })
+}
+
+/// What must be acknowledged before a run, before and after a daily check.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DailyCheckChange {
+    pub before: Vec<String>,
+    pub after: Vec<String>,
+}
+
+/// Judges the session in a folder and keeps its result for the day, if it is a daily check that nobody stopped.
+pub fn keep_daily_check(
+    library: &Path,
+    folder: &Path,
+    now: SystemTime,
+) -> Result<Option<(DailyCheck, DailyCheckChange)>, String> {
+    let session = Session::open(folder).map_err(|err| err.to_string())?;
+    let ending = session.end.as_ref().map(|end| end.outcome.as_str());
+    let is_stopped = [EndingKind::Stop.name(), EndingKind::Halt.name()].map(Some).contains(&ending);
+    if session.manifest.plan["name"] != DAILY_CHECK || is_stopped {
+        return Ok(None);
+    }
+    let check = judge_daily_check(&session, now).map_err(|err| err.to_string())?;
+    // Only a simulated rig has settings that reproduce it.
+    let rig = session.manifest.rig.as_ref();
+    let is_virtual = rig.is_some_and(|rig| !rig.settings.is_empty());
+    let to_acknowledge = || {
+        let touching = RampHold::default().plan();
+        let gate = DailyCheckGate::of(&touching, Some(library), &check.rig, is_virtual, now);
+        gate.map(|gate| gate.to_acknowledge()).map_err(|err| err.to_string())
+    };
+    let before = to_acknowledge()?;
+    add_check(library, &check).map_err(|err| err.to_string())?;
+    let after = to_acknowledge()?;
+    Ok(Some((check, DailyCheckChange { before, after })))
 }
 
 /// Mass in g and signal of every reading, in order.
@@ -299,8 +348,6 @@ pub const DAILY_CHECK_COMMAND: &str = "palpate daily-check";
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_protocols::plans::RampHold;
-    use palpate_sessions::checks::add_check;
 
     #[test]
     fn a_drift_is_told_before_a_check_fails() {

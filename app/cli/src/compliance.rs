@@ -84,7 +84,7 @@ fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
     let um = |mm: f64| 1e3 * mm;
     let mut lines = vec![
         format!(
-            "machine compliance of rig {}: {:.6} ± {:.6} mm/N ({:.3} ± {:.3} um/N)",
+            "machine compliance of rig {}: {:.6} ± {:.6} mm/N ({:.3} ± {:.3} µm/N)",
             found.rig,
             found.mm_per_n,
             found.std_error_mm_per_n,
@@ -107,7 +107,7 @@ fn text(found: &RigCompliance, saved: Option<&StoredCompliance>) -> String {
     ];
     lines.extend(found.presses.iter().map(|press| {
         format!(
-            "  press {}: {:.3} ± {:.3} um/N, {} samples",
+            "  press {}: {:.3} ± {:.3} µm/N, {} samples",
             press.press,
             um(press.mm_per_n),
             um(press.std_error_mm_per_n),

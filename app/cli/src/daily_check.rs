@@ -5,7 +5,7 @@ use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::RigArgs;
 use clap::Args;
-use palpate_analysis::daily::{DAILY_CHECK, assess_daily_check};
+use palpate_analysis::daily::{DAILY_CHECK, judge_daily_check};
 use palpate_model::metadata::SessionLabels;
 use palpate_model::metadata::SessionMetadata;
 use palpate_protocols::engine::EndingKind;
@@ -48,8 +48,6 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     if let Some(reason) = refusal.map_err(Failure::usage)? {
         return Err(Failure::usage(reason));
     }
-    let rig = bench.rig.description().name.clone();
-    let calibration = bench.calibration.name.clone();
     let request = RunRequest {
         plan,
         calibration: bench.calibration,
@@ -81,16 +79,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         )));
     }
     let session = Session::open(&view.folder).map_err(super::read_failure)?;
-    let parts = assess_daily_check(&session).map_err(super::source_failure)?;
-    let check = DailyCheck {
-        at: wall_now().into(),
-        rig,
-        by: args.operator.clone(),
-        session_id: session.manifest.session_id.clone(),
-        calibration,
-        is_passed: parts.iter().all(|part| part.is_passed),
-        parts,
-    };
+    let check = judge_daily_check(&session, wall_now()).map_err(super::source_failure)?;
     add_check(&library, &check).map_err(Failure::failed)?;
     let folder = view.folder.display().to_string();
     let object = serde_json::json!({

@@ -5,6 +5,7 @@ use crate::support::{
     stderr, stdout, succeeded, typed,
 };
 use palpate_model::calibration::Calibration;
+use palpate_sessions::log::Session;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -167,4 +168,26 @@ fn a_table_is_read_whole_or_refused_and_a_falling_signal_is_none() {
     let points = read["quality"]["points"].as_array().unwrap();
     let volts: Vec<f64> = points.iter().map(|one| one["signal_v"].as_f64().unwrap()).collect();
     assert_eq!(volts, [1.28, 1.6, 1.83, 2.06, 2.29, 2.52]);
+}
+
+/// What is kept in the library is what is used, in whichever way a session is recorded.
+#[test]
+fn the_calibration_in_force_reads_the_forces_unless_another_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "cell.csv", 0.0);
+    let import = split_words("calibration import cell.csv --name bench --rig sim --tolerance 0.05");
+    succeeded(&palpate(at, &import));
+    let used = |session: &str, more: &[&str]| {
+        let run = short_run(at, session, more);
+        succeeded(&run);
+        let manifest = Session::open(&at.join(session)).unwrap().manifest;
+        (manifest.calibration["name"].as_str().unwrap().to_owned(), run)
+    };
+    let (name, run) = used("in-force", &[]);
+    assert_eq!(name, "bench");
+    assert_says(&run, "forces are read with 'bench'");
+    assert_ne!(used("named", &["--calibration", "thesis"]).0, "bench");
+    // The straight cell of the ideal rig is another one.
+    assert_ne!(used("ideal", &["--profile", "ideal"]).0, "bench");
 }

@@ -105,7 +105,7 @@ impl WorkbenchApp {
 
     /// How far the exact fit of the run is.
     pub fn refit(&self) -> Refit<'_> {
-        self.workbench.latest_run.refit(self.workbench.run())
+        self.workbench.latest_run.refit(self.workbench.measured_run())
     }
 
     pub fn screen<T: Screen>(&self) -> Option<&T> {

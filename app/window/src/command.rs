@@ -50,6 +50,8 @@ pub enum UiCommand {
     ManualMove(ManualMove),
     /// Takes the protocol that calibrates the load cell.
     MeasureCalibration,
+    /// Takes the protocol of the daily check.
+    CheckRig,
     /// Saves the calibration that the last run measured.
     KeepCalibration,
     /// Starts the work of the screen shown: compare models, measure, test.
@@ -107,6 +109,12 @@ pub struct ManualMove {
 }
 
 impl ManualMove {
+    /// Whether a run by this plan is a move by hand: nothing is measured by it.
+    #[must_use]
+    pub fn is_plan(name: &str) -> bool {
+        [Self::jog(0.0, 0.0).protocol, Self::home().protocol].contains(&name)
+    }
+
     /// Moves by a distance in mm, positive towards the tissue, at a speed in mm/s.
     #[must_use]
     pub fn jog(distance: f64, speed: f64) -> Self {

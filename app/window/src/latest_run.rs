@@ -4,16 +4,18 @@ use crate::plots::PlotCache;
 use crate::screens::form::RunSetup;
 use crate::workers::fit::{Refit, Refitter, has_result};
 use eframe::egui::{Context, Ui};
+use palpate_analysis::daily::DailyCheckChange;
 use palpate_model::assessment::Assessment;
 use palpate_model::calibration::Calibration;
 use palpate_runner::RunView;
+use palpate_sessions::checks::DailyCheck;
 use std::path::{Path, PathBuf};
 
 /// Its plots, and what is found once it has ended.
 pub struct LatestRun {
     plots: PlotCache,
-    /// The start that the plots are of.
-    plotted: u64,
+    /// The session that the plots are of.
+    plotted: Option<PathBuf>,
     refitter: Refitter,
     /// The session whose end was reported.
     reported_end: Option<PathBuf>,
@@ -25,25 +27,25 @@ impl LatestRun {
     pub fn new(calibration: &Calibration) -> Self {
         Self {
             plots: PlotCache::for_calibration(calibration),
-            plotted: 0,
+            plotted: None,
             refitter: Refitter::default(),
             reported_end: None,
             last_start: None,
         }
     }
 
-    /// Follows the run of so many starts. `depth_mm` is the depth that the form asks for.
+    /// Follows a run. `depth_mm` is the depth that the form asks for.
     pub fn update(
         &mut self,
         ctx: &Context,
         run: Option<&RunView>,
-        starts: u64,
         setup: &RunSetup,
         depth_mm: f64,
         library: Option<&PathBuf>,
     ) {
-        if self.plotted != starts {
-            self.plotted = starts;
+        let session = run.map(|run| &run.folder);
+        if self.plotted.as_ref() != session {
+            self.plotted = session.cloned();
             self.plots = PlotCache::for_calibration(&setup.calibration);
         }
         self.plots.update(run, setup.limits.force_max, depth_mm);
@@ -69,6 +71,16 @@ impl LatestRun {
     /// Specimen and protocol of the last start.
     pub fn last_start(&self) -> Option<&[String; 2]> {
         self.last_start.as_ref()
+    }
+
+    /// What a daily check that has just been judged changes, once.
+    pub fn take_gate(&mut self) -> Option<DailyCheckChange> {
+        self.refitter.take_gate()
+    }
+
+    /// The daily check that this run was, judged; or why it could not be kept.
+    pub fn daily_check(&self, run: Option<&RunView>) -> Option<&Result<DailyCheck, String>> {
+        self.refitter.daily_check(run)
     }
 
     /// Why the checks of this run could not be made.

@@ -53,6 +53,8 @@ pub struct Occupation {
 pub struct Workbench {
     runner: Runner,
     pub snapshot: Arc<RunnerSnapshot>,
+    /// The last one whose run is not a move by hand.
+    measured: Arc<RunnerSnapshot>,
     /// Calibration and limits of new sessions.
     pub bench: RunSetup,
     pub form: ProtocolForm,
@@ -77,7 +79,6 @@ pub struct Workbench {
     pub queue: QueueDesk,
     pub latest_run: LatestRun,
     start: Start,
-    starts: u64,
     /// The run that begins once every loop of the window has stopped.
     next_run: Option<RunRequest>,
     is_closing: bool,
@@ -112,6 +113,7 @@ impl Workbench {
         let mut workbench = Self {
             latest_run: LatestRun::new(&request.calibration),
             snapshot: runner.snapshot(),
+            measured: runner.snapshot(),
             runner,
             bench: RunSetup {
                 calibration: request.calibration,
@@ -134,7 +136,6 @@ impl Workbench {
             front: ScreenOffers::default(),
             occupation: Occupation::default(),
             start: Start::None,
-            starts: 0,
             next_run: None,
             is_closing: false,
         };
@@ -151,6 +152,11 @@ impl Workbench {
     /// The run in progress or the last one.
     pub fn run(&self) -> Option<&RunView> {
         self.snapshot.run.as_ref()
+    }
+
+    /// The same without moves by hand, which leave the run before them on the screen.
+    pub fn measured_run(&self) -> Option<&RunView> {
+        self.measured.run.as_ref()
     }
 
     pub fn intent(&self) -> Intent {
@@ -312,23 +318,30 @@ impl Workbench {
     /// Takes the runner's snapshot and its answer to a start.
     pub fn poll(&mut self, ctx: &Context) {
         self.snapshot = self.runner.snapshot();
+        if !self.run().is_some_and(|run| ManualMove::is_plan(&run.plan_name)) {
+            self.measured = Arc::clone(&self.snapshot);
+        }
         self.ports.poll();
         self.poll_start();
         self.queue.poll(ctx);
     }
 
-    /// Follows the run of the snapshot; true when a run that has a result has just ended.
+    /// Follows the run that is shown; true when a run that has a result has just ended.
     pub fn follow_run(&mut self, ctx: &Context) -> bool {
-        let run = self.snapshot.run.as_ref();
+        let run = self.measured.run.as_ref();
         let depth_mm = self.form.checked().map_or(0.0, CheckedPlan::deepest_mm);
         let library = self.library.as_ref().ok();
-        self.latest_run.update(ctx, run, self.starts, &self.bench, depth_mm, library);
-        self.latest_run.take_ended(run)
+        self.latest_run.update(ctx, run, &self.bench, depth_mm, library);
+        if let Some(gate) = self.latest_run.take_gate() {
+            self.bench.take_gate(gate);
+            self.form.forget();
+        }
+        self.latest_run.take_ended(self.measured.run.as_ref())
     }
 
     /// Whether the run that waits for its verdict in the queue is the one that was checked last.
     pub fn is_open_run_shown(&self) -> bool {
-        let checked = self.library.as_ref().ok().zip(self.latest_run.assessed(self.run()));
+        let checked = self.library.as_ref().ok().zip(self.latest_run.assessed(self.measured_run()));
         let queue = self.queue.queue();
         checked.is_some_and(|(library, session)| queue.open_run_of(library, session).is_some())
     }
@@ -345,17 +358,14 @@ impl Workbench {
 
     /// Draws the plots of the run.
     pub fn plots_ui(&mut self, ui: &mut Ui) {
-        self.latest_run.plots_ui(ui, self.snapshot.run.as_ref());
+        self.latest_run.plots_ui(ui, self.measured.run.as_ref());
     }
 
     fn poll_start(&mut self) {
         match &self.start {
             Start::None => {}
             Start::Sent(answer) => match answer.try_recv() {
-                Ok(Ok(())) => {
-                    self.starts += 1;
-                    self.start = Start::Granted { seen: self.snapshot.sequence };
-                }
+                Ok(Ok(())) => self.start = Start::Granted { seen: self.snapshot.sequence },
                 Ok(Err(reason)) => {
                     self.refusal = Some(reason.to_string());
                     self.queue.cancel_start();

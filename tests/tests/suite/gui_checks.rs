@@ -1,14 +1,18 @@
 //! The screen of the daily checks, by accessible name: what two sessions measured, and what there is to do before the first.
 
 use eframe::egui::Key;
-use palpate_analysis::daily::{PastCheck, assess_daily_check};
+use palpate_analysis::daily::{DailyCheckGate, PastCheck, judge_daily_check};
+use palpate_analysis::window_requests::WorkbenchRequest;
+use palpate_drivers::sim::{SimProfile, SimSettings};
+use palpate_model::rig::Limits;
 use palpate_protocols::engine::EndingKind;
+use palpate_protocols::plans::RampHold;
 use palpate_runner::{TimeScale, wall_now};
 use palpate_sessions::Session;
-use palpate_sessions::checks::{DailyCheck, add_check};
+use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, read_checks};
 use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::checks::{ChecksScreen, SCREEN};
-use std::path::Path;
+use palpate_window::window::WindowOptions;
 
 fn checks(window: &TestWindow) -> Option<&[PastCheck]> {
     let checks = screen_of::<ChecksScreen>(window).checks()?;
@@ -35,23 +39,6 @@ fn check(flow: &mut WindowFlow) {
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
 }
 
-/// Keeps the result of a session as `palpate daily-check` does.
-fn keep(library: &Path, folder: &Path, rig: &str, session_id: Option<&str>) -> DailyCheck {
-    let session = Session::open(folder).unwrap();
-    let parts = assess_daily_check(&session).unwrap();
-    let check = DailyCheck {
-        at: wall_now().into(),
-        rig: rig.into(),
-        by: "Ada".into(),
-        session_id: session_id.unwrap_or(&session.manifest.session_id).into(),
-        calibration: "cell".into(),
-        is_passed: parts.iter().all(|part| part.is_passed),
-        parts,
-    };
-    add_check(library, &check).unwrap();
-    check
-}
-
 #[test]
 fn checks_stand_over_time_with_what_their_sessions_measured() {
     let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
@@ -60,32 +47,36 @@ fn checks_stand_over_time_with_what_their_sessions_measured() {
     flow.window.run_steps(2);
     flow.window.check_accessibility();
     assert!(flow.says("No daily check of this rig yet"));
-    assert!(flow.says("Run 'palpate daily-check' once a day"));
+    assert!(flow.says("Run it once a day"));
 
-    flow.click("Run");
-    flow.click("Change protocol...");
-    flow.click("Daily check");
+    flow.click("Run the daily check");
+    flow.window.run_steps(3);
     flow.type_into("operator", "Ada");
     check(&mut flow);
+    flow.wait_for_words("passed; it holds for today");
+    // It is not judged as a calibration, and nobody has to accept it.
+    assert!(!flow.says("too few to tell the curve") && !flow.says("Verdict"));
+    assert!(!flow.says("Save this calibration"));
     let library = flow.folder.path().to_owned();
     let rig = flow.window.state().snapshot().rig.description.name.clone();
-    let session = flow.sessions().into_iter().find(|path| Session::open(path).is_ok());
-    let session = session.unwrap();
-    let gone = keep(&library, &session, &rig, Some("a session that is gone"));
-    let kept = keep(&library, &session, &rig, None);
+    let session = flow.sessions().into_iter().find_map(|path| Session::open(&path).ok());
+    let kept = read_checks(&library, &rig).unwrap().pop().unwrap();
+    let judged = judge_daily_check(&session.unwrap(), wall_now()).unwrap();
+    assert_eq!(DailyCheck { at: kept.at, ..judged }, kept);
+    let gone = DailyCheck { session_id: "a session that is gone".into(), ..kept.clone() };
+    add_check(&library, &gone).unwrap();
 
     flow.click(SCREEN.name);
-    flow.click("Read again  F6");
     flow.wait("both checks", |window| checks(window).is_some_and(|checks| checks.len() == 2));
     flow.window.run_steps(2);
     flow.window.check_accessibility();
     let [first, second] = checks(&flow.window).unwrap() else {
         panic!("two checks were kept");
     };
-    assert_eq!((&first.check, &second.check), (&gone, &kept));
+    assert_eq!((&first.check, &second.check), (&kept, &gone));
     // Of what is not in the library nothing is known but what was said then.
-    assert_eq!((first.zero, first.weight), (None, None));
-    let (zero, weight) = (second.zero.unwrap(), second.weight.unwrap());
+    assert_eq!((second.zero, second.weight), (None, None));
+    let (zero, weight) = (first.zero.unwrap(), first.weight.unwrap());
     let part = |what: &str| kept.parts.iter().find(|part| part.what == what).unwrap();
     // The numbers of the plot are those of the sentences.
     for (what, text) in
@@ -100,4 +91,41 @@ fn checks_stand_over_time_with_what_their_sessions_measured() {
         assert!(flow.says(&words), "{words}");
     }
     assert!(flow.says(&part("weight").sentence));
+}
+
+#[test]
+fn a_check_that_passes_takes_the_place_of_one_that_failed_in_what_is_to_be_acknowledged() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = "the way home is blocked";
+    let part = CheckPart { what: "home".into(), is_passed: false, sentence: words.into() };
+    let failed = DailyCheck {
+        at: wall_now().into(),
+        rig: "sim".into(),
+        by: "Ada".into(),
+        session_id: "some session".into(),
+        calibration: "cell".into(),
+        is_passed: false,
+        parts: vec![part],
+    };
+    add_check(folder.path(), &failed).unwrap();
+    let rig = palpate_drivers::open("sim", &SimSettings::default()).unwrap();
+    let plan = RampHold::default().plan();
+    let gate = DailyCheckGate::of(&plan, Some(folder.path()), "sim", true, wall_now()).unwrap();
+    let limits = Limits::for_travel(rig.description().travel);
+    let calibration = palpate_drivers::sim::calibration(SimProfile::Lab);
+    let request = WorkbenchRequest {
+        to_acknowledge: gate.to_acknowledge(),
+        ..WorkbenchRequest::of(rig, calibration, limits, TimeScale::Factor(20.0))
+    };
+    let options = WindowOptions { settings: None, ..WindowOptions::from_request(request) };
+    let mut flow = WindowFlow::open_on(options, folder);
+    flow.click("Run");
+    flow.window.run_steps(3);
+    assert!(flow.says(words) && !flow.is_enabled("Start  F5"));
+    flow.act_by_name("Run the daily check");
+    flow.type_into("operator", "Ada");
+    check(&mut flow);
+    flow.wait_for_words("passed; it holds for today");
+    flow.act_by_name("Protocol ramp-hold");
+    assert!(!flow.says(words) && flow.is_enabled("Start  F5"));
 }

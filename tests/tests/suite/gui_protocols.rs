@@ -148,7 +148,7 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
     });
     flow.type_into("deep", "1e4");
     assert!(!flow.is_enabled("Start  F5"));
-    assert!(flow.says("line 15") || flow.says("step 5, ramp"));
+    assert!(flow.says("10000 mm is beyond the travel"));
     flow.type_into("deep", "3");
     flow.click("Start  F5");
     let run = flow.wait_for_end();
@@ -210,7 +210,7 @@ fn a_calibration_is_measured_by_prompts_judged_kept_and_used() {
     flow.window.run_steps(2);
     let shelf = CalibrationStore::open(flow.folder.path());
     let kept = shelf.in_force("sim").unwrap();
-    assert!(flow.says(&kept.id) && flow.says("in use"));
+    assert!(flow.says(&kept.id) && flow.says("in force"));
     assert!(flow.is_enabled("Use calibration  F6"));
     flow.window.key_press(Key::F6);
     flow.window.run_steps(3);

@@ -95,7 +95,7 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     assert!(flow.says(&format!("all 10: ramp-hold, {day}")));
     assert!(flow.says(&format!("in front: {}", session_name(&manifest))));
     flow.window.check_accessibility();
-    // One comes to the front, another is removed; both are undone, by key and by button.
+    // One comes to the front, another is removed and comes back, by button and by key.
     let order = |flow: &WindowFlow| -> Vec<String> {
         named(flow, "remove: ").into_iter().map(|(name, _)| name).collect()
     };
@@ -103,16 +103,21 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     let [third, fifth] = [&before[2], &before[4]];
     flow.click(&format!("front: {third}"));
     assert_eq!(order(&flow)[..3], [third.clone(), before[0].clone(), before[1].clone()]);
-    let moved = order(&flow);
-    flow.click(&format!("remove: {fifth}"));
-    assert_eq!(order(&flow).len(), 9);
-    flow.click(&format!("Undo: remove {fifth}"));
-    wait_until_read(&mut flow, 10);
-    assert_eq!(order(&flow), moved);
-    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Z);
-    flow.window.run_steps(3);
-    assert_eq!(order(&flow), before);
+    // To look at one is nothing that has to be undone.
     assert!(!flow.says("Undo: "));
+    let moved = order(&flow);
+    for by_key in [false, true] {
+        flow.click(&format!("remove: {fifth}"));
+        assert_eq!(order(&flow).len(), 9);
+        match by_key {
+            false => flow.click(&format!("Undo: remove {fifth}")),
+            true => flow.window.key_press_modifiers(Modifiers::COMMAND, Key::Z),
+        }
+        flow.window.run_steps(3);
+        wait_until_read(&mut flow, 10);
+        assert_eq!(order(&flow), moved);
+        assert!(!flow.says("Undo: "));
+    }
     // All of them go and come back; what was added since stays.
     flow.click("Clear list");
     assert!(flow.says("no session is shown yet"));
@@ -120,7 +125,7 @@ fn ten_sessions_take_ten_lines_and_what_was_done_with_them_is_undone() {
     flow.click("Add to view");
     flow.click("Undo: clear 10 sessions");
     wait_until_read(&mut flow, 10);
-    assert_eq!(order(&flow), before);
+    assert_eq!(order(&flow), moved);
 }
 
 /// Fits all sessions shown.
@@ -216,7 +221,7 @@ fn copies_figure(flow: &mut WindowFlow) {
     for ink in Tokens::of(false).sessions {
         let count = picture.pixels.iter().filter(|pixel| **pixel == ink).count();
         // More than the line of a legend: 40 px of 2 px, twice as fine.
-        assert!(count > 1000, "{ink:?}: {count}");
+        assert!(count > 400, "{ink:?}: {count}");
     }
 }
 

@@ -179,9 +179,9 @@ fn a_window_that_ends_in_mid_run_leaves_the_specimen_to_be_judged() {
     let next = found.next().unwrap();
     assert_eq!((next.wanted.specimen.as_str(), next.rejected), ("pig 1", 1));
     // The list says why a specimen is left out.
-    flow.type_into("why", "no tissue left");
     flow.window.get_by_label("pig 2, waiting").click_accesskit();
     flow.window.run_steps(2);
+    flow.type_into("why", "no tissue left");
     flow.click("Skip");
     flow.wait_for_words("1 skipped");
     assert_eq!(queue(&flow).find("pig 2").unwrap().state, SpecimenState::Skipped);
@@ -249,4 +249,21 @@ fn a_start_that_waits_for_a_verdict_leads_to_the_run_that_it_is_about() {
     flow.click("Accept");
     flow.wait_for_words("1 waiting, 1 accepted");
     assert_eq!(queue(&flow).find("pig 1").unwrap().state, SpecimenState::Accepted);
+}
+
+#[test]
+fn a_move_by_hand_leaves_the_result_of_the_run_before_it() {
+    let mut flow = WindowFlow::open(TimeScale::Max);
+    flow.click("Run");
+    shorten(&mut flow);
+    start(&mut flow);
+    flow.wait_for_words("Exact fit");
+    flow.act_by_name("Find home");
+    flow.wait("the end of the move", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.plan_name == "check-home" && run.outcome.is_some())
+    });
+    flow.act_by_name("Show the screen Result");
+    flow.window.run_steps(3);
+    assert!(flow.says("Exact fit") && flow.says("Verdict") && flow.is_enabled("Accept"));
 }

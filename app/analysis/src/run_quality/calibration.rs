@@ -1,5 +1,6 @@
 //! Checks of a session that measured a calibration.
 
+use crate::daily::DAILY_CHECK;
 use palpate_model::assessment::QualityCheck;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::RampHold;
@@ -9,7 +10,9 @@ use palpate_sessions::Session;
 
 /// None where the session measured no calibration.
 pub(super) fn calibration_checks(session: &Session) -> Vec<QualityCheck> {
-    let found = calibration_from_session(session, "measured").ok();
+    // A daily check weighs too, and has a judgement of its own.
+    let is_check = session.manifest.plan["name"] == DAILY_CHECK;
+    let found = (!is_check).then(|| calibration_from_session(session, "measured").ok()).flatten();
     let checks = found.and_then(|calibration| {
         let curve = calibration.curve().ok()?;
         // The protocol that is most often run with a new calibration.

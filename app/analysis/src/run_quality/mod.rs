@@ -178,7 +178,7 @@ fn contact(session: &Session, records: &[(usize, &Record)]) -> QualityCheck {
         return of(QualityRank::Doubtful, words).at(at, at);
     }
     let rank = rank_of(error, CONTACT_ERROR_MAX_MM, f64::INFINITY);
-    of(rank, format!("contact was found to {:.1} um before the probe pressed", 1e3 * error))
+    of(rank, format!("contact was found to {:.1} µm before the probe pressed", 1e3 * error))
 }
 
 fn saturation(session: &Session) -> QualityCheck {

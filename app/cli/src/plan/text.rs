@@ -43,7 +43,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
         .collect();
     let noise = match &report.signal {
         Some(signal) => format!(
-            "signal  noise {} mV in every sample, drift {} uV in one second, contact position ± {} um; {rate} samples per second",
+            "signal  noise {} mV in every sample, drift {} µV in one second, contact position ± {} µm; {rate} samples per second",
             digits(signal.noise_v * 1e3, 3),
             digits(signal.walk_v * 1e6, 3),
             digits(signal.contact_error_mm * 1e3, 3)

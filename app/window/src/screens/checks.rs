@@ -1,16 +1,16 @@
 //! The daily checks of the rig over time: deviations of its zero and of a known weight, and their limits.
 
-use super::screen::{Commands, Screen, ScreenEntry, Workbench};
+use super::screen::{Commands, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::plots::figure::{PlotLook, plot_ui};
 use crate::widgets::{
-    Column, Emphasis, TableRow, alarm_ui, answer_ui, fact_ui, heading_ui, quiet_ui, section_ui,
-    table_ui, work_ui,
+    Column, Emphasis, NamedControl, TableRow, alarm_ui, answer_ui, fact_ui, heading_ui, quiet_ui,
+    section_ui, table_ui, work_ui,
 };
 use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local, Utc};
-use eframe::egui::{Context, Key, Ui, vec2};
+use eframe::egui::{Button, Context, Key, Ui, vec2};
 use palpate_analysis::daily::{
-    DAILY_CHECK_COMMAND, DailyCheckDeviation, PastCheck, control_limits, past_checks, trends,
+    DailyCheckDeviation, PastCheck, control_limits, past_checks, trends,
 };
 use palpate_analysis::report::live::deviation_plot;
 use std::path::PathBuf;
@@ -25,7 +25,8 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
             library: workbench.library.clone(),
             rig: workbench.snapshot.rig.description.name.clone(),
             task: BackgroundTask::default(),
-            is_read: false,
+            was_shown: false,
+            is_stale: true,
         })
     },
 };
@@ -50,7 +51,10 @@ pub struct ChecksScreen {
     library: Result<PathBuf, String>,
     rig: String,
     task: BackgroundTask<Vec<PastCheck>>,
-    is_read: bool,
+    /// It was shown in the last frame.
+    was_shown: bool,
+    /// A check may have been made since it was last shown.
+    is_stale: bool,
 }
 
 impl ChecksScreen {
@@ -68,7 +72,7 @@ impl ChecksScreen {
 }
 
 impl Screen for ChecksScreen {
-    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, &format!("Daily checks of {}", self.rig));
         quiet_ui(
             ui,
@@ -77,7 +81,11 @@ impl Screen for ChecksScreen {
         ui.add_space(8.0);
         work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);
         section_ui(ui, "New check");
-        quiet_ui(ui, format!("Run '{DAILY_CHECK_COMMAND}' on the command line."));
+        let words = "Run the daily check";
+        let button = Button::new(words).min_size(vec2(150.0, 48.0));
+        if ui.add_enabled(!workbench.is_busy(), button).named(words).clicked() {
+            commands.push(UiCommand::CheckRig);
+        }
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
@@ -85,9 +93,7 @@ impl Screen for ChecksScreen {
         let Some(checks) = answer_ui(ui, &self.task, before) else { return };
         if checks.is_empty() {
             heading_ui(ui, "No daily check of this rig yet");
-            ui.label(format!(
-                "Run '{DAILY_CHECK_COMMAND}' once a day before the first specimen; this screen then shows the drift of both readings, the empty load cell and the weight."
-            ));
+            ui.label("Run it once a day before the first specimen; this screen then shows the drift of both readings, the empty load cell and the weight.");
             return;
         }
         let height = ui.available_height() * PLOT_SHARE / PLOTS.len() as f32 - 26.0;
@@ -138,11 +144,13 @@ impl Screen for ChecksScreen {
     }
 
     fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        self.is_stale |= !std::mem::take(&mut self.was_shown);
         self.task.poll();
     }
 
     fn shown(&mut self, ctx: &Context) {
-        if !std::mem::replace(&mut self.is_read, true) {
+        self.was_shown = true;
+        if std::mem::take(&mut self.is_stale) {
             self.read(ctx);
         }
     }

@@ -1,7 +1,7 @@
 //! What the plan will do, before anything moves.
 
 use super::form::ProtocolForm;
-use crate::widgets::{alarm_ui, fact_ui, placeholder_ui, quiet_ui, tick_box};
+use crate::widgets::{alarm_ui, fact_ui, placeholder_ui, sentence_ui, tick_box};
 use eframe::egui::Ui;
 use palpate_figures::uncertain::clock;
 use palpate_protocols::preview::Preview;
@@ -24,7 +24,7 @@ pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     }
     let warnings = checked.warnings.iter().map(ToString::to_string);
     for note in warnings.chain(preview.notes.iter().cloned()) {
-        quiet_ui(ui, format!("Note: {note}"));
+        sentence_ui(ui, format!("Note: {note}"));
     }
 }
 

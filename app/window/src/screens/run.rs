@@ -14,6 +14,7 @@ use crate::plots::course::CourseLimits;
 use crate::widgets::require;
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
+use palpate_analysis::daily::DAILY_CHECK;
 use palpate_protocols::file::BUILT_IN;
 use palpate_runner::{RunRequest, wall_now};
 use palpate_sessions::recover::recover_library;
@@ -155,7 +156,7 @@ impl Screen for RunScreen {
         match (self.middle, run) {
             (RunPane::Weighing, Some(run)) => {
                 let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
-                weighing_ui(ui, run, signal, &workbench.bench, commands);
+                weighing_ui(ui, run, signal, &workbench.bench);
             }
             (RunPane::Approach, Some(run)) => self.approach.ui(ui, run),
             (RunPane::Weighing | RunPane::Approach, None) => {}
@@ -238,6 +239,10 @@ impl Screen for RunScreen {
                 self.take_protocol("load-cell-calibration", workbench);
                 return Reaction::Show;
             }
+            UiCommand::CheckRig => {
+                self.take_protocol(DAILY_CHECK, workbench);
+                return Reaction::Show;
+            }
             UiCommand::OpenProtocol => self.read(None, ctx, workbench),
             UiCommand::Chosen(PathPurpose::Protocol, path) => self.read(Some(path), ctx, workbench),
             UiCommand::Chosen(PathPurpose::NewSessions, folder) => {
@@ -269,6 +274,8 @@ impl Screen for RunScreen {
             let words = format!("Protocol {name}");
             PaletteAction::new(words, "", UiCommand::TakeProtocol(name)).if_ok(is_free.clone())
         }));
+        let check = PaletteAction::new("Run the daily check", "", UiCommand::CheckRig);
+        actions.push(check.if_ok(is_free));
         actions.push(PaletteAction::new(
             "Open a protocol file",
             "",

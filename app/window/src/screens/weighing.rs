@@ -2,12 +2,10 @@
 //! the calibration in use expects.
 
 use super::form::RunSetup;
-use crate::command::{Commands, UiCommand};
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
-use crate::shell::run_strip::{RunControl, is_controllable};
 use crate::theme::reading_style;
 use crate::widgets::{
-    Column, Emphasis, TableRow, heading_ui, reason_button, require, share_ui, table_ui, tokens_of,
+    Column, Emphasis, TableRow, heading_ui, share_ui, table_ui, tokens_of, width_of,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing_plot;
@@ -19,38 +17,42 @@ use palpate_runner::{PlannedWeight, RunView};
 /// Height of the table in points.
 const TABLE_HEIGHT: f32 = 250.0;
 
+/// Heading and width of a column, whether it has numbers, and whether it stays where there is little room.
+const COLUMNS: [(&str, f32, bool, bool); 8] = [
+    ("pass", 34.0, true, true),
+    ("masses go", 66.0, false, true),
+    ("mass (g)", 60.0, true, true),
+    ("expected (V)", 82.0, true, false),
+    ("measured (V)", 82.0, true, true),
+    ("deviation (mV)", 92.0, true, false),
+    ("deviation (N)", 84.0, true, true),
+    ("", 44.0, false, true),
+];
+
 /// Draws the readings of a run that weighs.
-pub fn weighing_ui(
-    ui: &mut Ui,
-    run: &RunView,
-    signal: Option<Volts>,
-    bench: &RunSetup,
-    commands: &mut Commands,
-) {
+pub fn weighing_ui(ui: &mut Ui, run: &RunView, signal: Option<Volts>, bench: &RunSetup) {
     let next = next_of(run);
     now_ui(ui, run, next, signal, &bench.curve);
-    let verdict = require(is_controllable(run), "the run has stopped");
-    let verdict = verdict.and(run.can_redo.clone());
-    ui.horizontal(|ui| {
-        if reason_button(ui, "Read the last weight again", vec2(190.0, 28.0), &verdict) {
-            commands.push(UiCommand::RunControl(RunControl::Redo));
-        }
-    });
     ui.add_space(4.0);
-    let rows: Vec<TableRow> =
+    let columns = COLUMNS.map(|(head, width, is_number, _)| match is_number {
+        true => Column::numbers(head, width),
+        false => Column::words(head, width),
+    });
+    let mut rows: Vec<TableRow> =
         run.planned_weights.iter().map(|planned| row(planned, run, next, &bench.curve)).collect();
-    let columns = [
-        Column::numbers("pass", 34.0),
-        Column::words("masses go", 66.0),
-        Column::numbers("mass (g)", 60.0),
-        Column::numbers("expected (V)", 82.0),
-        Column::numbers("measured (V)", 82.0),
-        Column::numbers("deviation (mV)", 92.0),
-        Column::numbers("deviation (N)", 84.0),
-        Column::words("", 44.0),
-    ];
     ui.allocate_ui(vec2(ui.available_width(), TABLE_HEIGHT), |ui| {
-        table_ui(ui, "readings", &columns, &rows);
+        if width_of(&columns) <= ui.available_width() {
+            table_ui(ui, "readings", &columns, &rows);
+            return;
+        }
+        // What can be told from the others is left out where there is no room.
+        let kept = |place: &usize| COLUMNS[*place].3;
+        let places: Vec<usize> = (0..COLUMNS.len()).filter(kept).collect();
+        for row in &mut rows {
+            row.cells = places.iter().map(|place| row.cells[*place].clone()).collect();
+        }
+        let kept: Vec<Column> = places.iter().map(|place| columns[*place].clone()).collect();
+        table_ui(ui, "readings", &kept, &rows);
     });
     residuals_ui(ui, run, bench);
 }

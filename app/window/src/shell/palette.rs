@@ -104,8 +104,9 @@ impl Palette {
                 self.is_open = false;
             }
         });
-        let found: Vec<&PaletteAction> =
+        let mut found: Vec<&PaletteAction> =
             actions.iter().filter(|one| is_found(&one.name, &self.typed)).collect();
+        found.sort_by_key(|one| distance(&one.name, &self.typed));
         let last = found.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(moved).min(last);
         ui.add_space(4.0);
@@ -164,9 +165,28 @@ fn is_found(name: &str, typed: &str) -> bool {
     typed.split_whitespace().all(|word| name.contains(word))
 }
 
+/// How far a name is from what is typed: the same, or the same behind "Go to", or begun with it, or only containing it.
+fn distance(name: &str, typed: &str) -> u8 {
+    let (name, typed) = (name.to_lowercase(), typed.trim().to_lowercase());
+    let own = name.strip_prefix("go to ").unwrap_or(&name);
+    match (own == typed, own.starts_with(&typed)) {
+        _ if typed.is_empty() => 0,
+        (true, _) => 0,
+        (false, true) => 1,
+        (false, false) => 2,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_name_that_was_typed_comes_before_those_that_contain_it() {
+        let names = ["Show Result: judge the run and see its parameters", "Go to Parameters"];
+        assert!(distance(names[1], "parameters") < distance(names[0], "parameters"));
+        assert_eq!(names.map(|name| distance(name, "")), [0, 0]);
+    }
 
     #[test]
     fn words_are_found_in_any_order_and_case() {

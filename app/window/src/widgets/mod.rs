@@ -18,6 +18,6 @@ pub use fields::*;
 pub use glyph::*;
 pub use loop_times::loop_times_ui;
 pub use places::{NamedControl, places};
-pub use table::{Column, Emphasis, TableRow, table_ui};
+pub use table::{Column, Emphasis, TableRow, table_ui, width_of};
 pub use task_bar::*;
 pub use text::*;

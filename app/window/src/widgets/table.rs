@@ -73,7 +73,7 @@ pub struct TableRow {
     pub hint: Option<String>,
 }
 
-/// Draws the table in the space there is; scrolls both ways.
+/// Draws the table in the space there is; scrolls both ways, and to the marked row when another is marked.
 pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) {
     let tokens = tokens_of(ui);
     let width = width_of(columns);
@@ -85,37 +85,42 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[TableRow]) 
             ui.add(Label::new(text).truncate());
         });
         ui.separator();
-        ScrollArea::vertical().id_salt((name, "rows")).auto_shrink(false).show_rows(
-            ui,
-            ROW,
-            rows.len(),
-            |ui, shown| {
-                for row in &rows[shown] {
-                    let ink = row.emphasis.ink(tokens);
-                    let rect = row_ui(ui, columns, width, |ui, index, _| {
-                        let Some(cell) = row.cells.get(index) else { return };
-                        let mut text = RichText::new(cell).color(ink);
-                        if row.emphasis == Emphasis::Marked {
-                            text = text.strong();
-                        }
-                        ui.add(Label::new(text).truncate());
-                    });
+        let mut area = ScrollArea::vertical().id_salt((name, "rows")).auto_shrink(false);
+        let marked = rows.iter().position(|row| row.emphasis == Emphasis::Marked);
+        let known = ui.scope_id().with((name, "marked"));
+        let before = ui.data(|data| data.get_temp::<Option<usize>>(known));
+        if let Some(at) = marked.filter(|_| before != Some(marked)) {
+            let above = 0.5 * (ui.available_height() - ROW);
+            area = area.vertical_scroll_offset((at as f32 * ROW - above).max(0.0));
+        }
+        ui.data_mut(|data| data.insert_temp(known, marked));
+        area.show_rows(ui, ROW, rows.len(), |ui, shown| {
+            for row in &rows[shown] {
+                let ink = row.emphasis.ink(tokens);
+                let rect = row_ui(ui, columns, width, |ui, index, _| {
+                    let Some(cell) = row.cells.get(index) else { return };
+                    let mut text = RichText::new(cell).color(ink);
                     if row.emphasis == Emphasis::Marked {
-                        let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
-                        ui.painter().rect_filled(mark, 0.0, tokens.text);
+                        text = text.strong();
                     }
-                    if let Some(hint) = &row.hint {
-                        let id = ui.scope_id().with((name, &row.cells));
-                        ui.interact(rect, id, Sense::hover()).on_hover_text(hint);
-                    }
+                    ui.add(Label::new(text).truncate());
+                });
+                if row.emphasis == Emphasis::Marked {
+                    let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
+                    ui.painter().rect_filled(mark, 0.0, tokens.text);
                 }
-            },
-        );
+                if let Some(hint) = &row.hint {
+                    let id = ui.scope_id().with((name, &row.cells));
+                    ui.interact(rect, id, Sense::hover()).on_hover_text(hint);
+                }
+            }
+        });
     });
 }
 
 /// Width in points of all columns with the space between them.
-pub(super) fn width_of(columns: &[Column]) -> f32 {
+#[must_use]
+pub fn width_of(columns: &[Column]) -> f32 {
     columns.iter().map(|column| column.width + GAP).sum()
 }
 

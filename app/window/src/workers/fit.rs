@@ -3,6 +3,7 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
+use palpate_analysis::daily::{DailyCheckChange, keep_daily_check};
 use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
 use palpate_analysis::run_quality::assess_folder;
@@ -11,7 +12,8 @@ use palpate_figures::figure::{Ink, SeriesShape};
 use palpate_model::assessment::Assessment;
 use palpate_model::rig::Phase;
 use palpate_rheology::fit::{FitOptions, FitReport};
-use palpate_runner::RunView;
+use palpate_runner::{RunView, wall_now};
+use palpate_sessions::checks::DailyCheck;
 use std::path::{Path, PathBuf};
 
 /// Columns for which the curves of a plot are thinned: more than a screen is wide.
@@ -31,6 +33,9 @@ pub struct ExactFit {
 struct RunAnswer {
     quality: Assessment,
     fit: Result<ExactFit, String>,
+    /// Where the run was a daily check.
+    check: Option<Result<DailyCheck, String>>,
+    change: Option<DailyCheckChange>,
 }
 
 /// How far the exact fit of the run on the screen is.
@@ -51,12 +56,13 @@ pub struct Refitter {
     answer: BackgroundTask<RunAnswer>,
     /// The session that is or was fitted.
     session: Option<PathBuf>,
+    has_new_answer: bool,
 }
 
 impl Refitter {
     /// Fetches an answer, and starts when a run has ended. `library` has the daily checks of the rig.
     pub fn update(&mut self, ctx: &Context, run: Option<&RunView>, library: Option<&PathBuf>) {
-        self.answer.poll();
+        self.has_new_answer |= self.answer.poll();
         let ended = run.filter(|run| run.outcome.is_some() && has_result(run));
         let folder = ended.map(|run| &run.folder);
         if self.answer.is_busy() || self.session.as_ref() == folder {
@@ -68,6 +74,19 @@ impl Refitter {
             let library = library.cloned();
             self.answer.start("fit", ctx, move |_| assess(&folder, library.as_deref()));
         }
+    }
+
+    /// What a daily check that has just been judged changes, once.
+    pub fn take_gate(&mut self) -> Option<DailyCheckChange> {
+        if !std::mem::take(&mut self.has_new_answer) {
+            return None;
+        }
+        self.answer.answer()?.as_ref().ok()?.change.clone()
+    }
+
+    /// The daily check that this run was, judged; or why it could not be kept.
+    pub fn daily_check(&self, run: Option<&RunView>) -> Option<&Result<DailyCheck, String>> {
+        self.answer_of(run)?.check.as_ref()
     }
 
     fn is_of(&self, run: Option<&RunView>) -> bool {
@@ -127,7 +146,16 @@ fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {
     let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
     let found = assess_folder(folder, library, &recipe).map_err(|err| err.to_string())?;
     let fit = found.fitted.map_err(|err| err.to_string()).and_then(exact_fit);
-    Ok(RunAnswer { quality: found.quality, fit })
+    let library = library.ok_or("there is no library to keep the daily check in");
+    let (check, change) = match library
+        .map_err(str::to_owned)
+        .and_then(|at| keep_daily_check(at, folder, wall_now()))
+    {
+        Ok(None) => (None, None),
+        Ok(Some((check, change))) => (Some(Ok(check)), Some(change)),
+        Err(reason) => (Some(Err(reason)), None),
+    };
+    Ok(RunAnswer { quality: found.quality, fit, check, change })
 }
 
 fn exact_fit(fitted: SourceFit) -> Result<ExactFit, String> {

@@ -12,6 +12,7 @@ use eframe::egui::{Button, Context, Key, TextEdit, Ui, vec2};
 use palpate_analysis::calibrations::{
     CalibrationOverview, CalibrationView, read, store_calibration,
 };
+use palpate_analysis::daily::DAILY_CHECK;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -37,7 +38,10 @@ pub struct CalibrationScreen {
 
 /// The session of a run that measured a calibration, or why there is none to save.
 pub fn calibration_session(run: Option<&RunView>) -> Result<&Path, String> {
-    let has_weighed = |run: &&RunView| run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh);
+    let has_weighed = |run: &&RunView| {
+        let is_check = run.plan_name == DAILY_CHECK;
+        !is_check && run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh)
+    };
     let Some(run) = run.filter(has_weighed) else {
         return Err("the last run measured no calibration; measure a calibration first".into());
     };
@@ -125,7 +129,7 @@ impl Screen for CalibrationScreen {
             ui.add(input).labelled_by(label.id).named("name");
         });
         let has_name = require(!self.name.trim().is_empty(), "type a name first");
-        let verdict = calibration_session(workbench.run()).and(has_name);
+        let verdict = calibration_session(workbench.measured_run()).and(has_name);
         if reason_button(ui, "Save calibration of last run", vec2(150.0, 28.0), &verdict) {
             commands.push(UiCommand::KeepCalibration);
         }
@@ -200,7 +204,7 @@ impl Screen for CalibrationScreen {
 
     fn act(&mut self, ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
-            UiCommand::KeepCalibration => self.keep(workbench.run(), ctx),
+            UiCommand::KeepCalibration => self.keep(workbench.measured_run(), ctx),
             _ => return Reaction::NotMine,
         }
         Reaction::Show
@@ -217,7 +221,7 @@ impl Screen for CalibrationScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let is_measured = calibration_session(workbench.run()).map(|_| ());
+        let is_measured = calibration_session(workbench.measured_run()).map(|_| ());
         let keep = "Save the calibration of the last run";
         vec![
             PaletteAction::new("Measure a calibration", "", UiCommand::MeasureCalibration)

@@ -6,7 +6,7 @@ pub use field::{LabelField, ParamField};
 
 use crate::command::ManualMove;
 use crate::widgets::require;
-use palpate_analysis::daily::needs_daily_check;
+use palpate_analysis::daily::{DailyCheckChange, needs_daily_check};
 use palpate_analysis::protocol_sources::ProtocolSource;
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::metadata::{METADATA_KEYS, SessionLabels};
@@ -34,6 +34,19 @@ pub struct RunSetup {
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
+}
+
+impl RunSetup {
+    /// What must be acknowledged before a plan: nothing where it touches no specimen, as a daily check does.
+    pub fn to_acknowledge_for(&self, plan: &Plan) -> Vec<String> {
+        if needs_daily_check(plan) { self.to_acknowledge.clone() } else { Vec::new() }
+    }
+
+    /// Takes over what a daily check that was just made has to say of runs.
+    pub fn take_gate(&mut self, change: DailyCheckChange) {
+        self.to_acknowledge.retain(|words| !change.before.contains(words));
+        self.to_acknowledge.extend(change.after);
+    }
 }
 
 /// The protocol that is chosen, with the values typed for it.
@@ -162,7 +175,7 @@ impl ProtocolForm {
         };
         let checked = protocol.write_out(values).map(|written| {
             let mut preview = preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed);
-            preview.acknowledgements.extend(bench.to_acknowledge.iter().cloned());
+            preview.acknowledgements.extend(bench.to_acknowledge_for(&written.plan));
             CheckedPlan {
                 preview,
                 outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
@@ -173,7 +186,12 @@ impl ProtocolForm {
         let problems = checked.as_ref().err().map_or(&[][..], Vec::as_slice);
         for field in &mut self.fields {
             let own = problems.iter().find(|problem| field.is_named_in(&problem.message));
-            field.objection = own.map(|problem| problem.message.clone());
+            // Whoever wrote the file finds the line; a built-in one has none that matters.
+            let words = |problem: &ProtocolProblem| match &self.file {
+                Some(_) => problem.to_string(),
+                None => problem.message.clone(),
+            };
+            field.objection = own.map(words);
         }
         self.checked = Some((key, checked));
     }
@@ -229,6 +247,12 @@ impl ProtocolForm {
         }
     }
 
+    /// The same for specimens that are added to the queue: a calibration or a daily check is for none.
+    pub fn specimen_protocol(&self) -> String {
+        let is_for_none = self.checked().is_some_and(|checked| !needs_daily_check(&checked.plan));
+        if is_for_none { FIRST.to_owned() } else { self.source_name() }
+    }
+
     pub fn label_text(&self, name: &str) -> &str {
         let field = self.label_fields.iter().find(|field| field.key.name == name);
         field.map_or("", |field| &field.text)
@@ -260,13 +284,13 @@ impl ProtocolForm {
 
     fn request_for(&self, plan: Plan, bench: &RunSetup, is_acknowledged: bool) -> RunRequest {
         RunRequest {
-            plan,
             calibration: bench.calibration.clone(),
             limits: bench.limits,
             out: self.session_folder(),
             labels: self.labels.clone(),
             is_acknowledged,
-            to_acknowledge: bench.to_acknowledge.clone(),
+            to_acknowledge: bench.to_acknowledge_for(&plan),
+            plan,
             after_stop: AfterStop::Wait,
             answers: PromptResponder::Operator,
             leader: None,

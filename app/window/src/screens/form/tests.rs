@@ -72,7 +72,7 @@ fn wrong_fields_refuse_by_name() {
         ("hold", "-0.1", "correct the hold"),
         ("depth", "-1", "depth"),
         ("depth", "1e4", "depth"),
-        ("hold", "1e9", "1e9 s is out of range"),
+        ("hold", "1e9", "correct the hold"),
         ("specimen.thickness_mm", "0", "correct the specimen.thickness_mm"),
     ] {
         let (form, bench) = form_with(&[(name, text)]);
@@ -155,6 +155,38 @@ fn a_file_with_mistakes_names_their_lines_and_does_not_start() {
     form.choose_built_in("ramp-hold");
     type_into(&mut form, &[]);
     assert_eq!(form.verdict(), Ok(()));
+}
+
+#[test]
+fn what_is_wrong_with_a_value_stands_at_its_field_without_lines_of_a_file() {
+    for (text, words) in [
+        ("1200", "1200 mm is beyond the travel of rig sim, which ends at 150"),
+        ("-3", "-3 mm is out of range"),
+    ] {
+        let (form, _) = form_with(&[("depth", text)]);
+        let field = form.fields.iter().find(|one| one.parameter.name == "depth").unwrap();
+        let reason = field.value.as_ref().err().or(field.objection.as_ref()).unwrap();
+        assert!(reason.contains(words) && !reason.contains("line"), "{text}: {reason}");
+        assert_eq!(form.verdict().unwrap_err(), "correct the depth first");
+    }
+    let (form, _) = form_with(&[("depth", "20")]);
+    assert!(form.fields.iter().all(|field| field.objection.is_none()));
+    assert_eq!(form.verdict(), Ok(()));
+}
+
+#[test]
+fn specimens_are_not_added_with_a_protocol_that_touches_none() {
+    let mut form = ProtocolForm::default();
+    let (rig, bench) = bench();
+    for (name, wanted) in [
+        ("daily-check", FIRST),
+        ("load-cell-calibration", FIRST),
+        ("preconditioning", "preconditioning"),
+    ] {
+        form.choose_built_in(name);
+        form.refresh(&rig, &bench, true);
+        assert_eq!(form.specimen_protocol(), wanted, "{name}");
+    }
 }
 
 #[test]

@@ -34,7 +34,7 @@ impl ModelsScreen {
 
 impl Screen for ModelsScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let run = workbench.run().filter(|run| run.outcome.is_some());
+        let run = workbench.measured_run().filter(|run| run.outcome.is_some());
         let last_run = run.map(|run| run.folder.as_path());
         section_ui(ui, "Recordings compared");
         self.form.sources_ui(ui, last_run, commands);

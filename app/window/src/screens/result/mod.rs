@@ -10,12 +10,12 @@ use super::parameters::parameters_ui;
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::today;
 use super::weighing::weighing_ui;
-use crate::shell::activity::run_in_progress;
-use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, require, section_ui};
+use crate::widgets::{alarm_ui, placeholder_ui, quiet_ui, require, section_ui, sentence_ui};
 use crate::workers::fit::Refit;
 use crate::workers::queue_desk::QueueWork;
 use eframe::egui::{Context, Key, Ui};
 use palpate_runner::RunView;
+use palpate_sessions::checks::DailyCheck;
 use palpate_sessions::specimen_queue::QueueVerdict;
 use verdict::RunVerdict;
 
@@ -39,7 +39,7 @@ pub struct ResultScreen {
 impl ResultScreen {
     /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
     fn accept(&mut self, workbench: &mut Workbench) -> Reaction {
-        let Some(session) = workbench.latest_run.assessed(workbench.run()) else {
+        let Some(session) = workbench.latest_run.assessed(workbench.measured_run()) else {
             return Reaction::Done;
         };
         if workbench.queue.is_busy() {
@@ -60,14 +60,14 @@ impl Screen for ResultScreen {
         if let Some(reason) = &workbench.refusal {
             alarm_ui(ui, reason);
         }
-        let Some(run) = workbench.run() else {
+        let Some(run) = workbench.measured_run() else {
             section_ui(ui, "Result");
             placeholder_ui(ui, "no run yet; choose a protocol on the screen Run and start it");
             return;
         };
         let latest = &workbench.latest_run;
         let quality = latest.quality(Some(run));
-        if run_in_progress(&workbench.snapshot).is_some() {
+        if run.outcome.is_none() {
             section_ui(ui, "Result");
             quiet_ui(ui, "the run is in progress; its result comes when it has ended");
             return;
@@ -75,6 +75,10 @@ impl Screen for ResultScreen {
         ended_ui(ui, run, quality, commands);
         if let Some(reason) = latest.failure(Some(run)) {
             alarm_ui(ui, format!("the run could not be checked: {reason}"));
+        }
+        // A daily check is its own verdict.
+        if let Some(check) = latest.daily_check(Some(run)) {
+            return daily_check_ui(ui, check);
         }
         if let Some(session) = latest.assessed(Some(run)) {
             let may_repeat = workbench.repeat_verdict();
@@ -85,18 +89,18 @@ impl Screen for ResultScreen {
         }
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        match workbench.run().filter(|run| has_weighed(run)) {
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
+        match workbench.measured_run().filter(|run| has_weighed(run)) {
             Some(run) => {
                 let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
-                weighing_ui(ui, run, signal, &workbench.bench, commands);
+                weighing_ui(ui, run, signal, &workbench.bench);
             }
             None => workbench.plots_ui(ui),
         }
     }
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
-        let run = workbench.run();
+        let run = workbench.measured_run();
         if !run.is_some_and(has_weighed) {
             found_ui(ui, run, workbench.latest_run.refit(run));
         }
@@ -115,10 +119,23 @@ impl Screen for ResultScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let has_checks = workbench.latest_run.assessed(workbench.run()).is_some();
+        let has_checks = workbench.latest_run.assessed(workbench.measured_run()).is_some();
         let verdict = require(has_checks, "no run has ended and been checked");
         let accept = PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun);
         vec![accept.if_ok(verdict)]
+    }
+}
+
+/// Draws what a daily check found.
+fn daily_check_ui(ui: &mut Ui, check: &Result<DailyCheck, String>) {
+    section_ui(ui, "Daily check");
+    match check {
+        Err(reason) => alarm_ui(ui, format!("the result was not kept: {reason}")),
+        Ok(check) if check.is_passed => quiet_ui(ui, "passed; it holds for today"),
+        Ok(_) => alarm_ui(ui, "failed; repair the rig, and check it again"),
+    }
+    for part in check.iter().flat_map(|check| &check.parts) {
+        if part.is_passed { sentence_ui(ui, &part.sentence) } else { alarm_ui(ui, &part.sentence) }
     }
 }
 

@@ -60,15 +60,15 @@ impl ReviewScreen {
         let is_pressed = reason_button(ui, "Add to view", vec2(0.0, 22.0), &verdict);
         if is_pressed || (is_entered && verdict.is_ok()) {
             let path = PathBuf::from(self.path.trim());
-            self.is_path_wrong = !path.is_dir();
-            if !self.is_path_wrong {
+            self.wrong_path = (!path.is_dir()).then(|| self.path.clone());
+            if self.wrong_path.is_none() {
                 self.path.clear();
                 self.add(path, ui.ctx());
                 // The keys of the plots are next.
                 ui.memory_mut(|memory| memory.stop_text_input());
             }
         }
-        if self.is_path_wrong {
+        if self.wrong_path.as_ref() == Some(&self.path) {
             alarm_ui(ui, "there is no such folder; type the path of a session's folder");
         }
     }

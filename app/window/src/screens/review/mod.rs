@@ -103,8 +103,8 @@ pub struct ReviewScreen {
     /// Only the first and the last loop are drawn.
     has_ends_only: bool,
     path: String,
-    /// What was entered as a path leads to no folder.
-    is_path_wrong: bool,
+    /// What was entered as a path and leads to no folder.
+    wrong_path: Option<String>,
     next_id: u64,
     /// The most samples that share a lowest and a highest one in the plots over time.
     thinned: usize,
@@ -245,17 +245,17 @@ impl ReviewScreen {
     }
 }
 
-/// Numbers the sessions that have one name.
+/// Numbers the sessions that have one name, in the order in which they were added: whichever is in front.
 fn distinguish(subjects: &mut [ReviewSubject]) {
-    for index in 1..subjects.len() {
-        let (before, rest) = subjects.split_at_mut(index);
-        let own = &mut rest[0].name;
-        let first = own.clone();
-        let mut number = 2;
-        while before.iter().any(|one| one.name == *own) {
-            *own = format!("{first} ({number})");
-            number += 1;
-        }
+    let mut order: Vec<usize> = (0..subjects.len()).collect();
+    order.sort_by_key(|index| subjects[*index].id);
+    for (place, index) in order.iter().enumerate() {
+        let before = &order[..place];
+        let is_taken = |name: &str| before.iter().any(|one| subjects[*one].name == name);
+        let first = &subjects[*index].name;
+        let numbered = (2..).map(|number| format!("{first} ({number})"));
+        let name = std::iter::once(first.clone()).chain(numbered).find(|name| !is_taken(name));
+        subjects[*index].name = name.unwrap_or_default();
     }
 }
 

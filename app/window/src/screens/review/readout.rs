@@ -4,7 +4,7 @@ use super::ReviewScreen;
 use super::subject::ReviewSubject;
 use crate::widgets::quiet_ui;
 use crate::workers::review::Quantity;
-use eframe::egui::{Grid, RichText, Role, Ui, WidgetInfo, vec2};
+use eframe::egui::{Grid, RichText, Role, TextWrapMode, Ui, WidgetInfo, vec2};
 
 /// Decimals of a quantity: a tenth of a millinewton, a tenth of a micrometre, a microvolt.
 const fn decimals(quantity: Quantity) -> usize {
@@ -82,7 +82,7 @@ struct ReadoutColumn {
 }
 
 /// Width of a column in points.
-const COLUMN: f32 = 104.0;
+const COLUMN: f32 = 88.0;
 
 impl ReviewScreen {
     /// Draws a line for each cursor and one for their difference, a column for each quantity.
@@ -95,7 +95,9 @@ impl ReviewScreen {
         let readout = CursorReadout::of(front, self.cursors, front.shift(self.time_origin));
         let columns = readout.columns();
         let is_wide = columns.len() as f32 * COLUMN + 200.0 < ui.available_width();
-        Grid::new("readout").min_col_width(40.0).spacing(vec2(14.0, 2.0)).show(ui, |ui| {
+        Grid::new("readout").spacing(vec2(16.0, 0.0)).show(ui, |ui| {
+            ui.spacing_mut().interact_size.y = 20.0;
+            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
             ui.label("");
             for column in &columns {
                 quiet_ui(ui, format!("{} ({})", column.name, column.unit));

@@ -10,7 +10,6 @@ use crate::workbench::Workbench;
 use crate::workers::BackgroundTask;
 use chrono::{DateTime, Local};
 use eframe::egui::{Button, Ui, vec2};
-use palpate_analysis::daily::DAILY_CHECK_COMMAND;
 use palpate_sessions::DataQuality;
 use palpate_sessions::catalog::CatalogEntry;
 
@@ -53,7 +52,11 @@ pub(super) fn facts_ui(
         None => placeholder_ui(ui, "this rig had none yet"),
     }
     facts.warnings.iter().for_each(|words| alarm_ui(ui, words));
-    quiet_ui(ui, format!("'{DAILY_CHECK_COMMAND}' runs it."));
+    let words = "Run the daily check";
+    let button = Button::new(words).min_size(vec2(150.0, 48.0));
+    if ui.add_enabled(!workbench.is_busy(), button).named(words).clicked() {
+        commands.push(UiCommand::CheckRig);
+    }
     link_ui(ui, "Show the checks", checks::SCREEN.name, commands);
     section_ui(ui, "Disk");
     let free = format!("{:.1} GB free", facts.free_bytes as f64 * 1e-9);

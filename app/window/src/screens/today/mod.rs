@@ -102,7 +102,7 @@ impl Screen for TodayScreen {
     fn act(&mut self, _ctx: &Context, command: &UiCommand, workbench: &mut Workbench) -> Reaction {
         match command {
             UiCommand::Chosen(PathPurpose::Specimens, path) => {
-                let protocol = workbench.form.source_name();
+                let protocol = workbench.form.specimen_protocol();
                 let by = workbench.form.label_text("operator").to_owned();
                 workbench.queue.ask(QueueWork::AddTable(path.clone(), protocol), &by, "");
                 Reaction::Show

@@ -63,8 +63,8 @@ impl QueueForm {
         let queue = workbench.queue.queue();
         let is_free = require(!workbench.queue.is_busy(), "the queue is being written");
         section_ui(ui, "Add specimens");
-        let protocol = workbench.form.source_name();
-        quiet_ui(ui, format!("Protocol: {protocol}, as on the screen Run"));
+        let protocol = workbench.form.specimen_protocol();
+        quiet_ui(ui, format!("Protocol: {protocol}; the screen Run offers others"));
         let is_taken = text_row(ui, "names", "pig 7, pig 8", &mut self.added);
         let names: Vec<String> = self
             .added
@@ -216,7 +216,8 @@ impl QueueForm {
         if let Some(name) = &self.unknown {
             let words = format!("Add {name} to the queue");
             if ui.add(Button::new(&words).min_size(BUTTON)).named(&words).clicked() {
-                let work = QueueWork::AddNamed(vec![name.clone()], workbench.form.source_name());
+                let work =
+                    QueueWork::AddNamed(vec![name.clone()], workbench.form.specimen_protocol());
                 commands.push(UiCommand::Queue(work, String::new()));
                 (self.unknown, self.answer) = (None, None);
             }

@@ -63,7 +63,7 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
         row_ui(ui, &ParameterText::of(parameter));
         let mut own = own.iter().flat_map(|own| &own.parameters);
         if let Some(same) = own.find(|own| own.name == parameter.name) {
-            fact_ui(ui, "session", ParameterText::of(same).value);
+            fact_ui(ui, "", format!("session: {}", ParameterText::of(same).value));
         }
     }
     budget_ui(ui, &format!("{BUDGET_TITLE} of '{}'", one.name), &parameters);
