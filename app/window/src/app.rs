@@ -45,6 +45,9 @@ pub struct WorkbenchApp {
     meter: FrameMeter,
     pace: FramePace,
     is_zoom_set: bool,
+    /// Whose text size is in use, and the one that the last frame named.
+    monitor: Option<String>,
+    seen_monitor: Option<String>,
     are_fonts_warm: bool,
 }
 
@@ -91,6 +94,8 @@ impl WorkbenchApp {
             meter: FrameMeter::from_environment(),
             pace,
             is_zoom_set: false,
+            monitor: None,
+            seen_monitor: None,
             are_fonts_warm: false,
         };
         let mut commands = Commands::default();
@@ -234,6 +239,23 @@ impl WorkbenchApp {
         [now.left, now.right, now.log] = self.sizes.changes();
     }
 
+    /// Takes the text size of the monitor that the window has come to.
+    fn follow_monitor(&mut self, ctx: &Context) {
+        let monitor = monitor_name(ctx);
+        // In the frame after a change of text size, the size of the monitor is still that of before.
+        let is_sure = self.seen_monitor == monitor && monitor.is_some();
+        self.seen_monitor.clone_from(&monitor);
+        let settings = &self.settings.now;
+        if !std::mem::replace(&mut self.is_zoom_set, true) {
+            ctx.set_zoom_factor(settings.zoom);
+        } else if is_sure && monitor != self.monitor {
+            ctx.set_zoom_factor(
+                monitor.as_deref().map_or(settings.zoom, |it| settings.zoom_of(it)),
+            );
+            self.monitor = monitor;
+        }
+    }
+
     /// Closing stops motion first: the window stays until the axis is at rest.
     fn handle_close(&mut self, ctx: &Context) {
         if ctx.input(|input| input.viewport().close_requested()) {
@@ -290,6 +312,15 @@ impl WorkbenchApp {
     }
 }
 
+/// A monitor by its pixels and its scale: systems do not tell its maker. None where there is no monitor.
+fn monitor_name(ctx: &Context) -> Option<String> {
+    let viewport = ctx.input(|input| input.viewport().clone());
+    let scale = viewport.native_pixels_per_point?;
+    // The size is in points, which the zoom changes.
+    let pixels = viewport.monitor_size? * ctx.pixels_per_point();
+    Some(format!("{:.0} x {:.0} at {scale:.2}", pixels.x, pixels.y))
+}
+
 fn set_text_size(ctx: &Context, size: TextSize) {
     let zoom = ctx.zoom_factor();
     let zoom = match size {
@@ -319,9 +350,7 @@ impl eframe::App for WorkbenchApp {
         self.handle_close(ctx);
         self.meter.begin(frame.info().cpu_usage);
         self.read_input(ctx, &mut commands);
-        if !std::mem::replace(&mut self.is_zoom_set, true) {
-            ctx.set_zoom_factor(self.settings.now.zoom);
-        }
+        self.follow_monitor(ctx);
         self.workbench.poll(ctx);
         if let Some((ask, path)) = self.workbench.dialog.poll() {
             commands.push(match ask {
@@ -344,7 +373,7 @@ impl eframe::App for WorkbenchApp {
         }
         self.act(ctx, &mut commands);
         self.settings.now.is_dark = ctx.theme() == Theme::Dark;
-        self.settings.now.zoom = ctx.zoom_factor();
+        self.settings.now.keep_zoom(self.monitor.as_deref(), ctx.zoom_factor());
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
         let frame_s = frame.info().cpu_usage;

@@ -4,6 +4,7 @@ use palpate_analysis::window_requests::SETTINGS_VERSION;
 use palpate_sessions::atomic;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -21,6 +22,8 @@ pub struct WindowSettings {
     pub is_dark: bool,
     /// Size of text and everything else; 1 is the usual one.
     pub zoom: f32,
+    /// The same by monitor; each keeps its own.
+    pub zooms: BTreeMap<String, f32>,
     /// Name of the screen shown last.
     pub screen: String,
     /// Widths of the panels left and right of the middle, and height of the event log, in points; none for the usual sizes.
@@ -44,6 +47,7 @@ impl Default for WindowSettings {
             settings_version: SETTINGS_VERSION,
             is_dark: false,
             zoom: 1.0,
+            zooms: BTreeMap::new(),
             screen: String::new(),
             left: None,
             right: None,
@@ -75,8 +79,26 @@ impl WindowSettings {
         }
         let read: Self =
             serde_json::from_value(value).map_err(|err| unreadable(path, &err.to_string()))?;
-        let zoom = if read.zoom.is_finite() { read.zoom } else { 1.0 };
-        Ok(Self { zoom: zoom.clamp(*ZOOM.start(), *ZOOM.end()), ..read })
+        let possible = |zoom: f32| {
+            let zoom = if zoom.is_finite() { zoom } else { 1.0 };
+            zoom.clamp(*ZOOM.start(), *ZOOM.end())
+        };
+        let zooms = read.zooms.into_iter().map(|(monitor, zoom)| (monitor, possible(zoom)));
+        Ok(Self { zoom: possible(read.zoom), zooms: zooms.collect(), ..read })
+    }
+
+    /// The zoom factor of a monitor; of one that is new, that of the last one.
+    #[must_use]
+    pub fn zoom_of(&self, monitor: &str) -> f32 {
+        self.zooms.get(monitor).copied().unwrap_or(self.zoom)
+    }
+
+    /// Keeps the zoom factor, and for which monitor, where that is known.
+    pub fn keep_zoom(&mut self, monitor: Option<&str>, zoom: f32) {
+        self.zoom = zoom;
+        if let Some(monitor) = monitor.filter(|monitor| self.zooms.get(*monitor) != Some(&zoom)) {
+            self.zooms.insert(monitor.to_owned(), zoom);
+        }
     }
 
     /// Writes them; the file is replaced as a whole.
@@ -158,6 +180,16 @@ impl SettingsFile {
 mod tests {
     use super::*;
     use palpate_analysis::window_requests::SETTINGS_FILE;
+
+    #[test]
+    fn every_monitor_keeps_its_text_size_and_a_new_one_has_that_of_the_last() {
+        let mut settings = WindowSettings::default();
+        settings.keep_zoom(Some("laptop"), 1.0);
+        settings.keep_zoom(Some("bench"), 1.5);
+        settings.keep_zoom(None, 2.0);
+        let found = ["laptop", "bench", "new"].map(|monitor| settings.zoom_of(monitor));
+        assert_eq!(found, [1.0, 1.5, 2.0]);
+    }
 
     #[test]
     fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {
