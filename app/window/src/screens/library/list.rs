@@ -19,8 +19,8 @@ const MARGIN: usize = 60;
 
 /// Heading, width, whether it has numbers, and the order that the heading sorts by.
 const COLUMNS: [(&str, f32, bool, Option<CatalogOrder>); 10] = [
-    ("started (UTC)", 134.0, false, Some(CatalogOrder::Started)),
-    ("specimen", 92.0, false, Some(CatalogOrder::Specimen)),
+    ("started (UTC)", 154.0, false, Some(CatalogOrder::Started)),
+    ("specimen", 124.0, false, Some(CatalogOrder::Specimen)),
     ("verdict", 78.0, false, Some(CatalogOrder::Verdict)),
     ("review", 88.0, false, Some(CatalogOrder::Review)),
     ("health", 86.0, false, None),

@@ -5,7 +5,7 @@ use crate::widgets::{ChoiceTable, ScrollPosition, TableAction};
 use crate::widgets::{
     Column, Emphasis, NamedControl, TableCell, TableLine, alarm_ui, form_label, placeholder_ui,
     quiet_ui, reason_button, require, section_ui, sentence_ui, steady, text_row, tick_box,
-    tokens_of,
+    tokens_of, width_of,
 };
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
@@ -22,6 +22,7 @@ const BUTTON: Vec2 = vec2(130.0, 48.0);
 const NEXT_BUTTON: Vec2 = vec2(260.0, 56.0);
 /// Beside the button a name has so much room in points, or it stands above.
 const NAME_WIDTH_MIN: f32 = 240.0;
+const REMARK_WIDTH_MIN: f32 = 120.0;
 
 /// What is typed on the page.
 #[derive(Default)]
@@ -305,14 +306,16 @@ impl QueueForm {
     }
 
     fn table_ui(&mut self, ui: &mut Ui, items: &[QueueItem]) {
-        let columns = [
+        let mut columns = [
             Column::numbers("number", 46.0),
             Column::words("specimen", 96.0),
             Column::words("protocol", 84.0),
-            Column::words("state", 84.0),
+            Column::words("state", 70.0),
             Column::numbers("runs", 34.0),
-            Column::words("remark", 150.0),
+            Column::words("remark", 0.0),
         ];
+        // The last one takes what is left.
+        columns[5].width = (ui.available_width() - width_of(&columns)).max(REMARK_WIDTH_MIN);
         let table = ChoiceTable {
             name: "queue",
             columns: &columns,

@@ -1,4 +1,5 @@
 use super::*;
+use crate::fit::FitReport;
 use palpate_model::calibration::Calibration;
 use palpate_model::random::SplitMix;
 use palpate_model::units::{Depth, Seconds, Volts};
@@ -218,4 +219,27 @@ fn uncertain_compliance_makes_stiffness_uncertain() {
     }
     let sentence = one.sentence();
     assert!(sentence.contains("compliance stand"), "{sentence}");
+}
+
+/// An estimate that the record itself contradicts is not passed over in silence.
+#[test]
+fn a_value_outside_of_its_total_interval_is_named() {
+    let samples = record(5.0);
+    let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
+    let traced = traced(&samples, "thesis", &uncertainty);
+    let found = estimate_systematic(traced, &FitOptions::default()).unwrap();
+    let report = super::super::fit(&samples, &FitOptions::default()).unwrap();
+    let named = |report: &FitReport| {
+        let mut words = report.findings.iter();
+        words.find(|words| words.contains("lie outside of their total")).cloned()
+    };
+    assert_eq!(named(&report.clone().with_systematic(&found)), None);
+    let mut moved = found;
+    for own in &mut moved.parameters {
+        let half = 1.96 * own.error;
+        let far = if own.name == "mu1" { 3.0 } else { 0.5 };
+        own.joint = Some(JointChange { change: far * half, statistical: own.error, half });
+    }
+    let words = named(&report.with_systematic(&moved)).unwrap();
+    assert!(words.starts_with("the values of mu1 take the calibration as exact"), "{words}");
 }
