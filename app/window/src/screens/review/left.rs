@@ -19,6 +19,15 @@ impl ReviewScreen {
         if ui.button("Find sessions in the library").clicked() {
             commands.push(UiCommand::Show(library::SCREEN.name));
         }
+        section_ui(ui, "Fit");
+        self.model.ui(ui, "fit with", "include rejected sessions");
+        let verdict = self.fit_verdict();
+        if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
+            self.start_fits(ui.ctx());
+        }
+        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.state()) {
+            alarm_ui(ui, reason);
+        }
         section_ui(ui, "Time zero at");
         for time_origin in TimeOrigin::ALL {
             ui.radio_value(&mut self.time_origin, time_origin, time_origin.name())
@@ -41,15 +50,6 @@ impl ReviewScreen {
         });
         if !has_fit {
             quiet_ui(ui, "fit the sessions shown to see their residuals");
-        }
-        section_ui(ui, "Fit");
-        self.model.ui(ui, "fit with", "include rejected sessions");
-        let verdict = self.fit_verdict();
-        if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
-            self.start_fits(ui.ctx());
-        }
-        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.state()) {
-            alarm_ui(ui, reason);
         }
     }
 

@@ -6,7 +6,7 @@ use crate::screens::exact_fit::exact_ui;
 use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
-use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
+use eframe::egui::{Button, CollapsingHeader, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_figures::uncertain::{interval, plain};
 use palpate_sessions::edits::DataQuality;
 
@@ -54,7 +54,6 @@ impl ReviewScreen {
 }
 
 fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
-    let tokens = tokens_of(ui);
     let names = [
         ("specimen", &facts.specimen),
         ("operator", &facts.operator),
@@ -85,6 +84,17 @@ fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
         let taken = taken.map_or(String::new(), |at| format!(", taken {at}"));
         fact_ui(ui, "calibration", format!("{}{taken}", calibration.name));
     }
+    if !facts.hashes.is_empty() {
+        CollapsingHeader::new("SHA-256 of its files").show(ui, |ui| hashes_ui(ui, facts));
+    }
+    for note in &facts.notes {
+        quiet_ui(ui, note);
+    }
+}
+
+/// Draws the hash of each file, and a button that copies it.
+fn hashes_ui(ui: &mut Ui, facts: &SessionFacts) {
+    let tokens = tokens_of(ui);
     for hash in &facts.hashes {
         // Names of files may be long; the panel stays as wide as it is.
         let short: String = hash.sha256.chars().take(HASH_SHOWN).collect();
@@ -95,9 +105,6 @@ fn facts_ui(ui: &mut Ui, facts: &SessionFacts) {
         if ui.add(Button::new(name).small().truncate()).clicked() {
             ui.ctx().copy_text(hash.sha256.clone());
         }
-    }
-    for note in &facts.notes {
-        quiet_ui(ui, note);
     }
 }
 
