@@ -1,7 +1,7 @@
 //! Values of one parameter as dots with their intervals, a lane for each group and in it a line for each value, so that
 //! no dot covers another.
 
-use crate::widgets::tokens_of;
+use crate::widgets::{in_print, tokens_of};
 use eframe::egui::{
     Align2, Color32, Id, Rect, Role, Sense, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
 };
@@ -160,7 +160,7 @@ fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64)
         let value = mark as f64 * step;
         let x = across(value);
         ui.painter().vline(x, ground.y_range(), Stroke::new(1.0, tokens.line));
-        let text = number_text(value, step);
+        let text = in_print(&number_text(value, step));
         let at = pos2(x, ground.bottom() + 2.0);
         let galley = ui.painter().layout_no_wrap(text, font.clone(), tokens.text_quiet);
         let own = Align2::CENTER_TOP.anchor_size(at, galley.size());

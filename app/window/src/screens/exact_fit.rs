@@ -86,6 +86,14 @@ pub fn row_ui(ui: &mut Ui, text: &ParameterText) {
     }
 }
 
+/// Draws a parameter's symbol and an interval of it.
+pub fn interval_ui(ui: &mut Ui, name: &str, interval: &str) {
+    ui.horizontal(|ui| {
+        cell(ui, NAME_WIDTH, |ui| symbol_ui(ui, name));
+        number_ui(ui, interval, tokens_of(ui).text);
+    });
+}
+
 /// Draws the uncertainty budget, folded away; nothing where the sources are not told apart.
 pub fn budget_ui(ui: &mut Ui, title: &str, parameters: &[FittedParameter]) {
     if parameters.iter().all(|one| one.budget.is_empty()) {

@@ -35,6 +35,10 @@ fn fonts() -> FontDefinitions {
     let data = FontData::from_static(LUCIDE_FONT_BYTES);
     fonts.font_data.insert(ICONS.to_owned(), data.into());
     fonts.families.insert(FontFamily::Name(ICONS.into()), vec![ICONS.to_owned()]);
+    // The font of words has no raised minus; that of numbers has.
+    let numbers = fonts.families.get(&FontFamily::Monospace).and_then(|all| all.first().cloned());
+    let words = fonts.families.entry(FontFamily::Proportional).or_default();
+    words.extend(numbers);
     fonts
 }
 

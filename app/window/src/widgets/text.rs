@@ -42,6 +42,34 @@ pub fn fact_ui(ui: &mut Ui, name: &str, value: impl Into<String>) {
     });
 }
 
+/// Numbers with their powers of ten as in print: `5.18e-2` becomes 5.18·10⁻².
+#[must_use]
+pub fn in_print(text: &str) -> String {
+    const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
+    let raised = |one: char| match one {
+        '-' => Some('⁻'),
+        _ => one.to_digit(10).map(|digit| RAISED[digit as usize]),
+    };
+    let mut print = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find('e') {
+        let (before, behind) = (&rest[..at], &rest[at + 1..]);
+        print += before;
+        let exponent: String = behind.chars().map_while(raised).collect();
+        let is_number = before.ends_with(|one: char| one.is_ascii_digit() || ")]".contains(one));
+        if is_number && !exponent.is_empty() {
+            print += "·10";
+            // A digit or a minus is one byte where it is typed.
+            rest = &behind[exponent.chars().count()..];
+            print += &exponent;
+        } else {
+            print.push('e');
+            rest = behind;
+        }
+    }
+    print + rest
+}
+
 /// A sentence that wraps.
 pub fn sentence_ui(ui: &mut Ui, words: impl Into<String>) {
     ui.add(Label::new(words.into()).wrap());
@@ -93,4 +121,23 @@ pub fn small_alarm_ui(ui: &mut Ui, words: impl Into<String>) {
 
 fn colored_ui(ui: &mut Ui, words: RichText, ink: Color32) {
     ui.add(Label::new(words.color(ink)).wrap());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::in_print;
+
+    #[test]
+    fn powers_of_ten_are_raised_and_words_are_left_alone() {
+        for (text, print) in [
+            ("(5.1801 ± 0.0031)e-2", "(5.1801 ± 0.0031)·10⁻²"),
+            ("-8.7320e-3 [-9.0000, 0.0000]e-3", "-8.7320·10⁻³ [-9.0000, 0.0000]·10⁻³"),
+            ("1.5e12", "1.5·10¹²"),
+            ("not yet", "not yet"),
+            ("0.750", "0.750"),
+            ("held at 1 e", "held at 1 e"),
+        ] {
+            assert_eq!(in_print(text), print);
+        }
+    }
 }

@@ -12,7 +12,7 @@ use crate::screens::parameters::symbol_job;
 use crate::theme::Tokens;
 use crate::widgets::{
     ChoiceTable, Column, Emphasis, Glyph, ScrollPosition, TableAction, TableCell, TableLine,
-    alarm_ui, quiet_ui, tokens_of,
+    alarm_ui, in_print, quiet_ui, tokens_of,
 };
 use eframe::egui::{
     Align2, Galley, Id, Label, Pos2, Rect, RichText, ScrollArea, Sense, TextStyle, Ui, UiBuilder,
@@ -56,10 +56,10 @@ impl Value {
     }
 
     fn short_text(&self) -> String {
-        match (self.parameter.std_error, self.ends()) {
+        in_print(&match (self.parameter.std_error, self.ends()) {
             (Some(error), Some(ends)) => with_interval(self.parameter.value, error, ends),
             _ => text::ParameterText::of(&self.parameter).value,
-        }
+        })
     }
 
     /// How far it is, in words; empty where it is near.

@@ -2,7 +2,7 @@
 
 use super::ReviewScreen;
 use super::subject::ReviewSubject;
-use crate::screens::exact_fit::exact_ui;
+use crate::screens::exact_fit::{exact_ui, interval_ui};
 use crate::widgets::{alarm_ui, fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use crate::workers::review::SessionFacts;
 use crate::workers::review::fit::SessionFit;
@@ -160,7 +160,7 @@ fn fit_ui(ui: &mut Ui, fit: &SessionFit) {
                         format!("[{low}, {high}]")
                     }
                 };
-                fact_ui(ui, &found.name, words);
+                interval_ui(ui, &found.name, &words);
             }
         }
     }

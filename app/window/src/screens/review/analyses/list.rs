@@ -2,7 +2,7 @@
 
 use super::super::ReviewSource;
 use super::OwnFit;
-use crate::screens::exact_fit::{budget_ui, row_ui};
+use crate::screens::exact_fit::{budget_ui, interval_ui, row_ui};
 use crate::widgets::{
     NamedControl, fact_ui, quiet_ui, reason_button, require, small_ui, tokens_of,
 };
@@ -76,7 +76,7 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
         for one in profile {
             let name = one["name"].as_str().unwrap_or_default();
             let ends = format!("[{}, {}]", number(&one["low"]), number(&one["high"]));
-            fact_ui(ui, name, ends);
+            interval_ui(ui, name, &ends);
         }
     }
     for sentence in stored_analysis::sentences(results) {
