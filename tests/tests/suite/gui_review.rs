@@ -49,13 +49,16 @@ fn one_session_is_looked_at_closely() {
         session.manifest.session_id.as_str(),
         session.manifest.specimen.as_str(),
         "ending",
-        "000.mcap",
+        "SHA-256 of its files",
         "health",
         "contact",
         "thinned to min/max of",
     ] {
         assert!(flow.says(words), "{words}");
     }
+    flow.click("SHA-256 of its files");
+    flow.window.run_steps(3);
+    assert!(flow.says("000.mcap"));
     flow.window.check_accessibility();
     // Cursors and what stands between them, by button and by key.
     assert!(flow.says("set cursors A and B"));

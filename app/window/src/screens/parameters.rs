@@ -1,6 +1,6 @@
 //! The force model's parameters as they become known, each with its uncertainty.
 
-use crate::widgets::{in_print, quiet_ui, tokens_of};
+use crate::widgets::{quiet_ui, tokens_of};
 use eframe::egui::text::LayoutJob;
 use eframe::egui::{
     Align, Color32, FontSelection, Label, Layout, Response, RichText, Role, Ui, WidgetInfo, vec2,
@@ -114,8 +114,19 @@ pub(super) fn value_ui(ui: &mut Ui, name: &str, value: &str, ink: Color32, unit:
 
 /// Draws a number with its power of ten as in print; as typed, it is what a screen reader says.
 pub(super) fn number_ui(ui: &mut Ui, text: &str, ink: Color32) -> Response {
-    let number = RichText::new(in_print(text)).color(ink).monospace();
-    let label = ui.add(Label::new(number).wrap());
+    let mut job = LayoutJob::default();
+    let mut append = |text: RichText, align: Align| {
+        let text = text.color(ink).monospace();
+        text.append_to(&mut job, ui.style(), FontSelection::Default, align);
+    };
+    match text.rsplit_once('e').filter(|(_, exponent)| exponent.parse::<i32>().is_ok()) {
+        Some((number, exponent)) => {
+            append(RichText::new(format!("{number}·10")), Align::BOTTOM);
+            append(RichText::new(exponent).size(INDEX_SIZE), Align::TOP);
+        }
+        None => append(RichText::new(text), Align::BOTTOM),
+    }
+    let label = ui.add(Label::new(job).wrap());
     label.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
     label
 }

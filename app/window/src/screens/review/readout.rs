@@ -2,9 +2,9 @@
 
 use super::ReviewScreen;
 use super::subject::ReviewSubject;
-use crate::widgets::quiet_ui;
+use crate::widgets::{quiet_ui, tokens_of};
 use crate::workers::review::Quantity;
-use eframe::egui::{Grid, RichText, Role, TextWrapMode, Ui, WidgetInfo, vec2};
+use eframe::egui::{Grid, RichText, Role, Ui, WidgetInfo, vec2};
 
 /// Decimals of a quantity: a tenth of a millinewton, a tenth of a micrometre, a microvolt.
 const fn decimals(quantity: Quantity) -> usize {
@@ -95,12 +95,12 @@ impl ReviewScreen {
         let readout = CursorReadout::of(front, self.cursors, front.shift(self.time_origin));
         let columns = readout.columns();
         let is_wide = columns.len() as f32 * COLUMN + 200.0 < ui.available_width();
-        Grid::new("readout").spacing(vec2(16.0, 0.0)).show(ui, |ui| {
-            ui.spacing_mut().interact_size.y = 20.0;
-            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+        let ink = tokens_of(ui).text_quiet;
+        let quiet = |words: &str| RichText::new(words).small().color(ink);
+        Grid::new("readout").spacing(vec2(16.0, 0.0)).min_row_height(19.0).show(ui, |ui| {
             ui.label("");
             for column in &columns {
-                quiet_ui(ui, format!("{} ({})", column.name, column.unit));
+                ui.label(quiet(&format!("{} ({})", column.name, column.unit)));
             }
             if is_wide {
                 self.copy_ui(ui, &front.name, &readout);
@@ -110,7 +110,7 @@ impl ReviewScreen {
                 if columns.iter().all(|column| column.cells[line].is_none()) {
                     continue;
                 }
-                quiet_ui(ui, name);
+                ui.label(quiet(name));
                 for column in &columns {
                     let (number, words) = column.cells[line].clone().unwrap_or_default();
                     let number = ui.label(RichText::new(number).monospace());
