@@ -28,6 +28,15 @@ pub struct FittedParameter {
     pub budget: Vec<BudgetEntry>,
 }
 
+impl FittedParameter {
+    /// Whether the value, which takes the calibration as exact, lies outside of the total interval, which uses what the
+    /// record tells of the calibration.
+    #[must_use]
+    pub fn is_displaced(&self) -> bool {
+        self.total95.is_some_and(|[low, high]| self.value < low || self.value > high)
+    }
+}
+
 /// One source of a parameter's uncertainty (JCGM 100:2008, "uncertainty budget").
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BudgetEntry {

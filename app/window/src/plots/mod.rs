@@ -11,6 +11,6 @@ pub mod over_time;
 mod run;
 pub mod small;
 pub mod stretches;
-mod style;
+pub mod style;
 
 pub use run::PlotCache;

@@ -2,11 +2,13 @@
 //! than a frame can draw become a picture.
 
 use super::navigate::{AxisRange, Gesture, gesture};
-use super::style::{name_up, still};
+use super::style::{name_up, paint_grid, still};
 use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
-use eframe::egui::{Color32, ColorImage, Context, Rect, TextureHandle, TextureOptions, Ui, vec2};
+use eframe::egui::{
+    Color32, ColorImage, Context, Rect, Shape, TextureHandle, TextureOptions, Ui, vec2,
+};
 use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, PlotUi, Points};
 use palpate_model::signal::polyline::{PixelCoverage, PolylineReducer};
 use palpate_model::signal::track::SignalTrack;
@@ -166,7 +168,10 @@ impl DepthLines {
         self.update(ui.ctx(), lines, [depth, force]);
         let tokens = tokens_of(ui);
         let (x, y) = (depth.shown(), force.shown());
+        let has_picture = self.texture.is_some();
+        let grid = ui.painter().add(Shape::Noop);
         let plot = still(ui, Plot::new("review_force_depth"), tokens)
+            .show_grid(!has_picture)
             .x_axis_label("depth from contact (mm)")
             .y_axis_label(name_up(ui, "force above tare (N)", true));
         let response = plot.show(ui, |plot_ui| {
@@ -183,6 +188,9 @@ impl DepthLines {
                 }
             }
         });
+        if has_picture {
+            paint_grid(ui, grid, &response.transform, tokens);
+        }
         self.measure(ui, response.response.rect);
         gesture(ui, &response.response)
     }

@@ -2,7 +2,7 @@
 
 use super::navigate::{AxisRange, Gesture, gesture};
 use super::stretches::Stretches;
-use super::style::{name_up, round_marks, still};
+use super::style::{name_up, still};
 use crate::theme::Tokens;
 use crate::widgets::tokens_of;
 use eframe::egui::{Align2, Color32, RichText, Ui};
@@ -107,10 +107,8 @@ pub fn over_time_ui(
 ) -> Gesture {
     let tokens = tokens_of(ui);
     let (shown, [low, high]) = (span.shown(), heights(panel));
-    let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
     let plot = still(ui, Plot::new(panel.id), tokens)
         .y_axis_label(name_up(ui, panel.axis, time_axis.is_some()))
-        .y_grid_spacer(move |input| round_marks(input, marks_up))
         .x_axis_label(time_axis.unwrap_or_default())
         .show_axes([time_axis.is_some(), true]);
     let response = plot.show(ui, |plot_ui| {

@@ -1,7 +1,7 @@
 //! Small plots beside each other with the same axes; only those at the outer edges have their numbers and names.
 
 use super::navigate::{Gesture, gesture};
-use super::style::{name_up, round_marks, still};
+use super::style::{name_up, still, with_marks};
 use crate::widgets::tokens_of;
 use eframe::egui::{Id, Rangef, Rect, Ui, UiBuilder, Vec2, vec2};
 use egui_plot::{Plot, PlotUi};
@@ -92,13 +92,11 @@ pub fn small_plot_ui<'a>(
     let steps = [place.width() / 60.0, place.height() / 26.0];
     let steps = steps.map(|count| f64::from(count).clamp(2.0, 6.0));
     let drawn = move |ui: &mut Ui| {
-        still(ui, Plot::new(plot.id), tokens)
+        with_marks(still(ui, Plot::new(plot.id), tokens), steps)
             .x_axis_label(plot.names[0].unwrap_or_default())
             .y_axis_label(name_up(ui, plot.names[1].unwrap_or_default(), plot.names[0].is_some()))
             // Quiet, and the same in all of them whether they have their numbers or not.
             .grid_spacing(Rangef::new(20.0, 90.0))
-            .x_grid_spacer(move |input| round_marks(input, steps[0]))
-            .y_grid_spacer(move |input| round_marks(input, steps[1]))
             .show_axes(plot.names.map(|name| name.is_some()))
             .show(ui, move |plot_ui| {
                 let [x, y] = plot.shown;

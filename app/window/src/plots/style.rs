@@ -1,9 +1,11 @@
 //! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
 
 use crate::theme::Tokens;
-use eframe::egui::{Rangef, TextStyle, Ui, Vec2, vec2};
-use egui_plot::{GridInput, GridMark, Plot};
+use eframe::egui::layers::ShapeIdx;
+use eframe::egui::{Rangef, Shape, Stroke, TextStyle, Ui, Vec2, vec2};
+use egui_plot::{GridInput, GridMark, Plot, PlotTransform};
 use palpate_figures::drawing::round_up;
+use std::ops::RangeInclusive;
 
 /// Labelled steps across the width and up the height of a plot, at most.
 const STEPS_ACROSS: f64 = 9.0;
@@ -17,20 +19,53 @@ const MINOR_PER_MAJOR: f64 = 5.0;
 
 /// Gives a plot that fills the space there is the common look.
 pub(super) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
-    let [across, up] = steps(ui.available_size());
     // It would be filled a second time; see `shell::panels::frame`.
-    plot.show_background(false)
+    with_marks(plot, steps(ui.available_size()))
+        .show_background(false)
         .allow_scroll(false)
         .set_margin_fraction(vec2(0.01, 0.03))
         .grid_color(tokens.line)
         // Points between two lines at which they begin to show and are drawn in full.
         .grid_spacing(Rangef::new(10.0, 70.0))
-        .x_grid_spacer(move |input| round_marks(input, across))
+        .y_axis_min_width(AXIS_WIDTH)
+}
+
+/// Marks at round numbers, so many across and up at most that have their number.
+pub(super) fn with_marks(plot: Plot<'_>, [across, up]: [f64; 2]) -> Plot<'_> {
+    plot.x_grid_spacer(move |input| round_marks(input, across))
         .y_grid_spacer(move |input| round_marks(input, up))
-        .x_axis_formatter(|mark, _| mark_text(mark))
-        .y_axis_formatter(|mark, _| mark_text(mark))
-        // One width for all, so that plots above each other share their time axis.
-        .y_axis_min_width(46.0)
+        .x_axis_formatter(move |mark, range| mark_text(mark, major_step(range, across)))
+        .y_axis_formatter(move |mark, range| mark_text(mark, major_step(range, up)))
+}
+
+/// Width in points of the numbers and the name beside a plot: one for all, so that plots above each other share their time
+/// axis. Numbers of seven letters have room.
+pub const AXIS_WIDTH: f32 = 70.0;
+
+/// A picture of a plot is painted before its grid, which would lie over it: this paints the grid at a place in the list of
+/// shapes that was taken before.
+pub(super) fn paint_grid(ui: &Ui, at: ShapeIdx, transform: &PlotTransform, tokens: &Tokens) {
+    let frame = *transform.frame();
+    let [low, high] = [transform.bounds().min(), transform.bounds().max()];
+    let steps = steps(frame.size());
+    let mut lines = Vec::new();
+    for axis in [0, 1] {
+        let bounds = (low[axis], high[axis]);
+        let range = bounds.0..=bounds.1;
+        for mark in round_marks(GridInput { bounds, base_step_size: 0.0 }, steps[axis]) {
+            let is_major = mark.step_size >= 0.9 * major_step(&range, steps[axis]);
+            let ink = if is_major { tokens.line } else { tokens.line.gamma_multiply(0.5) };
+            let mut place = [low[0], low[1]];
+            place[axis] = mark.value;
+            let place = transform.position_from_point(&place.into());
+            let stroke = Stroke::new(1.0, ink);
+            lines.push(match axis {
+                0 => Shape::vline(place.x, frame.y_range(), stroke),
+                _ => Shape::hline(frame.x_range(), place.y, stroke),
+            });
+        }
+    }
+    ui.painter().set(at, Shape::Vec(lines));
 }
 
 /// The same for a plot whose bounds are ours: [`super::navigate`] moves and zooms it, and its readouts are drawn by us.
@@ -72,11 +107,10 @@ fn steps(size: Vec2) -> [f64; 2] {
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
 pub(super) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    let span = high - low;
-    if !(span.is_finite() && span > 0.0) {
+    if !((high - low).is_finite() && high > low) {
         return Vec::new();
     }
-    let major = round_up(span / steps_max);
+    let major = major_step(&(low..=high), steps_max);
     let minor = major / MINOR_PER_MAJOR;
     // The bounds hold at most ten majors, so at most fifty minors and two at the edges.
     let (first, last) = ((low / minor).ceil() as i64, (high / minor).floor() as i64);
@@ -88,8 +122,16 @@ pub(super) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
         .collect()
 }
 
-/// A mark's value with the decimals its step needs: egui's own rounding shows 0.5 as 0.
-fn mark_text(mark: GridMark) -> String {
+/// From one labelled mark to the next.
+fn major_step(range: &RangeInclusive<f64>, steps_max: f64) -> f64 {
+    round_up((range.end() - range.start()) / steps_max)
+}
+
+/// The value of a labelled mark with the decimals its step needs: egui's own rounding shows 0.5 as 0.
+fn mark_text(mark: GridMark, major: f64) -> String {
+    if mark.step_size < 0.9 * major {
+        return String::new();
+    }
     let decimals = (-mark.step_size.log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{:.decimals$}", mark.value)
 }
@@ -110,7 +152,8 @@ mod tests {
         for (value, step_size, text) in
             [(-0.5, 0.5, "-0.5"), (20.0, 10.0, "20"), (0.04, 0.02, "0.04"), (1e4, 5e3, "10000")]
         {
-            assert_eq!(mark_text(GridMark { value, step_size }), text);
+            assert_eq!(mark_text(GridMark { value, step_size }, step_size), text);
+            assert_eq!(mark_text(GridMark { value, step_size }, 5.0 * step_size), "");
         }
     }
 

@@ -3,8 +3,9 @@
 use super::parameters::{
     NAME_WIDTH, VALUE_WIDTH, cell, number_ui, symbol_job, symbol_ui, tight, value_ui,
 };
+use crate::theme::Tokens;
 use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
-use eframe::egui::{CollapsingHeader, RichText, Ui};
+use eframe::egui::{CollapsingHeader, Color32, RichText, Ui};
 use palpate_analysis::report::budget::{BUDGET_TITLE, UncertaintyBudget};
 use palpate_analysis::report::text::{ParameterText, quality, typeset};
 use palpate_model::estimate::FittedParameter;
@@ -14,31 +15,37 @@ use palpate_rheology::fit::FitReport;
 const WIDE: f32 = 500.0;
 /// Of a symbol with its unit, and of an interval, where they stand beside each other.
 const SYMBOL_WIDTH: f32 = 110.0;
-const INTERVAL_WIDTH: f32 = 180.0;
+const INTERVAL_WIDTH: f32 = 196.0;
 
 /// Draws the report: parameters with their intervals and their budget, quality, every sentence.
 pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
     section_ui(ui, "Exact fit");
-    let texts: Vec<ParameterText> = report.parameters.iter().map(ParameterText::of).collect();
     tight(ui, |ui| {
         if ui.available_width() > WIDE {
-            table_ui(ui, &texts);
+            table_ui(ui, &report.parameters);
         } else {
-            texts.iter().for_each(|text| row_ui(ui, text));
+            report.parameters.iter().for_each(|one| row_ui(ui, one));
         }
     });
+    // A value beside its own interval is explained where it is seen.
+    let displaced = report.displaced_sentence();
+    if let Some(sentence) = &displaced {
+        sentence_ui(ui, sentence);
+    }
     budget_ui(ui, BUDGET_TITLE, &report.parameters);
     ui.label(quality(report));
-    report.sentences().for_each(|sentence| sentence_ui(ui, sentence));
+    let others = report.sentences().filter(|one| Some(*one) != displaced.as_deref());
+    others.for_each(|sentence| sentence_ui(ui, sentence));
 }
 
 /// Draws a line for each parameter, with as many of its intervals as have room; the total one is the one that counts.
-fn table_ui(ui: &mut Ui, texts: &[ParameterText]) {
+fn table_ui(ui: &mut Ui, parameters: &[FittedParameter]) {
     let tokens = tokens_of(ui);
+    let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
     let gap = ui.spacing().item_spacing.x;
     let room = ui.available_width() - SYMBOL_WIDTH - VALUE_WIDTH - 2.0 * gap;
     let count = ((room + gap) / (INTERVAL_WIDTH + gap)).floor().max(1.0) as usize;
-    let names = ["total 95 %", "95 %"].into_iter();
+    let names = [TOTAL, "95 %"].into_iter();
     let known = names.filter(|name| texts.iter().any(|text| !interval(text, name).is_empty()));
     let names: Vec<&str> = known.take(count).collect();
     ui.horizontal(|ui| {
@@ -48,7 +55,7 @@ fn table_ui(ui: &mut Ui, texts: &[ParameterText]) {
             cell(ui, INTERVAL_WIDTH, |ui| quiet_ui(ui, *name));
         }
     });
-    for text in texts {
+    for (parameter, text) in parameters.iter().zip(&texts) {
         ui.horizontal(|ui| {
             cell(ui, SYMBOL_WIDTH, |ui| {
                 let symbol = ui.label(symbol_job(ui, &text.name, &text.unit));
@@ -57,23 +64,32 @@ fn table_ui(ui: &mut Ui, texts: &[ParameterText]) {
             cell(ui, VALUE_WIDTH, |ui| number_ui(ui, &text.value, tokens.text));
             for name in &names {
                 cell(ui, INTERVAL_WIDTH, |ui| {
-                    number_ui(ui, interval(text, name), tokens.text_quiet)
+                    number_ui(ui, interval(text, name), interval_ink(tokens, parameter, name))
                 });
             }
         });
     }
 }
 
+const TOTAL: &str = "total 95 %";
+
+/// A total interval that does not hold its own value stands out.
+fn interval_ink(tokens: &Tokens, parameter: &FittedParameter, name: &str) -> Color32 {
+    let is_odd = name == TOTAL && parameter.is_displaced();
+    if is_odd { tokens.alarm_text } else { tokens.text_quiet }
+}
+
 fn interval<'a>(text: &'a ParameterText, name: &str) -> &'a str {
-    if name == "95 %" { &text.interval } else { &text.total }
+    if name == TOTAL { &text.total } else { &text.interval }
 }
 
 /// Draws a parameter with its intervals below.
-pub fn row_ui(ui: &mut Ui, text: &ParameterText) {
+pub fn row_ui(ui: &mut Ui, parameter: &FittedParameter) {
     let tokens = tokens_of(ui);
+    let text = ParameterText::of(parameter);
     value_ui(ui, &text.name, &text.value, tokens.text, &text.unit);
-    for name in ["95 %", "total 95 %"] {
-        let interval = interval(text, name);
+    for name in ["95 %", TOTAL] {
+        let interval = interval(&text, name);
         if interval.is_empty() {
             continue;
         }
@@ -81,7 +97,7 @@ pub fn row_ui(ui: &mut Ui, text: &ParameterText) {
             cell(ui, NAME_WIDTH, |ui| {
                 ui.label(RichText::new(name).color(tokens.text_quiet).small())
             });
-            number_ui(ui, interval, tokens.text_quiet);
+            number_ui(ui, interval, interval_ink(tokens, parameter, name));
         });
     }
 }

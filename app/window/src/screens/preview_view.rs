@@ -6,6 +6,9 @@ use eframe::egui::Ui;
 use palpate_figures::uncertain::clock;
 use palpate_protocols::preview::Preview;
 
+/// A plan that expects less indents nothing; a search for the surface touches it.
+const FORCE_SEEN_N: f64 = 0.05;
+
 /// Draws durations, forces and storage, then refusals and notes.
 pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let Some(checked) = form.checked() else {
@@ -50,10 +53,11 @@ fn numbers_ui(ui: &mut Ui, preview: &Preview) {
         "duration",
         format!("{} expected, {} at most", clock(preview.expected.0), clock(preview.longest.0)),
     );
-    fact_ui(
-        ui,
-        "peak force",
-        format!("{:.1} to {:.1} expected", preview.force_band[0], preview.force_band[1]),
-    );
+    let [low, high] = preview.force_band;
+    let force = match high.0 > FORCE_SEEN_N {
+        true => format!("{low:.1} to {high:.1} expected"),
+        false => "no indentation".to_owned(),
+    };
+    fact_ui(ui, "peak force", force);
     fact_ui(ui, "storage", format!("up to {:.1} MB", preview.storage_bytes as f64 * 1e-6));
 }

@@ -13,6 +13,8 @@ pub struct EventLog {
     /// The filter as typed.
     filter: String,
     is_unfolded: bool,
+    /// An alarm unfolded it, and nobody since.
+    is_by_alarm: bool,
     /// Alarms so far.
     alarms: usize,
 }
@@ -32,7 +34,13 @@ impl EventLog {
 
     fn take(&mut self, events: &[LogLine]) {
         let alarms = events.iter().filter(|line| line.is_alarm).count();
-        self.is_unfolded |= alarms > self.alarms;
+        if alarms > self.alarms && !self.is_unfolded {
+            (self.is_unfolded, self.is_by_alarm) = (true, true);
+        }
+        // The next run begins without alarms.
+        if alarms == 0 && std::mem::take(&mut self.is_by_alarm) {
+            self.is_unfolded = false;
+        }
         self.alarms = alarms;
     }
 
@@ -41,7 +49,7 @@ impl EventLog {
         let last = snapshot.run.as_ref().and_then(|run| run.events.last());
         ui.horizontal_centered(|ui| {
             if ui.button("All events").clicked() {
-                self.is_unfolded = true;
+                (self.is_unfolded, self.is_by_alarm) = (true, false);
             }
             let tokens = tokens_of(ui);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -136,10 +144,12 @@ mod tests {
         log.is_unfolded = false;
         log.take(&[line(false), line(true), line(false)]);
         assert!(!log.is_unfolded);
-        // The next run begins without alarms.
+        // The next run begins without alarms, and what an alarm has unfolded is folded again.
         log.take(&[]);
         log.take(&[line(true)]);
         assert!(log.is_unfolded);
+        log.take(&[]);
+        assert!(!log.is_unfolded);
     }
 
     #[test]

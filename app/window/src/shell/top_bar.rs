@@ -110,7 +110,8 @@ fn run_line(run: &RunView) -> String {
             format!("last run {}, {}", outcome.ending, clock(run.now.seconds().0))
         }
         (None, Some(_)) => format!("{step}, waiting for Retract or Close session"),
-        (None, None) => format!("{step}, {}, {} left", run.phase, clock(run.time_left.0)),
+        // What matters most comes first: a narrow window cuts the rest.
+        (None, None) => format!("{}, {} left, {step}", run.phase, clock(run.time_left.0)),
     }
 }
 

@@ -4,6 +4,7 @@ mod quality;
 mod verdict;
 
 use super::after_stop::ended_ui;
+use super::calibration::calibration_session;
 use super::exact_fit::exact_ui;
 use super::live_panel::{cycles_ui, facts_ui};
 use super::parameters::parameters_ui;
@@ -80,7 +81,9 @@ impl Screen for ResultScreen {
         if let Some(check) = latest.daily_check(Some(run)) {
             return daily_check_ui(ui, check);
         }
-        if let Some(session) = latest.assessed(Some(run)) {
+        // A calibration is kept, not accepted.
+        let has_calibration = calibration_session(Some(run)).is_ok();
+        if let Some(session) = latest.assessed(Some(run)).filter(|_| !has_calibration) {
             let may_repeat = workbench.repeat_verdict();
             self.verdict.ui(ui, session, &workbench.queue, &may_repeat, commands);
         }

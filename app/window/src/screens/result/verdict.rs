@@ -2,6 +2,7 @@
 //! specimen of the queue.
 
 use crate::command::{Commands, UiCommand};
+use crate::screens::run;
 use crate::widgets::{
     NamedControl, alarm_ui, quiet_ui, require, section_ui, sentence_ui, text_row,
 };
@@ -39,14 +40,6 @@ impl RunVerdict {
             *self = Self { session: Some(session.to_owned()), reason: String::new() };
         }
         section_ui(ui, "Verdict");
-        match queue.verdict_of(session) {
-            Some(Ok(verdict)) => {
-                sentence_ui(ui, verdict_words(*verdict));
-                next_ui(ui, queue, commands);
-            }
-            Some(Err(reason)) => alarm_ui(ui, format!("the verdict was not written: {reason}")),
-            None => {}
-        }
         text_row(ui, "reason", "for a rejection", &mut self.reason);
         let is_free = require(!queue.is_busy(), "writing the verdict");
         let has_reason =
@@ -63,24 +56,37 @@ impl RunVerdict {
             ] {
                 if button_ui(ui, name, "", can.is_ok()) {
                     let work = QueueWork::Judge(session.to_owned(), verdict);
-                    commands.push(UiCommand::Queue(work, self.reason.clone()));
+                    commands.push(UiCommand::Queue(work, std::mem::take(&mut self.reason)));
+                    // Nothing moves before the specimen lies as it should and somebody starts.
                     if verdict == QueueVerdict::Repeat {
-                        commands.push(UiCommand::Start);
+                        commands.push(UiCommand::Show(run::SCREEN.name));
                     }
                 }
             }
         });
-        if let Err(reason) = can_reject.and(can_repeat) {
-            quiet_ui(ui, reason);
+        // What comes with a verdict stands below the buttons, which stay where they are.
+        match queue.verdict_of(session) {
+            Some(Ok(verdict)) => {
+                sentence_ui(ui, verdict_words(*verdict));
+                next_ui(ui, queue, commands);
+            }
+            Some(Err(reason)) => alarm_ui(ui, format!("the verdict was not written: {reason}")),
+            None => {
+                if let Err(reason) = can_reject.and(can_repeat) {
+                    quiet_ui(ui, reason);
+                }
+            }
         }
     }
 }
 
 const fn verdict_words(verdict: QueueVerdict) -> &'static str {
     match verdict {
-        QueueVerdict::Accept => "Accepted.",
-        QueueVerdict::Reject => "Rejected.",
-        QueueVerdict::Repeat => "Rejected, to be repeated.",
+        QueueVerdict::Accept => "Accepted. The session's verdict is valid.",
+        QueueVerdict::Reject => "Rejected. The session's verdict is rejected.",
+        QueueVerdict::Repeat => {
+            "Rejected, to be repeated: the screen Run has the same specimen and protocol."
+        }
     }
 }
 

@@ -20,6 +20,9 @@ use palpate_figures::tokens::LIGHT;
 use palpate_model::signal::track::SignalTrack;
 use std::path::PathBuf;
 
+const NO_DIALOG: &str =
+    "this desktop shows no file dialog; Figure on the right writes to a path that is typed";
+
 /// Columns of a figure of plots side by side.
 const COLUMNS: usize = 3;
 /// Width of a line in px, and room above for the names of phases as a share of the height of lines.
@@ -49,8 +52,8 @@ impl FigureExport {
             }));
         }
         let chosen = self.dialog.poll();
-        if let Some(reason) = self.dialog.take_refusal() {
-            self.copied = Some(Err(reason));
+        if self.dialog.take_refusal().is_some() {
+            self.copied = Some(Err(NO_DIALOG.to_owned()));
         }
         if let Some(to) = chosen
             && let Some(figure) = self.waiting.take()

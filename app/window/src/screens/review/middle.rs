@@ -7,6 +7,7 @@ use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
+use crate::plots::style::AXIS_WIDTH;
 use crate::theme::icon_text;
 use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
@@ -14,11 +15,10 @@ use eframe::egui::{Button, RichText, Ui, vec2};
 use lucide_icons::Icon;
 use palpate_model::signal::track::SignalTrack;
 
-/// Points that the axes beside and below a plot take of it.
-const AXIS_WIDTH: f32 = 58.0;
+/// Points that the axis below a plot takes of it.
 const AXIS_HEIGHT: f32 = 34.0;
 /// Sessions that are drawn with two points a pixel each; of more than that, each has fewer.
-const FULL_LINES: usize = 6;
+const FULL_LINES: usize = 13;
 
 impl ReviewScreen {
     pub fn draw_middle(&mut self, ui: &mut Ui) {
@@ -66,8 +66,8 @@ impl ReviewScreen {
             (icon_text(Icon::ChevronLeft), "Pan left", "left arrow", ViewMove::PanLeft),
             (icon_text(Icon::ChevronRight), "Pan right", "right arrow", ViewMove::PanRight),
             (icon_text(Icon::Maximize), "Reset view", "Home", ViewMove::Reset),
-            (word("A"), "Cursor A", "A, or a click", ViewMove::Cursor(0)),
-            (word("B"), "Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
+            (word("Cursor A"), "Cursor A", "A, or a click", ViewMove::Cursor(0)),
+            (word("Cursor B"), "Cursor B", "B, or a click with Shift", ViewMove::Cursor(1)),
             (icon_text(Icon::X), "Clear cursors", "Delete", ViewMove::ClearCursors),
         ] {
             // Cursors stand in time, which the view of cycles does not have.

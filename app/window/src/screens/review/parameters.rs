@@ -12,14 +12,13 @@ use crate::screens::parameters::symbol_job;
 use crate::theme::Tokens;
 use crate::widgets::{
     ChoiceTable, Column, Emphasis, Glyph, ScrollPosition, TableAction, TableCell, TableLine,
-    alarm_ui, in_print, quiet_ui, tokens_of,
+    alarm_ui, quiet_ui, tokens_of,
 };
 use eframe::egui::{
     Align2, Galley, Id, Label, Pos2, Rect, RichText, ScrollArea, Sense, TextStyle, Ui, UiBuilder,
     pos2, vec2,
 };
 use palpate_analysis::report::text;
-use palpate_figures::uncertain::with_interval;
 use palpate_model::estimate::FittedParameter;
 use std::cmp::Ordering;
 use std::collections::HashMap;
@@ -28,7 +27,7 @@ use std::sync::Arc;
 /// A tint is full at so many robust standard deviations.
 const FULL: f64 = 5.0;
 /// What tint, triangle and ring mean.
-const MEANING: &str = "Values stand with their total 95 % interval. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: a tint is full at 5, and beyond 3.5 a triangle in the cell and a ring around the dot mark an outlier. Groups of fewer than four sessions have no tint.";
+const MEANING: &str = "A dot stands in its statistical 95 % interval: errors of a calibration move all sessions that it reads alike. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: a tint is full at 5, and beyond 3.5 a triangle in the cell and a ring around the dot mark an outlier. Groups of fewer than four sessions have no tint.";
 /// Least width of the strip of a parameter, and most of the names of groups, in points.
 const STRIP_MIN: f32 = 130.0;
 const LANE_NAME_MAX: f32 = 120.0;
@@ -50,16 +49,9 @@ struct Value {
 }
 
 impl Value {
-    /// The total interval, or the statistical one.
+    /// The statistical interval: errors of a calibration move all sessions that it reads alike.
     fn ends(&self) -> Option<[f64; 2]> {
-        self.parameter.total95.or(self.parameter.ci95)
-    }
-
-    fn short_text(&self) -> String {
-        in_print(&match (self.parameter.std_error, self.ends()) {
-            (Some(error), Some(ends)) => with_interval(self.parameter.value, error, ends),
-            _ => text::ParameterText::of(&self.parameter).value,
-        })
+        self.parameter.ci95.or(self.parameter.total95)
     }
 
     /// How far it is, in words; empty where it is near.
@@ -77,12 +69,13 @@ impl Value {
         self.deviation.is_some_and(|far| far.abs() >= OUTLIER)
     }
 
-    fn cell(&self, tokens: &Tokens) -> TableCell {
-        let Some(far) = self.deviation else { return TableCell::text(self.short_text()) };
+    fn cell(&self, decimals: usize, tokens: &Tokens) -> TableCell {
+        let text = format!("{:.decimals$}", self.parameter.value);
+        let Some(far) = self.deviation else { return TableCell::text(text) };
         let emphasis = Emphasis::Tinted(tokens.deviation((far / FULL) as f32));
         let mark = if far > 0.0 { Glyph::Up } else { Glyph::Down };
         let glyph = self.is_outlier().then_some(mark);
-        TableCell { glyph, text: self.short_text(), emphasis }
+        TableCell { glyph, text, emphasis }
     }
 }
 
@@ -105,6 +98,8 @@ fn is_finding(parameter: &FittedParameter) -> bool {
 /// The sessions that are fitted, group by group, and the parameters of the first.
 struct Parameters {
     names: Vec<FittedParameter>,
+    /// Of each, so that two digits of the smallest standard error are seen.
+    decimals: Vec<usize>,
     rows: Vec<Row>,
 }
 
@@ -112,7 +107,20 @@ impl Parameters {
     fn of(subjects: &[ReviewSubject], groups: &[SessionGroup]) -> Option<Self> {
         let order = groups.iter().flat_map(|group| &group.members);
         let first = order.clone().find_map(|index| subjects[*index].fitted())?;
-        let names = first.report.parameters.clone();
+        let all = || subjects.iter().filter_map(ReviewSubject::fitted);
+        let mut names = first.report.parameters.clone();
+        // What is kept at a value in all of them is none of their findings.
+        names.retain(|one| all().filter_map(|fit| fit.report.parameter(&one.name)).any(is_finding));
+        let decimals = names.iter().map(|one| {
+            let errors = all().filter_map(|fit| fit.report.parameter(&one.name)?.std_error);
+            let least = errors.filter(|error| *error > 0.0).fold(f64::INFINITY, f64::min);
+            if least.is_finite() {
+                (1.0 - least.log10().floor()).clamp(0.0, 8.0) as usize
+            } else {
+                4
+            }
+        });
+        let decimals = decimals.collect();
         let mut rows = Vec::new();
         for group in groups {
             let short = group.members.iter().copied().zip(group.short_names(subjects));
@@ -146,7 +154,7 @@ impl Parameters {
                 });
             }
         }
-        Some(Self { names, rows })
+        Some(Self { names, decimals, rows })
     }
 
     /// The rows sorted by a column; those without a value there come last either way.
@@ -176,15 +184,20 @@ impl ReviewScreen {
         let groups = groups(&self.subjects, self.grouping);
         refusals_ui(ui, &self.subjects);
         let Some(mut found) = Parameters::of(&self.subjects, &groups) else {
-            let words = "none of the sessions shown is fitted yet; press 'Fit the sessions shown'";
-            return quiet_ui(ui, words);
+            return match self.fits.state() {
+                Some(state) => quiet_ui(ui, format!("fitting the sessions shown: {}", state.what)),
+                None => quiet_ui(
+                    ui,
+                    "none of the sessions shown is fitted yet; press 'Fit the sessions shown'",
+                ),
+            };
         };
         // The table has at least half of the height.
         let strips = ScrollArea::vertical().id_salt("strips").auto_shrink([false, true]);
         let room = 0.5 * ui.available_height();
         let strips = strips.max_height(room);
         let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, room, &groups, &found)).inner;
-        let words = "blue is below and orange above the median of its group; a triangle or red ring is an outlier, a black ring is in front";
+        let words = "tint: below (blue) or above (orange) the median of its group; red ring: outlier; black ring: in front";
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
         ui.add(Label::new(words).truncate()).on_hover_text(MEANING);
         found.sort(&self.subjects, self.parameter_table.sorted);
@@ -293,11 +306,11 @@ impl ReviewScreen {
             Grouping::None => "group",
             by => by.name(),
         };
-        let mut columns = vec![Column::words(group, 84.0), Column::words("session", 130.0)];
+        let mut columns = vec![Column::words(group, 64.0), Column::words("session", 112.0)];
         for parameter in &found.names {
             let print = Some(symbol_job(ui, &parameter.name, &parameter.unit));
             let head = text::parameter_head(parameter);
-            columns.push(Column { print, ..Column::numbers(&head, 196.0) });
+            columns.push(Column { print, ..Column::numbers(&head, 82.0) });
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
         let line = |number: usize| {
@@ -305,7 +318,7 @@ impl ReviewScreen {
             let name = &self.subjects[row.index].name;
             let mut words = name.clone();
             let mut cells = vec![TableCell::text(&row.group), TableCell::text(&row.short)];
-            for value in &row.values {
+            for (value, decimals) in row.values.iter().zip(&found.decimals) {
                 let Some(value) = value else {
                     cells.push(TableCell::default());
                     continue;
@@ -316,7 +329,7 @@ impl ReviewScreen {
                     text::cell(&value.parameter),
                     value.deviation_words()
                 );
-                cells.push(value.cell(tokens));
+                cells.push(value.cell(*decimals, tokens));
             }
             cells.push(TableCell::text(format!("{:.3}", row.rmse_mn)));
             TableLine { name: words, cells }
@@ -386,7 +399,7 @@ mod tests {
     /// A model with fewer parameters leaves the order of a column that is gone.
     #[test]
     fn a_column_that_is_gone_sorts_nothing() {
-        let mut found = Parameters { names: Vec::new(), rows: Vec::new() };
+        let mut found = Parameters { names: Vec::new(), decimals: Vec::new(), rows: Vec::new() };
         for (index, rmse_mn) in [(0, 2.0), (1, 1.0)] {
             let (group, short) = (String::new(), String::new());
             found.rows.push(Row { index, group, short, values: Vec::new(), rmse_mn });

@@ -10,7 +10,7 @@ use crate::widgets::{
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
 use crate::workers::queue_desk::QueueWork;
-use eframe::egui::{Button, Key, Label, RichText, TextEdit, Ui, Vec2, vec2};
+use eframe::egui::{Button, Key, Label, RichText, ScrollArea, TextEdit, Ui, Vec2, vec2};
 use palpate_analysis::report::queue::counts_text;
 use palpate_analysis::specimen_queue::{drawn_seed, visible_items};
 use palpate_sessions::specimen_queue::{
@@ -22,6 +22,8 @@ const BUTTON: Vec2 = vec2(130.0, 48.0);
 const NEXT_BUTTON: Vec2 = vec2(260.0, 56.0);
 /// Beside the button a name has so much room in points, or it stands above.
 const NAME_WIDTH_MIN: f32 = 240.0;
+/// Five specimens and the names of the columns, in points.
+const LIST_HEIGHT_MIN: f32 = 180.0;
 const REMARK_WIDTH_MIN: f32 = 120.0;
 
 /// What is typed on the page.
@@ -129,6 +131,21 @@ impl QueueForm {
         next: &Result<u32, String>,
         commands: &mut Commands,
     ) {
+        let room = ui.available_height();
+        // In a low window all of it scrolls, so that the list keeps its rows.
+        let whole = ScrollArea::vertical().id_salt("queue page").auto_shrink(false);
+        whole.show(ui, |ui| self.page_ui(ui, room, workbench, next, commands));
+    }
+
+    fn page_ui(
+        &mut self,
+        ui: &mut Ui,
+        room: f32,
+        workbench: &Workbench,
+        next: &Result<u32, String>,
+        commands: &mut Commands,
+    ) {
+        let top = ui.cursor().top();
         let queue = workbench.queue.queue();
         if let Some(reason) = &workbench.queue.refusal {
             alarm_ui(ui, reason);
@@ -145,7 +162,12 @@ impl QueueForm {
         sentence_ui(ui, counts_text(queue));
         let items = visible_items(queue);
         self.chosen_ui(ui, &items, workbench, commands);
-        self.table_ui(ui, &items);
+        let left = room - (ui.cursor().top() - top);
+        let size = vec2(ui.available_width(), left.max(LIST_HEIGHT_MIN));
+        ui.allocate_ui(size, |ui| {
+            ui.set_max_height(size.y);
+            self.table_ui(ui, &items);
+        });
     }
 
     /// A run without a verdict, such as one that a crash ended.
@@ -298,9 +320,9 @@ impl QueueForm {
                 refusals.push(can.err());
             }
         });
-        if let Some(reason) =
-            refusals.iter().all(Option::is_some).then(|| refusals[0].clone()).flatten()
-        {
+        // Of what could be done with one in this state.
+        let own = if state == SpecimenState::Waiting { 0 } else { 2 };
+        if let Some(reason) = &refusals[own] {
             quiet_ui(ui, reason);
         }
     }
@@ -328,8 +350,11 @@ impl QueueForm {
         };
         let (acts, _) = table.ui(ui, &mut self.scrolled);
         for act in acts {
-            if let TableAction::Choose(index, _) = act {
-                self.chosen = Some(items[index].number);
+            if let TableAction::Choose(index, _) = act
+                && self.chosen.replace(items[index].number) != Some(items[index].number)
+            {
+                // A reason is about one specimen.
+                self.reason.clear();
             }
         }
     }

@@ -109,10 +109,9 @@ impl FitReport {
     }
 
     /// Which estimates lie outside of their own total interval, because it uses what the record tells of the calibration.
-    fn displaced_sentence(&self) -> Option<String> {
-        let is_outside = |one: &&FittedParameter| {
-            one.total95.is_some_and(|[low, high]| one.value < low || one.value > high)
-        };
+    #[must_use]
+    pub fn displaced_sentence(&self) -> Option<String> {
+        let is_outside = |one: &&FittedParameter| one.is_displaced();
         let names = self.parameters.iter().filter(is_outside).map(|one| one.name.as_str());
         let names: Vec<&str> = names.collect();
         (!names.is_empty()).then(|| {

@@ -60,7 +60,7 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     let AnalysisContent::Fit { results, .. } = &one.what else { return false };
     let parameters = stored_analysis::parameters(results);
     for parameter in &parameters {
-        row_ui(ui, &ParameterText::of(parameter));
+        row_ui(ui, parameter);
         let mut own = own.iter().flat_map(|own| &own.parameters);
         if let Some(same) = own.find(|own| own.name == parameter.name) {
             fact_ui(ui, "", format!("session: {}", ParameterText::of(same).value));
