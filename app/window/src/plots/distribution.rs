@@ -18,7 +18,7 @@ const EDGE: f32 = 8.0;
 const RADIUS: f32 = 3.5;
 const ARROW: f32 = 3.0;
 /// Part of the width of all values that an interval may add on either side; wider ones are cut.
-const INTERVAL_SHARE: f64 = 0.35;
+const INTERVAL_SHARE: f64 = 2.5;
 
 /// A value.
 pub struct DistributionDot {

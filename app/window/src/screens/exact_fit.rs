@@ -15,6 +15,7 @@ use palpate_rheology::fit::FitReport;
 const WIDE: f32 = 500.0;
 /// Of a symbol with its unit, and of an interval, where they stand beside each other.
 const SYMBOL_WIDTH: f32 = 110.0;
+const WIDE_VALUE_WIDTH: f32 = 212.0;
 const INTERVAL_WIDTH: f32 = 196.0;
 
 /// Draws the report: parameters with their intervals and their budget, quality, every sentence.
@@ -43,14 +44,14 @@ fn table_ui(ui: &mut Ui, parameters: &[FittedParameter]) {
     let tokens = tokens_of(ui);
     let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
     let gap = ui.spacing().item_spacing.x;
-    let room = ui.available_width() - SYMBOL_WIDTH - VALUE_WIDTH - 2.0 * gap;
+    let room = ui.available_width() - SYMBOL_WIDTH - WIDE_VALUE_WIDTH - 2.0 * gap;
     let count = ((room + gap) / (INTERVAL_WIDTH + gap)).floor().max(1.0) as usize;
     let names = [TOTAL, "95 %"].into_iter();
     let known = names.filter(|name| texts.iter().any(|text| !interval(text, name).is_empty()));
     let names: Vec<&str> = known.take(count).collect();
     ui.horizontal(|ui| {
         cell(ui, SYMBOL_WIDTH, |_| ());
-        cell(ui, VALUE_WIDTH, |ui| quiet_ui(ui, "value"));
+        cell(ui, WIDE_VALUE_WIDTH, |ui| quiet_ui(ui, "value"));
         for name in &names {
             cell(ui, INTERVAL_WIDTH, |ui| quiet_ui(ui, *name));
         }
@@ -61,7 +62,7 @@ fn table_ui(ui: &mut Ui, parameters: &[FittedParameter]) {
                 let symbol = ui.label(symbol_job(ui, &text.name, &text.unit));
                 symbol.on_hover_text(format!("{}, 95 %: {}", text.name, text.interval));
             });
-            cell(ui, VALUE_WIDTH, |ui| number_ui(ui, &text.value, tokens.text));
+            cell(ui, WIDE_VALUE_WIDTH, |ui| number_ui(ui, &text.value, tokens.text));
             for name in &names {
                 cell(ui, INTERVAL_WIDTH, |ui| {
                     number_ui(ui, interval(text, name), interval_ink(tokens, parameter, name))

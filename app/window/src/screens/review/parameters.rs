@@ -310,7 +310,7 @@ impl ReviewScreen {
         for parameter in &found.names {
             let print = Some(symbol_job(ui, &parameter.name, &parameter.unit));
             let head = text::parameter_head(parameter);
-            columns.push(Column { print, ..Column::numbers(&head, 82.0) });
+            columns.push(Column { print, ..Column::numbers(&head, 88.0) });
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
         let line = |number: usize| {

@@ -145,6 +145,8 @@ impl QueueForm {
         next: &Result<u32, String>,
         commands: &mut Commands,
     ) {
+        // The bar of the scrolling stands beside what it scrolls.
+        ui.set_max_width(ui.available_width() - ui.spacing().scroll.bar_width);
         let top = ui.cursor().top();
         let queue = workbench.queue.queue();
         if let Some(reason) = &workbench.queue.refusal {
