@@ -106,11 +106,14 @@ fn a_run_is_judged_by_its_checks_and_by_its_operator() {
     };
     assert!(!flow.is_enabled("Reject") && !flow.is_enabled("Repeat"), "without a reason");
     flow.click("Accept");
-    flow.wait("the verdict", |window| window.query_by_label("Accepted.").is_some());
+    flow.wait_for_words("Accepted.");
     assert_eq!(verdict().unwrap().1, "A. Tester");
     flow.type_into("reason", "hair under the probe");
     flow.click("Repeat");
-    flow.wait("the second run", |_| session.with_file_name("session-0002").exists());
+    flow.wait("the verdict", |_| verdict().is_some_and(|one| one.0 == DataQuality::Rejected));
+    flow.window.run_steps(5);
+    // Nothing moves before the operator starts.
+    assert!(!session.with_file_name("session-0002").exists() && flow.is_enabled("Start  F5"));
     let (rejected, by, reason) = verdict().unwrap();
     assert_eq!((rejected, by.as_str()), (DataQuality::Rejected, "A. Tester"));
     assert_eq!(reason, "hair under the probe");

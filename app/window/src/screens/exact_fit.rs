@@ -1,8 +1,6 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
-use super::parameters::{
-    NAME_WIDTH, VALUE_WIDTH, cell, number_ui, symbol_job, symbol_ui, tight, value_ui,
-};
+use super::parameters::{NAME_WIDTH, cell, number_ui, symbol_job, symbol_ui, tight, value_ui};
 use crate::theme::Tokens;
 use crate::widgets::{fact_ui, quiet_ui, section_ui, sentence_ui, tokens_of};
 use eframe::egui::{CollapsingHeader, Color32, RichText, Ui};

@@ -26,7 +26,7 @@ const INDEX_SIZE: f32 = 9.0;
 
 /// Columns of a parameter's name and value in points: a value of five digits with its uncertainty and a power of ten has room.
 pub(super) const NAME_WIDTH: f32 = 68.0;
-pub(super) const VALUE_WIDTH: f32 = 190.0;
+const VALUE_WIDTH: f32 = 190.0;
 
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
