@@ -117,38 +117,29 @@ pub fn judge_daily_check(session: &Session, now: SystemTime) -> Result<DailyChec
     })
 }
 
-/// What must be acknowledged before a run, before and after a daily check.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct DailyCheckChange {
-    pub before: Vec<String>,
-    pub after: Vec<String>,
-}
-
-/// Judges the session in a folder and keeps its result for the day, if it is a daily check that nobody stopped.
+/// Judges the session in a folder and keeps its result for the day, if it is a daily check that nobody stopped. With it
+/// comes what must be acknowledged before a run from now on.
 pub fn keep_daily_check(
-    library: &Path,
+    library: Option<&Path>,
     folder: &Path,
     now: SystemTime,
-) -> Result<Option<(DailyCheck, DailyCheckChange)>, String> {
+) -> Result<Option<(DailyCheck, Vec<String>)>, String> {
     let session = Session::open(folder).map_err(|err| err.to_string())?;
     let ending = session.end.as_ref().map(|end| end.outcome.as_str());
     let is_stopped = [EndingKind::Stop.name(), EndingKind::Halt.name()].map(Some).contains(&ending);
     if session.manifest.plan["name"] != DAILY_CHECK || is_stopped {
         return Ok(None);
     }
+    let library = library.ok_or("there is no library that could keep it")?;
     let check = judge_daily_check(&session, now).map_err(|err| err.to_string())?;
     // Only a simulated rig has settings that reproduce it.
     let rig = session.manifest.rig.as_ref();
     let is_virtual = rig.is_some_and(|rig| !rig.settings.is_empty());
-    let to_acknowledge = || {
-        let touching = RampHold::default().plan();
-        let gate = DailyCheckGate::of(&touching, Some(library), &check.rig, is_virtual, now);
-        gate.map(|gate| gate.to_acknowledge()).map_err(|err| err.to_string())
-    };
-    let before = to_acknowledge()?;
     add_check(library, &check).map_err(|err| err.to_string())?;
-    let after = to_acknowledge()?;
-    Ok(Some((check, DailyCheckChange { before, after })))
+    let touching = RampHold::default().plan();
+    let gate = DailyCheckGate::of(&touching, Some(library), &check.rig, is_virtual, now);
+    let gate = gate.map_err(|err| err.to_string())?;
+    Ok(Some((check, gate.to_acknowledge())))
 }
 
 /// Mass in g and signal of every reading, in order.
@@ -307,7 +298,16 @@ pub fn needs_daily_check(plan: &Plan) -> bool {
     plan.steps.iter().any(|planned| is_touching(&planned.step))
 }
 
+/// In every sentence of the gate, and in no other.
+const OF_TODAY: &str = "daily check today";
+
 impl DailyCheckGate {
+    /// Whether it said a sentence that is to be acknowledged.
+    #[must_use]
+    pub fn has_said(sentence: &str) -> bool {
+        sentence.contains(OF_TODAY)
+    }
+
     /// The gate before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
     pub fn of(
@@ -321,11 +321,11 @@ impl DailyCheckGate {
             return Ok(Self::Open);
         }
         let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;
-        let none = format!("rig {rig} had no daily check today");
+        let none = format!("rig {rig} had no {OF_TODAY}");
         Ok(match last_check_of_day(&checks, now.into()) {
             Some(check) if check.is_passed => Self::Open,
             Some(check) => Self::Acknowledge(format!(
-                "rig {rig} failed its daily check today ({}); repair the rig and repeat '{DAILY_CHECK_COMMAND}'",
+                "rig {rig} failed its {OF_TODAY} ({}); repair the rig and repeat '{DAILY_CHECK_COMMAND}'",
                 check.failures()
             )),
             None if is_virtual => {

@@ -238,7 +238,8 @@ pub fn export_all(
         ExportDestination::Tables(format, folder) => format!(
             "{written} of {of} sessions written as {} to {}",
             format.ending(),
-            folder.display()
+            // A name alone does not tell the folder.
+            std::path::absolute(folder).unwrap_or_else(|_| folder.clone()).display()
         ),
         ExportDestination::Lake(lake) => format!(
             "{} of {of} sessions added to {}; {were_there} were already there",

@@ -210,7 +210,13 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         (None, Some(_)) => (None, Vec::new()),
         (name, _) => CalibrationSource::wanted(name.as_deref(), &rig.description().name)?,
     };
-    let mut bench = calibrated(args, rig, locks, source)?;
+    let mut bench = calibrated(args, rig, locks, source).map_err(|failure| match failure {
+        // One that cannot be read may be the one that is missing.
+        Failure::Usage(reason) if !unreadable.is_empty() => {
+            Failure::Usage(format!("{reason} ({})", unreadable.join("; ")))
+        }
+        other => other,
+    })?;
     bench.doubts.extend(unreadable);
     Ok(bench)
 }

@@ -28,8 +28,11 @@ pub(super) fn run(
     let windows = windows.ok_or_else(|| Failure::usage(NO_WINDOW))?;
     let to_open = args.paths.iter().map(|path| existing(path)).collect::<Result<_, _>>()?;
     let bench = open(&args.rig)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
-    let request = WorkbenchRequest { to_open, ..request(bench, args.rig.time_scale)? };
+    bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
+    // Who names a calibration has been told on the terminal; where none is named, whoever runs must know.
+    let doubts = if args.rig.calibration.is_none() { bench.doubts.clone() } else { Vec::new() };
+    let mut request = WorkbenchRequest { to_open, ..request(bench, args.rig.time_scale)? };
+    request.to_acknowledge.extend(doubts);
     windows.workbench(request).map_err(Failure::Failed)
 }
 

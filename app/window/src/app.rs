@@ -352,7 +352,11 @@ impl eframe::App for WorkbenchApp {
         self.read_input(ctx, &mut commands);
         self.follow_monitor(ctx);
         self.workbench.poll(ctx);
-        if let Some((ask, path)) = self.workbench.dialog.poll() {
+        let chosen = self.workbench.dialog.poll();
+        if let Some(reason) = self.workbench.dialog.take_refusal() {
+            self.workbench.notice = Some(reason);
+        }
+        if let Some((ask, path)) = chosen {
             commands.push(match ask {
                 PathPurpose::Opened => UiCommand::Review(vec![path]),
                 ask => UiCommand::Chosen(ask, path),

@@ -4,7 +4,6 @@ use crate::plots::PlotCache;
 use crate::screens::form::RunSetup;
 use crate::workers::fit::{Refit, Refitter, has_result};
 use eframe::egui::{Context, Ui};
-use palpate_analysis::daily::DailyCheckChange;
 use palpate_model::assessment::Assessment;
 use palpate_model::calibration::Calibration;
 use palpate_runner::RunView;
@@ -73,9 +72,14 @@ impl LatestRun {
         self.last_start.as_ref()
     }
 
-    /// What a daily check that has just been judged changes, once.
-    pub fn take_gate(&mut self) -> Option<DailyCheckChange> {
+    /// What must be acknowledged after a daily check that has just been judged, once.
+    pub fn take_gate(&mut self) -> Option<Vec<String>> {
         self.refitter.take_gate()
+    }
+
+    /// Whether a daily check is being judged.
+    pub fn is_judging(&self) -> bool {
+        self.refitter.is_judging()
     }
 
     /// The daily check that this run was, judged; or why it could not be kept.

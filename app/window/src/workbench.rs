@@ -81,6 +81,8 @@ pub struct Workbench {
     start: Start,
     /// The run that begins once every loop of the window has stopped.
     next_run: Option<RunRequest>,
+    /// Specimen and protocol that it is asked for.
+    asked: Option<[String; 2]>,
     is_closing: bool,
 }
 
@@ -137,6 +139,7 @@ impl Workbench {
             occupation: Occupation::default(),
             start: Start::None,
             next_run: None,
+            asked: None,
             is_closing: false,
         };
         workbench.refresh_ports(ctx);
@@ -184,6 +187,7 @@ impl Workbench {
     /// Whether the protocol may start now, or why not.
     pub fn start_verdict(&self) -> Result<(), String> {
         self.move_verdict()?;
+        require(!self.latest_run.is_judging(), "the daily check is being judged")?;
         self.form.verdict()
     }
 
@@ -292,9 +296,11 @@ impl Workbench {
         request.map_err(|reason| self.refusal = Some(reason)).ok()
     }
 
-    /// Has a run begin once every loop of the window has stopped.
-    pub fn set_next_run(&mut self, request: RunRequest) {
+    /// Has a run begin once every loop of the window has stopped. `asked`: specimen and protocol of the form, where it
+    /// is what the form asks for.
+    pub fn set_next_run(&mut self, request: RunRequest, asked: Option<[String; 2]>) {
         self.next_run = Some(request);
+        self.asked = asked;
     }
 
     pub fn has_next_run(&self) -> bool {
@@ -348,7 +354,7 @@ impl Workbench {
 
     /// Whether the run shown may be repeated now, or why not: the form has what it would start.
     pub fn repeat_verdict(&self) -> Result<(), String> {
-        self.start_verdict()?;
+        self.free_verdict()?;
         let is_same = self.latest_run.last_start() == Some(&self.form.next_start());
         require(
             is_same,
@@ -365,7 +371,12 @@ impl Workbench {
         match &self.start {
             Start::None => {}
             Start::Sent(answer) => match answer.try_recv() {
-                Ok(Ok(())) => self.start = Start::Granted { seen: self.snapshot.sequence },
+                Ok(Ok(())) => {
+                    if let Some(asked) = self.asked.take() {
+                        self.latest_run.set_last_start(asked);
+                    }
+                    self.start = Start::Granted { seen: self.snapshot.sequence };
+                }
                 Ok(Err(reason)) => {
                     self.refusal = Some(reason.to_string());
                     self.queue.cancel_start();
@@ -406,14 +417,18 @@ impl Workbench {
         if !is_safe {
             self.operator(Operator::Stop);
         }
-        is_safe && !self.queue.is_busy()
+        is_safe && !self.is_writing()
     }
 
     /// Whether a window that waited for the axis to rest may close now.
     pub fn may_close(&self) -> bool {
         let is_safe = self.is_at_rest() || !self.runner.is_alive();
-        // A verdict that is being written is not lost.
-        self.is_closing && is_safe && !self.queue.is_busy()
+        self.is_closing && is_safe && !self.is_writing()
+    }
+
+    /// Whether something is being written that would be lost with the window.
+    fn is_writing(&self) -> bool {
+        self.queue.is_busy() || self.latest_run.is_judging()
     }
 
     fn is_at_rest(&self) -> bool {

@@ -1,7 +1,7 @@
 //! The screen of the daily checks, by accessible name: what two sessions measured, and what there is to do before the first.
 
 use eframe::egui::Key;
-use palpate_analysis::daily::{DailyCheckGate, PastCheck, judge_daily_check};
+use palpate_analysis::daily::{DailyCheckGate, PastCheck, judge_daily_check, keep_daily_check};
 use palpate_analysis::window_requests::WorkbenchRequest;
 use palpate_drivers::sim::{SimProfile, SimSettings};
 use palpate_model::rig::Limits;
@@ -128,4 +128,13 @@ fn a_check_that_passes_takes_the_place_of_one_that_failed_in_what_is_to_be_ackno
     flow.wait_for_words("passed; it holds for today");
     flow.act_by_name("Protocol ramp-hold");
     assert!(!flow.says(words) && flow.is_enabled("Start  F5"));
+}
+
+#[test]
+fn a_session_of_another_protocol_is_no_check_with_a_library_or_without() {
+    let session = palpate_tests::workspace().join("tests/sessions/ramp-hold-lab");
+    let folder = tempfile::tempdir().unwrap();
+    for library in [None, Some(folder.path())] {
+        assert_eq!(keep_daily_check(library, &session, wall_now()), Ok(None));
+    }
 }

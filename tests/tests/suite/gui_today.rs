@@ -267,3 +267,21 @@ fn a_move_by_hand_leaves_the_result_of_the_run_before_it() {
     flow.window.run_steps(3);
     assert!(flow.says("Exact fit") && flow.says("Verdict") && flow.is_enabled("Accept"));
 }
+
+#[test]
+fn a_specimen_in_the_form_does_not_keep_the_rig_from_being_checked() {
+    let mut flow = WindowFlow::open(TimeScale::Factor(20.0));
+    take_first_of_two(&mut flow);
+    assert_eq!(flow.window.get_by_label("specimen").value().as_deref(), Some("pig 1"));
+    flow.act_by_name("Run the daily check");
+    flow.type_into("operator", "Ada");
+    flow.window.key_press(Key::F5);
+    flow.wait("the first question", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.prompt.is_some())
+    });
+    let run = flow.run().unwrap();
+    let manifest = SessionSummary::read(&run.folder).unwrap().manifest;
+    assert_eq!((run.plan_name.as_str(), manifest.specimen.as_str()), ("daily-check", ""));
+    assert!(queue(&flow).open_run().is_none());
+}

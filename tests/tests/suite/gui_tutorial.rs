@@ -141,6 +141,8 @@ fn carry_out(flow: &mut WindowFlow, deed: &TutorialStep) {
                 "report.html" | "tables" => flow.folder.path().join("out").join(text),
                 text => text.into(),
             };
+            // A person types once the field is there: what it belongs to may still be read.
+            flow.wait(name, |window| window.query_by_label(name).is_some());
             flow.type_into(name, &text.display().to_string());
         }
         TutorialStep::Wait(words) => flow.wait(words, |window| says(window, words)),

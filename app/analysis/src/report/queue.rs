@@ -46,7 +46,8 @@ pub fn counts_text(queue: &SpecimenQueue) -> String {
     if counts.without_verdict > 0 {
         parts.push("1 without a verdict".into());
     }
-    parts.push(format!("{} runs, {} of them rejected", counts.runs, counts.rejected_runs));
+    let runs = if counts.runs == 1 { "1 run".into() } else { format!("{} runs", counts.runs) };
+    parts.push(format!("{runs}, {} of them rejected", counts.rejected_runs));
     let seeds: Vec<String> = queue.seeds.iter().map(u64::to_string).collect();
     if !seeds.is_empty() {
         parts.push(format!("random order with seed {}", seeds.join(", then ")));

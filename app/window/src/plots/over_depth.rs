@@ -2,7 +2,7 @@
 //! than a frame can draw become a picture.
 
 use super::navigate::{AxisRange, Gesture, gesture};
-use super::style::{name_up, paint_grid, still};
+use super::style::{name_up, paint_grid, steps, still};
 use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
@@ -170,6 +170,7 @@ impl DepthLines {
         let (x, y) = (depth.shown(), force.shown());
         let has_picture = self.texture.is_some();
         let grid = ui.painter().add(Shape::Noop);
+        let steps = steps(ui.available_size());
         let plot = still(ui, Plot::new("review_force_depth"), tokens)
             .show_grid(!has_picture)
             .x_axis_label("depth from contact (mm)")
@@ -189,7 +190,7 @@ impl DepthLines {
             }
         });
         if has_picture {
-            paint_grid(ui, grid, &response.transform, tokens);
+            paint_grid(ui, grid, &response.transform, steps, tokens);
         }
         self.measure(ui, response.response.rect);
         gesture(ui, &response.response)

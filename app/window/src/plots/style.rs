@@ -43,11 +43,16 @@ pub(super) fn with_marks(plot: Plot<'_>, [across, up]: [f64; 2]) -> Plot<'_> {
 pub const AXIS_WIDTH: f32 = 70.0;
 
 /// A picture of a plot is painted before its grid, which would lie over it: this paints the grid at a place in the list of
-/// shapes that was taken before.
-pub(super) fn paint_grid(ui: &Ui, at: ShapeIdx, transform: &PlotTransform, tokens: &Tokens) {
+/// shapes that was taken before, with so many labelled steps across and up at most.
+pub(super) fn paint_grid(
+    ui: &Ui,
+    at: ShapeIdx,
+    transform: &PlotTransform,
+    steps: [f64; 2],
+    tokens: &Tokens,
+) {
     let frame = *transform.frame();
     let [low, high] = [transform.bounds().min(), transform.bounds().max()];
-    let steps = steps(frame.size());
     let mut lines = Vec::new();
     for axis in [0, 1] {
         let bounds = (low[axis], high[axis]);
@@ -96,7 +101,7 @@ pub(super) fn name_up(ui: &Ui, name: &str, has_axis_below: bool) -> String {
 }
 
 /// Labelled steps that a plot of a size in points has room for, across and up.
-fn steps(size: Vec2) -> [f64; 2] {
+pub(super) fn steps(size: Vec2) -> [f64; 2] {
     let [across, up] = POINTS_PER_STEP;
     [
         f64::from(size.x / across).clamp(2.0, STEPS_ACROSS),

@@ -6,9 +6,6 @@ use eframe::egui::Ui;
 use palpate_figures::uncertain::clock;
 use palpate_protocols::preview::Preview;
 
-/// A plan that expects less indents nothing; a search for the surface touches it.
-const FORCE_SEEN_N: f64 = 0.05;
-
 /// Draws durations, forces and storage, then refusals and notes.
 pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let Some(checked) = form.checked() else {
@@ -21,7 +18,8 @@ pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
         return;
     };
     let preview = &checked.preview;
-    numbers_ui(ui, preview);
+    let does_indent = checked.outline.iter().any(|point| point.depth.0 > 0.0);
+    numbers_ui(ui, preview, does_indent);
     for refusal in &preview.refusals {
         alarm_ui(ui, format!("Refused: {refusal}"));
     }
@@ -47,14 +45,14 @@ pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
     }
 }
 
-fn numbers_ui(ui: &mut Ui, preview: &Preview) {
+fn numbers_ui(ui: &mut Ui, preview: &Preview, does_indent: bool) {
     fact_ui(
         ui,
         "duration",
         format!("{} expected, {} at most", clock(preview.expected.0), clock(preview.longest.0)),
     );
     let [low, high] = preview.force_band;
-    let force = match high.0 > FORCE_SEEN_N {
+    let force = match does_indent {
         true => format!("{low:.1} to {high:.1} expected"),
         false => "no indentation".to_owned(),
     };

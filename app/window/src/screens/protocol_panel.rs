@@ -95,6 +95,9 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
         if tick.on_hover_text(hint).changed() {
             field.text = is_on.to_string();
         }
+        if let Some(reason) = &field.objection {
+            small_alarm_ui(ui, reason);
+        }
         return;
     }
     let is_wide = field.parameter.is_list || field.parameter.kind == QuantityKind::Text;

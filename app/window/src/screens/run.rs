@@ -14,7 +14,7 @@ use crate::plots::course::CourseLimits;
 use crate::widgets::require;
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{CentralPanel, Context, Frame, Key, Margin, Panel, ScrollArea, Ui};
-use palpate_analysis::daily::DAILY_CHECK;
+use palpate_analysis::daily::{DAILY_CHECK, needs_daily_check};
 use palpate_protocols::file::BUILT_IN;
 use palpate_runner::{RunRequest, wall_now};
 use palpate_sessions::recover::recover_library;
@@ -62,11 +62,15 @@ impl RunScreen {
         }
     }
 
-    fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
+    fn begin(
+        &mut self,
+        request: Option<RunRequest>,
+        asked: Option<[String; 2]>,
+        workbench: &mut Workbench,
+    ) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
-            workbench.latest_run.set_last_start(workbench.form.next_start());
-            workbench.set_next_run(request);
+            workbench.set_next_run(request, asked);
         }
     }
 
@@ -208,10 +212,19 @@ impl Screen for RunScreen {
                 let specimen = workbench.form.specimen().to_owned();
                 let protocol = workbench.form.source_name();
                 let request = workbench.ready_run();
+                let asked = Some(workbench.form.next_start());
                 let queue = &mut workbench.queue;
-                match request.map(|request| queue.start(&specimen, &protocol).map(|()| request)) {
+                // The queue has no say in what touches no specimen.
+                let mut may_start = |request: RunRequest| match needs_daily_check(&request.plan) {
+                    true => queue.start(&specimen, &protocol).map(|()| request),
+                    false => {
+                        queue.cancel_start();
+                        Ok(request)
+                    }
+                };
+                match request.map(&mut may_start) {
                     Some(Err(reason)) => return refuse(workbench, reason),
-                    request => self.begin(request.and_then(Result::ok), workbench),
+                    request => self.begin(request.and_then(Result::ok), asked, workbench),
                 }
                 // What moves is to be seen.
                 return Reaction::Show;
@@ -219,7 +232,7 @@ impl Screen for RunScreen {
             UiCommand::ManualMove(manual) => {
                 workbench.queue.cancel_start();
                 let request = workbench.manual_run(manual);
-                self.begin(request, workbench);
+                self.begin(request, None, workbench);
             }
             UiCommand::View(view) => {
                 if *view == RunPane::Choose {
@@ -237,10 +250,12 @@ impl Screen for RunScreen {
             }
             UiCommand::MeasureCalibration => {
                 self.take_protocol("load-cell-calibration", workbench);
+                workbench.form.set_label("specimen", "");
                 return Reaction::Show;
             }
             UiCommand::CheckRig => {
                 self.take_protocol(DAILY_CHECK, workbench);
+                workbench.form.set_label("specimen", "");
                 return Reaction::Show;
             }
             UiCommand::OpenProtocol => self.read(None, ctx, workbench),

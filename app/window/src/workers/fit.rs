@@ -3,7 +3,7 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
-use palpate_analysis::daily::{DailyCheckChange, keep_daily_check};
+use palpate_analysis::daily::{DAILY_CHECK, keep_daily_check};
 use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
 use palpate_analysis::run_quality::assess_folder;
@@ -35,7 +35,8 @@ struct RunAnswer {
     fit: Result<ExactFit, String>,
     /// Where the run was a daily check.
     check: Option<Result<DailyCheck, String>>,
-    change: Option<DailyCheckChange>,
+    /// What must be acknowledged from then on.
+    gate: Option<Vec<String>>,
 }
 
 /// How far the exact fit of the run on the screen is.
@@ -56,13 +57,20 @@ pub struct Refitter {
     answer: BackgroundTask<RunAnswer>,
     /// The session that is or was fitted.
     session: Option<PathBuf>,
-    has_new_answer: bool,
+    /// What a daily check says of the runs to come, until it is taken.
+    gate: Option<Vec<String>>,
+    /// A daily check is being judged.
+    is_judging: bool,
 }
 
 impl Refitter {
     /// Fetches an answer, and starts when a run has ended. `library` has the daily checks of the rig.
     pub fn update(&mut self, ctx: &Context, run: Option<&RunView>, library: Option<&PathBuf>) {
-        self.has_new_answer |= self.answer.poll();
+        if self.answer.poll() {
+            let answer = self.answer.answer().and_then(|answer| answer.as_ref().ok());
+            self.gate = answer.and_then(|answer| answer.gate.clone());
+        }
+        self.is_judging &= self.answer.is_busy();
         let ended = run.filter(|run| run.outcome.is_some() && has_result(run));
         let folder = ended.map(|run| &run.folder);
         if self.answer.is_busy() || self.session.as_ref() == folder {
@@ -70,18 +78,21 @@ impl Refitter {
         }
         self.answer = BackgroundTask::default();
         self.session = folder.cloned();
+        self.is_judging = ended.is_some_and(|run| run.plan_name == DAILY_CHECK);
         if let Some(folder) = folder.cloned() {
             let library = library.cloned();
             self.answer.start("fit", ctx, move |_| assess(&folder, library.as_deref()));
         }
     }
 
-    /// What a daily check that has just been judged changes, once.
-    pub fn take_gate(&mut self) -> Option<DailyCheckChange> {
-        if !std::mem::take(&mut self.has_new_answer) {
-            return None;
-        }
-        self.answer.answer()?.as_ref().ok()?.change.clone()
+    /// What must be acknowledged after a daily check that has just been judged, once.
+    pub fn take_gate(&mut self) -> Option<Vec<String>> {
+        self.gate.take()
+    }
+
+    /// Whether a daily check is being judged: nothing starts before it is.
+    pub fn is_judging(&self) -> bool {
+        self.is_judging
     }
 
     /// The daily check that this run was, judged; or why it could not be kept.
@@ -129,7 +140,7 @@ impl Refitter {
 
 /// Whether a run pressed or weighed anything, and so has something to be judged.
 pub fn has_result(run: &RunView) -> bool {
-    has_ramp(run) || has_weighed(run)
+    has_ramp(run) || has_weighed(run) || run.plan_name == DAILY_CHECK
 }
 
 /// Whether a run indented anything: nothing else can be fitted.
@@ -146,16 +157,12 @@ fn assess(folder: &Path, library: Option<&Path>) -> Result<RunAnswer, String> {
     let recipe = FitRecipe::new(FitOptions::default(), SourceSelection::default());
     let found = assess_folder(folder, library, &recipe).map_err(|err| err.to_string())?;
     let fit = found.fitted.map_err(|err| err.to_string()).and_then(exact_fit);
-    let library = library.ok_or("there is no library to keep the daily check in");
-    let (check, change) = match library
-        .map_err(str::to_owned)
-        .and_then(|at| keep_daily_check(at, folder, wall_now()))
-    {
+    let (check, gate) = match keep_daily_check(library, folder, wall_now()) {
         Ok(None) => (None, None),
-        Ok(Some((check, change))) => (Some(Ok(check)), Some(change)),
+        Ok(Some((check, gate))) => (Some(Ok(check)), Some(gate)),
         Err(reason) => (Some(Err(reason)), None),
     };
-    Ok(RunAnswer { quality: found.quality, fit, check, change })
+    Ok(RunAnswer { quality: found.quality, fit, check, gate })
 }
 
 fn exact_fit(fitted: SourceFit) -> Result<ExactFit, String> {

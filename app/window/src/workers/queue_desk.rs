@@ -137,8 +137,6 @@ impl QueueDesk {
         self.to_begin = None;
         let Some(item) = self.queue.find(specimen) else { return Ok(()) };
         match item.state {
-            // The verdict that lets it wait again is being written.
-            SpecimenState::Begun if self.is_busy() => {}
             SpecimenState::Waiting if item.wanted.protocol == protocol => {}
             SpecimenState::Waiting => {
                 return Err(format!(

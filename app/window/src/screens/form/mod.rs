@@ -6,13 +6,13 @@ pub use field::{LabelField, ParamField};
 
 use crate::command::ManualMove;
 use crate::widgets::require;
-use palpate_analysis::daily::{DailyCheckChange, needs_daily_check};
+use palpate_analysis::daily::{DAILY_CHECK, DailyCheckGate, needs_daily_check};
 use palpate_analysis::protocol_sources::ProtocolSource;
 use palpate_model::calibration::{Calibration, CalibrationCurve};
 use palpate_model::metadata::{METADATA_KEYS, SessionLabels};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::file::{Protocol, ProtocolProblem, built_in};
-use palpate_protocols::plans::Plan;
+use palpate_protocols::plans::{Plan, Step};
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
 use palpate_runner::{AfterStop, PromptResponder, RigView, RunRequest};
 use palpate_sessions::specimen_queue::QueuedSpecimen;
@@ -36,16 +36,28 @@ pub struct RunSetup {
     pub to_acknowledge: Vec<String>,
 }
 
+/// Why a daily check could not tell with its weight.
+fn uncheckable(plan: &Plan, calibration: &Calibration) -> Option<String> {
+    let is_check = plan.name == DAILY_CHECK;
+    let mut masses = plan.steps.iter().filter_map(|planned| match &planned.step {
+        Step::Weigh(weigh) if is_check && weigh.mass_g > 0.0 => Some(weigh.mass_g),
+        _ => None,
+    });
+    masses.find_map(|mass_g| {
+        calibration.check_refusal(mass_g).unwrap_or_else(|err| Some(err.to_string()))
+    })
+}
+
 impl RunSetup {
     /// What must be acknowledged before a plan: nothing where it touches no specimen, as a daily check does.
     pub fn to_acknowledge_for(&self, plan: &Plan) -> Vec<String> {
         if needs_daily_check(plan) { self.to_acknowledge.clone() } else { Vec::new() }
     }
 
-    /// Takes over what a daily check that was just made has to say of runs.
-    pub fn take_gate(&mut self, change: DailyCheckChange) {
-        self.to_acknowledge.retain(|words| !change.before.contains(words));
-        self.to_acknowledge.extend(change.after);
+    /// Takes over what a daily check that was just made has to say of runs, in place of what one before said.
+    pub fn take_gate(&mut self, gate: Vec<String>) {
+        self.to_acknowledge.retain(|words| !DailyCheckGate::has_said(words));
+        self.to_acknowledge.extend(gate);
     }
 }
 
@@ -175,7 +187,15 @@ impl ProtocolForm {
         };
         let checked = protocol.write_out(values).map(|written| {
             let mut preview = preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed);
-            preview.acknowledgements.extend(bench.to_acknowledge_for(&written.plan));
+            preview.refusals.extend(uncheckable(&written.plan, &bench.calibration));
+            // Only the built-in plans are known to touch nothing.
+            let has_file = self.file.is_some();
+            let asked = if has_file {
+                bench.to_acknowledge.clone()
+            } else {
+                bench.to_acknowledge_for(&written.plan)
+            };
+            preview.acknowledgements.extend(asked);
             CheckedPlan {
                 preview,
                 outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
@@ -249,7 +269,9 @@ impl ProtocolForm {
 
     /// The same for specimens that are added to the queue: a calibration or a daily check is for none.
     pub fn specimen_protocol(&self) -> String {
-        let is_for_none = self.checked().is_some_and(|checked| !needs_daily_check(&checked.plan));
+        let is_check = self.file.is_none() && self.source_name() == DAILY_CHECK;
+        let is_for_none =
+            is_check || self.checked().is_some_and(|checked| !needs_daily_check(&checked.plan));
         if is_for_none { FIRST.to_owned() } else { self.source_name() }
     }
 

@@ -175,6 +175,29 @@ fn what_is_wrong_with_a_value_stands_at_its_field_without_lines_of_a_file() {
 }
 
 #[test]
+fn a_weight_that_the_calibration_cannot_tell_is_refused_before_the_check() {
+    let (rig, bench) = bench();
+    let mut form = ProtocolForm::default();
+    form.choose_built_in(DAILY_CHECK);
+    for (mass, is_possible) in [("200", false), ("840", true)] {
+        type_into(&mut form, &[("operator", "Ada"), ("mass", mass)]);
+        form.refresh(&rig, &bench, true);
+        assert_eq!(form.verdict().is_ok(), is_possible, "{mass} g: {:?}", form.verdict());
+    }
+}
+
+#[test]
+fn a_check_takes_the_place_of_what_one_before_said_and_of_nothing_else() {
+    let (_, mut bench) = bench();
+    let yesterday =
+        "rig sim failed its daily check today (the way home is blocked); repair the rig";
+    bench.to_acknowledge = vec!["the calibration is 400 d old".into(), yesterday.into()];
+    bench.take_gate(vec!["rig sim had no daily check today".into()]);
+    bench.take_gate(Vec::new());
+    assert_eq!(bench.to_acknowledge, ["the calibration is 400 d old"]);
+}
+
+#[test]
 fn specimens_are_not_added_with_a_protocol_that_touches_none() {
     let mut form = ProtocolForm::default();
     let (rig, bench) = bench();

@@ -8,6 +8,7 @@ use crate::widgets::{
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
 use palpate_analysis::catalog_search::SessionHistory;
 use palpate_analysis::report::catalog::one_line;
+use palpate_figures::uncertain::plain;
 use palpate_sessions::catalog::{CatalogEntry, NamedValueSource, SessionOrigin};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -146,7 +147,7 @@ fn values_ui(ui: &mut Ui, entry: &CatalogEntry) {
         for one in values.iter().take(VALUES) {
             // A number that was converted has its unit in its text.
             let text = match (one.number, source) {
-                (Some(_), NamedValueSource::Fit) => format!("{} {}", one.text, one.unit),
+                (Some(number), NamedValueSource::Fit) => format!("{} {}", plain(number), one.unit),
                 _ => one.text.clone(),
             };
             ui.add(Label::new(one_line(&format!("{} {text}", one.name))).truncate());

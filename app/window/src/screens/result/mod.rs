@@ -18,6 +18,7 @@ use eframe::egui::{Context, Key, Ui};
 use palpate_runner::RunView;
 use palpate_sessions::checks::DailyCheck;
 use palpate_sessions::specimen_queue::QueueVerdict;
+use std::path::Path;
 use verdict::RunVerdict;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
@@ -40,7 +41,7 @@ pub struct ResultScreen {
 impl ResultScreen {
     /// Accepts the run that has ended and been checked; where specimens wait, the day goes on with the next one.
     fn accept(&mut self, workbench: &mut Workbench) -> Reaction {
-        let Some(session) = workbench.latest_run.assessed(workbench.measured_run()) else {
+        let Some(session) = judgeable(workbench) else {
             return Reaction::Done;
         };
         if workbench.queue.is_busy() {
@@ -81,9 +82,7 @@ impl Screen for ResultScreen {
         if let Some(check) = latest.daily_check(Some(run)) {
             return daily_check_ui(ui, check);
         }
-        // A calibration is kept, not accepted.
-        let has_calibration = calibration_session(Some(run)).is_ok();
-        if let Some(session) = latest.assessed(Some(run)).filter(|_| !has_calibration) {
+        if let Some(session) = judgeable(workbench) {
             let may_repeat = workbench.repeat_verdict();
             self.verdict.ui(ui, session, &workbench.queue, &may_repeat, commands);
         }
@@ -122,11 +121,19 @@ impl Screen for ResultScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let has_checks = workbench.latest_run.assessed(workbench.measured_run()).is_some();
+        let has_checks = judgeable(workbench).is_some();
         let verdict = require(has_checks, "no run has ended and been checked");
         let accept = PaletteAction::new("Accept the run", "Ctrl+Enter", UiCommand::AcceptRun);
         vec![accept.if_ok(verdict)]
     }
+}
+
+/// Session of the run shown, once it is checked and where somebody is to judge it: a calibration is kept, and a daily check
+/// is its own verdict.
+fn judgeable(workbench: &Workbench) -> Option<&Path> {
+    let run = workbench.measured_run();
+    let (latest, is_calibration) = (&workbench.latest_run, calibration_session(run).is_ok());
+    latest.assessed(run).filter(|_| !is_calibration && latest.daily_check(run).is_none())
 }
 
 /// Draws what a daily check found.
