@@ -3,9 +3,9 @@
 use super::Job;
 use crate::widgets::{alarm_ui, quiet_ui};
 use eframe::egui::{Button, Context, Ui};
+use palpate_runner::Stopwatch;
 use rfd::FileDialog;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,15 +30,15 @@ pub enum PathPurpose {
     Specimens,
 }
 
-/// Nobody cancels a dialog in less time.
-const SEEN: Duration = Duration::from_millis(400);
+/// Nobody cancels a dialog in less time, in s.
+const SEEN_S: f64 = 0.4;
 const NO_DIALOG: &str = "this desktop shows no file dialog (on Linux it needs xdg-desktop-portal or zenity); type the path into the field instead";
 
 /// A dialog that may be open, and gives a `T`.
 #[derive(Debug)]
 pub struct Dialog<T> {
     job: Job<Option<T>>,
-    opened: Option<Instant>,
+    opened: Option<Stopwatch>,
     refusal: Option<String>,
 }
 
@@ -61,7 +61,7 @@ impl<T: Send + 'static> Dialog<T> {
         pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
     ) -> Result<(), String> {
         self.refusal = None;
-        self.opened = Some(Instant::now());
+        self.opened = Some(Stopwatch::start());
         let opened = self.job.start("dialog", ctx, move || pick(FileDialog::new()));
         opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
@@ -70,7 +70,7 @@ impl<T: Send + 'static> Dialog<T> {
     pub fn poll(&mut self) -> Option<T> {
         let answer = self.job.poll()?;
         // The library for dialogs does not say why it showed none.
-        let is_unseen = self.opened.is_some_and(|opened| opened.elapsed() < SEEN);
+        let is_unseen = self.opened.as_ref().is_some_and(|opened| opened.seconds() < SEEN_S);
         if answer.is_none() && is_unseen {
             self.refusal = Some(NO_DIALOG.to_owned());
         }
