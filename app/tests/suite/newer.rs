@@ -112,7 +112,7 @@ fn newer_library(at: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         "tag library/sessions/edits +old",
         "mask library/sessions/analyses --name old --leave-out 95..96",
         "calibration import weights.csv --name newer --rig sim",
-        "daily-check --time-scale max --operator Ada",
+        "daily-check --time-scale max --operator Ada --calibration thesis",
         "fit library/sessions/whole",
         "find",
     ] {

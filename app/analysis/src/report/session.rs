@@ -14,7 +14,7 @@ const GAP_USUAL_S: f64 = 1.1e-3;
 pub struct SessionNameParts {
     pub specimen: String,
     pub protocol: String,
-    /// Day and minute at which it began, in UTC.
+    /// Day and second at which it began, in UTC.
     pub day: String,
     pub time: String,
 }
@@ -32,7 +32,7 @@ impl SessionNameParts {
             (None, None) => "no protocol".to_owned(),
         };
         let at = |format: &str| manifest.started_at.format(format).to_string();
-        Self { specimen, protocol, day: at("%Y-%m-%d"), time: at("%H:%M UTC") }
+        Self { specimen, protocol, day: at("%Y-%m-%d"), time: at("%H:%M:%S UTC") }
     }
 }
 

@@ -26,6 +26,12 @@ pub fn exact_ui(ui: &mut Ui, report: &FitReport) {
             report.parameters.iter().for_each(|one| row_ui(ui, one));
         }
     });
+    if report.parameters.iter().any(|one| one.total95.is_some()) {
+        quiet_ui(
+            ui,
+            "total: with the errors of the calibration, which are found together with the parameters, so that it may lie beside the other interval",
+        );
+    }
     // A value beside its own interval is explained where it is seen.
     let displaced = report.displaced_sentence();
     if let Some(sentence) = &displaced {
