@@ -128,7 +128,11 @@ fn nothing_reaches_over_the_edge_of_its_panel_or_over_its_neighbour() {
         }
         for screen in screens().filter(|screen| screen.key.is_some()) {
             flow.show(screen);
-            flow.window.run_steps(3);
+            // What comes from the disk is part of the page; it has its place a few frames after it came.
+            flow.wait("what is read", |window| {
+                window.query_all_by_label_contains("reading the").next().is_none()
+            });
+            flow.window.run_steps(5);
             let all = shown(&flow.window, size);
             let mut words = over_edges(&all, &edges(screen.name, size));
             words.extend(overlaps(&all));
