@@ -1,7 +1,7 @@
 //! A day of specimens in the window: queue, verdicts, repeats, and what is left after a crash.
 
 use eframe::egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_model::rig::Phase;
 use palpate_runner::TimeScale;
 use palpate_sessions::specimen_queue::{
@@ -246,6 +246,11 @@ fn a_start_that_waits_for_a_verdict_leads_to_the_run_that_it_is_about() {
     flow.window.run_steps(3);
     assert!(flow.says("the run of pig 1 has no verdict yet"));
     assert!(flow.says("Measured, without a verdict"));
+    // The queue is read again when the page comes.
+    flow.wait("the buttons of the verdict", |window| {
+        let found = window.query_by_label("Accept");
+        found.is_some_and(|node| !node.accesskit_node().is_disabled())
+    });
     flow.click("Accept");
     flow.wait_for_words("1 waiting, 1 accepted");
     assert_eq!(queue(&flow).find("pig 1").unwrap().state, SpecimenState::Accepted);
