@@ -133,7 +133,7 @@ pub struct OpenRig {
     pub calibration: Calibration,
     /// Reasons to doubt that calibration, one sentence each.
     pub doubts: Vec<String>,
-    /// Says which calibration of the library it is, where nobody named one.
+    /// A sentence with the calibration of the library that is used, where the command line names none.
     pub from_library: Option<String>,
     /// Interlock thresholds.
     pub limits: Limits,

@@ -29,7 +29,7 @@ pub(super) fn run(
     let to_open = args.paths.iter().map(|path| existing(path)).collect::<Result<_, _>>()?;
     let bench = open(&args.rig)?;
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
-    // Who names a calibration has been told on the terminal; where none is named, whoever runs must know.
+    // Doubts about a calibration that the command line does not name must be acknowledged before a run.
     let doubts = if args.rig.calibration.is_none() { bench.doubts.clone() } else { Vec::new() };
     let mut request = WorkbenchRequest { to_open, ..request(bench, args.rig.time_scale)? };
     request.to_acknowledge.extend(doubts);

@@ -312,7 +312,7 @@ impl WorkbenchApp {
     }
 }
 
-/// A monitor by its pixels and its scale: systems do not tell its maker. None where there is no monitor.
+/// A monitor by its pixels and its scale: systems do not report its maker. None where there is no monitor.
 fn monitor_name(ctx: &Context) -> Option<String> {
     let viewport = ctx.input(|input| input.viewport().clone());
     let scale = viewport.native_pixels_per_point?;

@@ -81,8 +81,8 @@ pub struct Workbench {
     start: Start,
     /// The run that begins once every loop of the window has stopped.
     next_run: Option<RunRequest>,
-    /// Specimen and protocol that it is asked for.
-    asked: Option<[String; 2]>,
+    /// Specimen and protocol of the form, where it comes from the form.
+    form_start: Option<[String; 2]>,
     is_closing: bool,
 }
 
@@ -139,7 +139,7 @@ impl Workbench {
             occupation: Occupation::default(),
             start: Start::None,
             next_run: None,
-            asked: None,
+            form_start: None,
             is_closing: false,
         };
         workbench.refresh_ports(ctx);
@@ -296,11 +296,11 @@ impl Workbench {
         request.map_err(|reason| self.refusal = Some(reason)).ok()
     }
 
-    /// Has a run begin once every loop of the window has stopped. `asked`: specimen and protocol of the form, where it
-    /// is what the form asks for.
-    pub fn set_next_run(&mut self, request: RunRequest, asked: Option<[String; 2]>) {
+    /// Has a run begin once every loop of the window has stopped. `form_start`: specimen and protocol of the form,
+    /// where it comes from the form.
+    pub fn set_next_run(&mut self, request: RunRequest, form_start: Option<[String; 2]>) {
         self.next_run = Some(request);
-        self.asked = asked;
+        self.form_start = form_start;
     }
 
     pub fn has_next_run(&self) -> bool {
@@ -372,8 +372,8 @@ impl Workbench {
             Start::None => {}
             Start::Sent(answer) => match answer.try_recv() {
                 Ok(Ok(())) => {
-                    if let Some(asked) = self.asked.take() {
-                        self.latest_run.set_last_start(asked);
+                    if let Some(start) = self.form_start.take() {
+                        self.latest_run.set_last_start(start);
                     }
                     self.start = Start::Granted { seen: self.snapshot.sequence };
                 }

@@ -54,7 +54,7 @@ fn checks_stand_over_time_with_what_their_sessions_measured() {
     flow.type_into("operator", "Ada");
     check(&mut flow);
     flow.wait_for_words("passed; it holds for today");
-    // It is not judged as a calibration, and nobody has to accept it.
+    // It is not judged as a calibration, and needs no verdict.
     assert!(!flow.says("too few to tell the curve") && !flow.says("Verdict"));
     assert!(!flow.says("Save this calibration"));
     let library = flow.folder.path().to_owned();

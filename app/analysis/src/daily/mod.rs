@@ -67,7 +67,7 @@ pub fn judge_daily_check(session: &Session, now: SystemTime) -> Result<DailyChec
     })
 }
 
-/// Judges the session in a folder and keeps its result for the day, if it is a daily check that nobody stopped. With it
+/// Judges the session in a folder and keeps its result for the day, if it is a daily check that was not stopped. With it
 /// comes what must be acknowledged before a run from now on.
 pub fn keep_daily_check(
     library: Option<&Path>,

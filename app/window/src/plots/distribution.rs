@@ -52,7 +52,7 @@ pub fn height(counts: impl Iterator<Item = usize>, line: f32) -> f32 {
     counts.map(|count| lane_height(count, line)).sum::<f32>() + NUMBERS
 }
 
-/// Height of a line with which lanes fit into a room, as far as dots can be told apart.
+/// Height of a line with which lanes fit into a room, as far as dots stay distinct.
 #[must_use]
 pub fn line_height(counts: impl Iterator<Item = usize> + Clone, room: f32) -> f32 {
     let lines: usize = counts.clone().map(|count| count.max(1)).sum();

@@ -65,12 +65,12 @@ impl RunScreen {
     fn begin(
         &mut self,
         request: Option<RunRequest>,
-        asked: Option<[String; 2]>,
+        form_start: Option<[String; 2]>,
         workbench: &mut Workbench,
     ) {
         if let Some(request) = request {
             self.middle = first_view(&request.plan);
-            workbench.set_next_run(request, asked);
+            workbench.set_next_run(request, form_start);
         }
     }
 
@@ -212,7 +212,7 @@ impl Screen for RunScreen {
                 let specimen = workbench.form.specimen().to_owned();
                 let protocol = workbench.form.source_name();
                 let request = workbench.ready_run();
-                let asked = Some(workbench.form.next_start());
+                let form_start = Some(workbench.form.next_start());
                 let queue = &mut workbench.queue;
                 // The queue has no say in what touches no specimen.
                 let mut may_start = |request: RunRequest| match needs_daily_check(&request.plan) {
@@ -224,7 +224,7 @@ impl Screen for RunScreen {
                 };
                 match request.map(&mut may_start) {
                     Some(Err(reason)) => return refuse(workbench, reason),
-                    request => self.begin(request.and_then(Result::ok), asked, workbench),
+                    request => self.begin(request.and_then(Result::ok), form_start, workbench),
                 }
                 // What moves is to be seen.
                 return Reaction::Show;

@@ -45,7 +45,7 @@ pub fn weighing_ui(ui: &mut Ui, run: &RunView, signal: Option<Volts>, bench: &Ru
             table_ui(ui, "readings", &columns, &rows);
             return;
         }
-        // What can be told from the others is left out where there is no room.
+        // What follows from the other columns is left out where there is no room.
         let kept = |place: &usize| COLUMNS[*place].3;
         let places: Vec<usize> = (0..COLUMNS.len()).filter(kept).collect();
         for row in &mut rows {

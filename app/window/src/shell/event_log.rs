@@ -13,7 +13,7 @@ pub struct EventLog {
     /// The filter as typed.
     filter: String,
     is_unfolded: bool,
-    /// An alarm unfolded it, and nobody since.
+    /// An alarm unfolded it, and no operator since.
     is_by_alarm: bool,
     /// Alarms so far.
     alarms: usize,

@@ -30,7 +30,7 @@ pub enum PathPurpose {
     Specimens,
 }
 
-/// Nobody cancels a dialog in less time, in s.
+/// A person needs more time than this to cancel a dialog, in s.
 const SEEN_S: f64 = 0.4;
 const NO_DIALOG: &str = "this desktop shows no file dialog (on Linux it needs xdg-desktop-portal or zenity); type the path into the field instead";
 

@@ -36,7 +36,7 @@ pub struct RunSetup {
     pub to_acknowledge: Vec<String>,
 }
 
-/// Why a daily check could not tell with its weight.
+/// Why the weight of a daily check proves nothing with this calibration.
 fn uncheckable(plan: &Plan, calibration: &Calibration) -> Option<String> {
     let is_check = plan.name == DAILY_CHECK;
     let mut masses = plan.steps.iter().filter_map(|planned| match &planned.step {
@@ -190,12 +190,12 @@ impl ProtocolForm {
             preview.refusals.extend(uncheckable(&written.plan, &bench.calibration));
             // Only the built-in plans are known to touch nothing.
             let has_file = self.file.is_some();
-            let asked = if has_file {
+            let acknowledgements = if has_file {
                 bench.to_acknowledge.clone()
             } else {
                 bench.to_acknowledge_for(&written.plan)
             };
-            preview.acknowledgements.extend(asked);
+            preview.acknowledgements.extend(acknowledgements);
             CheckedPlan {
                 preview,
                 outline: outline(&written.plan, rig, &bench.limits, &bench.curve),

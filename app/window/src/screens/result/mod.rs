@@ -128,7 +128,7 @@ impl Screen for ResultScreen {
     }
 }
 
-/// Session of the run shown, once it is checked and where somebody is to judge it: a calibration is kept, and a daily check
+/// Session of the run shown, once it is checked and where it needs a verdict: a calibration is kept, and a daily check
 /// is its own verdict.
 fn judgeable(workbench: &Workbench) -> Option<&Path> {
     let run = workbench.measured_run();

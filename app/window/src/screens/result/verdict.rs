@@ -57,7 +57,7 @@ impl RunVerdict {
                 if button_ui(ui, name, "", can.is_ok()) {
                     let work = QueueWork::Judge(session.to_owned(), verdict);
                     commands.push(UiCommand::Queue(work, std::mem::take(&mut self.reason)));
-                    // Nothing moves before the specimen lies as it should and somebody starts.
+                    // Nothing moves before the specimen lies as it should and Start is pressed.
                     if verdict == QueueVerdict::Repeat {
                         commands.push(UiCommand::Show(run::SCREEN.name));
                     }
