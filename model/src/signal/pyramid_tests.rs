@@ -135,12 +135,42 @@ fn there_are_at_most_two_points_a_pixel_and_the_memory_is_as_stated() {
     let raw = values(&mut random, 1 << 20, false);
     let pyramid = pyramid(&mut random, &raw);
     let per_sample = pyramid.bytes() as f64 / raw.len() as f64;
-    assert!((4.6..4.7).contains(&per_sample), "{per_sample}");
+    assert!((4.95..5.05).contains(&per_sample), "{per_sample}");
     for (samples, pixels) in [(1000, 800.0), (1601, 800.0), (40_000, 333.0), (1 << 20, 1600.0)] {
         let column = column_for(samples, pixels);
         let points = drawn(&pyramid, 0, samples, column).len();
         assert!(points as f64 <= 2.0 * pixels + 2.0, "{points}");
         // And not many fewer than there is room for.
         assert!(points as f64 >= 0.45 * pixels.min(samples as f64), "{points}");
+    }
+}
+
+/// The mean, lowest and highest of every column are those of its samples; beside gaps the mean is between the two.
+#[test]
+fn columns_have_the_mean_of_their_samples() {
+    let mut random = SplitMix::seeded(13);
+    for round in 0..300 {
+        let count = 1 + random.below(if round % 10 == 0 { 40_000 } else { 900 });
+        let has_gaps = round % 2 == 1;
+        let raw = values(&mut random, count, has_gaps);
+        let pyramid = pyramid(&mut random, &raw);
+        let column = 1 << random.below(14);
+        let mut next = 0;
+        pyramid.columns(0, count, column, |at, found| {
+            assert_eq!(at, next);
+            next += column;
+            let own = &raw[at..(at + column).min(count)];
+            let known = || own.iter().copied().filter(|one| one.is_finite());
+            let Some(found) = found else { return assert_eq!(known().count(), 0) };
+            assert_eq!(Some(found.low), known().reduce(f32::min));
+            assert_eq!(Some(found.high), known().reduce(f32::max));
+            assert_eq!(found.has_gap, known().count() < own.len());
+            let mean = known().map(f64::from).sum::<f64>() / known().count() as f64;
+            // An f32 has 24 bits, and a column at most seven levels that each round once; values are below 32.
+            let is_near = (f64::from(found.mean) - mean).abs() < 7.0 * 32.0 / f64::from(1 << 24);
+            assert!(is_near || found.has_gap, "{} instead of {mean}", found.mean);
+            assert!((found.low..=found.high).contains(&found.mean));
+        });
+        assert!(next >= count);
     }
 }

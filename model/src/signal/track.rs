@@ -2,9 +2,9 @@
 //! between the thread that reads and the one that draws.
 //!
 //! Memory: 8 bytes a sample for its time, and for each quantity 4 bytes for its value as an f32, which has the
-//! digits of a 24-bit converter, and 0.67 bytes for its [`Pyramid`].
+//! digits of a 24-bit converter, and 1 byte for its [`Pyramid`].
 
-use super::pyramid::{Pyramid, PyramidMark, column_for};
+use super::pyramid::{ColumnStatistics, Pyramid, PyramidMark, column_for};
 use std::sync::Arc;
 
 /// Samples in a segment: as many as the log has in its largest block.
@@ -176,29 +176,15 @@ impl SignalTrack {
     pub fn draw(
         &self,
         quantity: usize,
-        [from, to]: [f64; 2],
+        window: [f64; 2],
         pixels: f64,
         mut draw: impl FnMut(Option<[f64; 2]>),
     ) -> DrawStatistics {
-        let per_second = pixels / (to - from);
         let mut pen = Pen { draw: &mut draw, newest: None, drawn: DrawStatistics::default() };
-        if self.segments.is_empty() || !(per_second.is_finite() && per_second > 0.0) {
-            return pen.drawn;
-        }
-        let first_shown = self.place(from).map_or(0, |place| place.segment);
-        for number in first_shown..self.segments.len() {
-            let (segment, before) = (&self.segments[number], self.before[number]);
-            let times = &segment.times;
-            let Some(column) = segment.columns.get(quantity) else {
-                break;
-            };
+        for part in self.parts(quantity, window, pixels) {
+            let SegmentPart { number, column, samples: [start, end], size } = part;
+            let (times, before) = (&self.segments[number].times, self.before[number]);
             let count = times.len();
-            let start = times.partition_point(|t| *t < from).saturating_sub(1);
-            let end = (times.partition_point(|t| *t <= to) + 1).min(count);
-            // To the next segment, or this one would be narrower than it is.
-            let next = self.segments.get(number + 1);
-            let until = next.map_or(times[count - 1], |next| next.times[0]);
-            let size = column_for(count, (until - times[0]) * per_second);
             pen.drawn.samples_per_column = pen.drawn.samples_per_column.max(size.min(count));
             let values = column.values();
             // The ends of the recording stay where they are.
@@ -209,15 +195,78 @@ impl SignalTrack {
                 PyramidMark::Point(index, value) => pen.point(before + index, times[index], value),
                 PyramidMark::Gap => pen.gap(),
             });
-            if next.is_none() && end == count && values[count - 1].is_finite() {
+            let is_last = number + 1 == self.segments.len() && end == count;
+            if is_last && values[count - 1].is_finite() {
                 pen.point(before + count - 1, times[count - 1], values[count - 1]);
-            }
-            if times[count - 1] > to {
-                break;
             }
         }
         pen.drawn
     }
+
+    /// Hands out the columns that [`Self::draw`] draws, each with the times of its first and its last sample; `None`
+    /// for one without a number.
+    pub fn columns(
+        &self,
+        quantity: usize,
+        window: [f64; 2],
+        pixels: f64,
+        mut take: impl FnMut([f64; 2], Option<ColumnStatistics>),
+    ) {
+        for SegmentPart { number, column, samples: [start, end], size } in
+            self.parts(quantity, window, pixels)
+        {
+            let times = &self.segments[number].times;
+            column.columns(start, end, size, |at, found| {
+                take([times[at], times[(at + size).min(times.len()) - 1]], found);
+            });
+        }
+    }
+
+    /// The parts of segments that are seen between two times on so many pixels.
+    fn parts(
+        &self,
+        quantity: usize,
+        [from, to]: [f64; 2],
+        pixels: f64,
+    ) -> impl Iterator<Item = SegmentPart<'_>> {
+        let per_second = pixels / (to - from);
+        let first = match per_second.is_finite() && per_second > 0.0 {
+            true => self.place(from).map_or(0, |place| place.segment),
+            false => self.segments.len(),
+        };
+        let shown = self.segments.iter().enumerate().skip(first);
+        // One sample behind the end is seen too.
+        let shown = shown
+            .take_while(move |(number, _)| *number == first || self.time_before(*number) <= to);
+        shown.map_while(move |(number, segment)| {
+            let times = &segment.times;
+            let column = segment.columns.get(quantity)?;
+            let count = times.len();
+            let start = times.partition_point(|t| *t < from).saturating_sub(1);
+            let end = (times.partition_point(|t| *t <= to) + 1).min(count);
+            // To the next segment, or this one would be narrower than it is.
+            let next = self.segments.get(number + 1);
+            let until = next.map_or(times[count - 1], |next| next.times[0]);
+            let size = column_for(count, (until - times[0]) * per_second);
+            Some(SegmentPart { number, column, samples: [start, end], size })
+        })
+    }
+
+    /// Time of the last sample before a segment.
+    fn time_before(&self, number: usize) -> f64 {
+        let before = number.checked_sub(1).and_then(|before| self.segments[before].times.last());
+        before.copied().unwrap_or(f64::NEG_INFINITY)
+    }
+}
+
+/// A part of a segment that is seen.
+struct SegmentPart<'a> {
+    number: usize,
+    column: &'a Pyramid,
+    /// The first, and the one behind the last.
+    samples: [usize; 2],
+    /// Samples in a column.
+    size: usize,
 }
 
 /// Hands out points, each once.
@@ -332,6 +381,32 @@ mod tests {
     }
 
     #[test]
+    fn columns_are_those_that_are_drawn() {
+        let mut random = SplitMix::seeded(23);
+        for _ in 0..60 {
+            let count = 1 + random.below(8);
+            let (track, _) = track(&mut random, count);
+            let [start, end] = track.span().unwrap();
+            let window = [start + 0.2 * (end - start), end + 1e-3];
+            let mut points = Vec::new();
+            track.draw(0, window, 100.0, |point| points.extend(point));
+            let mut ends = Vec::new();
+            track.columns(0, window, 100.0, |times, found| {
+                assert!(times[0] <= times[1]);
+                ends.extend(found.into_iter().flat_map(|one| [one.low, one.high]));
+            });
+            let by = |values: &[f64]| {
+                let low = values.iter().copied().reduce(f64::min);
+                (low, values.iter().copied().reduce(f64::max))
+            };
+            let ends: Vec<f64> = ends.into_iter().map(f64::from).collect();
+            // The last sample of the track stands in a column already.
+            let points: Vec<f64> = points.into_iter().map(|[_, value]| value).collect();
+            assert_eq!(by(&ends), by(&points));
+        }
+    }
+
+    #[test]
     fn memory_is_as_stated() {
         let count = 1 << 16;
         let times = (0..count).map(f64::from).collect();
@@ -339,6 +414,6 @@ mod tests {
         let values = vec![1.0f32; count as usize];
         track.push(Arc::new(TrackSegment::new(times, &vec![values; 4])));
         let per_sample = track.bytes() as f64 / f64::from(count);
-        assert!((26.6..26.7).contains(&per_sample), "{per_sample}");
+        assert!((27.9..28.1).contains(&per_sample), "{per_sample}");
     }
 }
