@@ -24,6 +24,7 @@ pub mod extremes;
 pub mod feedback_session;
 pub mod fidelity;
 pub mod fit;
+pub mod group_statistics;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 #[cfg(feature = "haptics")]

@@ -39,7 +39,7 @@ pub use live::{LiveFit, ResidualBlocks};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
-pub(crate) use report::student_t975;
+pub use report::student_t975;
 pub use report::{
     BudgetEntry, FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate,
 };

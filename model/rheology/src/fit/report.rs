@@ -366,7 +366,8 @@ fn estimate_noise(
 
 /// The 97.5 % point of Student's t: exact for 1 and 2 degrees of freedom, else the expansion of
 /// Abramowitz & Stegun 26.7.5, good to 1e-2 at 3 and to 1e-4 from 6 on.
-pub(crate) fn student_t975(degrees_of_freedom: f64) -> f64 {
+#[must_use]
+pub fn student_t975(degrees_of_freedom: f64) -> f64 {
     let z: f64 = 1.959_963_984_540_054;
     let at = |from: f64, [high, low]: [f64; 2]| {
         let share = (1.0 / from - 1.0 / degrees_of_freedom) * from * (from + 1.0);
