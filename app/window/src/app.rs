@@ -68,7 +68,7 @@ impl WorkbenchApp {
         if form.folder.is_empty() {
             form.folder.clone_from(&settings.now.sessions);
         }
-        let mut screens = Screens::open(&workbench, &settings.now.screen);
+        let mut screens = Screens::open(&workbench, &settings.now.screen, &settings.now.layouts);
         let library = workbench.library.as_ref();
         let is_first = settings.is_new()
             && to_open.is_empty()
@@ -221,7 +221,7 @@ impl WorkbenchApp {
         }
         let is_simulated = self.workbench.is_simulated;
         let shown = if is_simulated { run::SCREEN.name } else { rig::SCREEN.name };
-        self.screens = Screens::open(&self.workbench, shown);
+        self.screens = Screens::open(&self.workbench, shown, &self.screens.layouts());
     }
 
     /// Copies into the settings what is only needed when the window closes.
@@ -237,6 +237,7 @@ impl WorkbenchApp {
         now.operator = form.label_text("operator").to_owned();
         now.sessions.clone_from(&form.folder);
         [now.left, now.right, now.log] = self.sizes.changes();
+        now.layouts = self.screens.layouts();
     }
 
     /// Takes the text size of the monitor that the window has come to.

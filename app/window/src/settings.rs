@@ -30,6 +30,8 @@ pub struct WindowSettings {
     pub left: Option<f32>,
     pub right: Option<f32>,
     pub log: Option<f32>,
+    /// How the parts of screens are arranged, by the names of the screens.
+    pub layouts: BTreeMap<String, Value>,
     /// Of the last run.
     pub operator: String,
     /// Folder for new sessions; empty for the library.
@@ -52,6 +54,7 @@ impl Default for WindowSettings {
             left: None,
             right: None,
             log: None,
+            layouts: BTreeMap::new(),
             operator: String::new(),
             sessions: String::new(),
             is_tour_over: false,

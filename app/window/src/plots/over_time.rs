@@ -12,6 +12,7 @@ use palpate_model::rig::Phase;
 pub struct TimeLayer<'a> {
     pub name: &'a str,
     pub color: Color32,
+    pub width: f32,
     pub stretches: &'a Stretches,
 }
 
@@ -48,8 +49,8 @@ pub struct TimePanel<'a> {
 const MARGIN: f64 = 0.06;
 /// Room above for the names of phases.
 const NAMES: f64 = 0.1;
-/// Names of phases that are narrower than this share of the axis are left out.
-const NAME_SHARE: f64 = 0.03;
+/// Width of a letter in points: the name of a phase that is narrower is left out.
+const LETTER: f64 = 8.0;
 
 /// Lowest and highest of all lines with room around them.
 fn heights(panel: &TimePanel<'_>) -> [f64; 2] {
@@ -63,6 +64,7 @@ fn heights(panel: &TimePanel<'_>) -> [f64; 2] {
 
 /// Draws what all plots of a session have behind their lines: phases, what is left out, what happened.
 fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &TimeBackdrop, shown: [f64; 2], tokens: &Tokens) {
+    let per_second = f64::from(plot_ui.transform().frame().width()) / (shown[1] - shown[0]);
     for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
         if *to < shown[0] || *from > shown[1] {
             continue;
@@ -72,8 +74,8 @@ fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &TimeBackdrop, shown: [f64; 2],
             _ => tokens.phase_band,
         };
         let seen = to.min(shown[1]) - from.max(shown[0]);
-        let has_name = seen > NAME_SHARE * (shown[1] - shown[0]);
-        let name = if has_name { phase.name() } else { "" };
+        let has_room = seen * per_second > LETTER * phase.name().len() as f64;
+        let name = if has_room { phase.name() } else { "" };
         plot_ui.span(Shade::new(name, *from..=*to).fill(fill).border_color(tokens.line));
     }
     for [from, to] in &setting.left_out {
@@ -120,9 +122,8 @@ pub fn over_time_ui(
             plot_ui.hline(zero.allow_hover(false));
         }
         for (number, layer) in panel.layers.iter().enumerate() {
-            for line in layer.stretches.lines(layer.name, number, layer.color) {
-                plot_ui.line(line);
-            }
+            let look = (layer.color, layer.width);
+            layer.stretches.paint(plot_ui, layer.name, number, look);
         }
         for (name, cursor) in ["A", "B"].into_iter().zip(setting.cursors) {
             let Some(t) = cursor.filter(|t| (shown[0]..=shown[1]).contains(t)) else {

@@ -2,7 +2,7 @@
 //! change.
 
 use eframe::egui::Color32;
-use egui_plot::{Line, PlotPoint, PlotPoints};
+use egui_plot::{FilledArea, Line, PlotPoint, PlotPoints, PlotUi};
 use palpate_model::signal::track::{DrawStatistics, SignalTrack};
 use std::ops::Range;
 
@@ -19,12 +19,29 @@ pub struct LineWindow {
     pub version: u64,
 }
 
+/// Width of a line, and of the one in front of others, in points.
+pub const WIDTH: f32 = 1.4;
+pub const FRONT_WIDTH: f32 = 2.2;
+/// Share of the colour of a line in the area around it, so that ten of them over each other are still told apart.
+const AREA: f32 = 0.22;
+
+/// Columns of samples without a gap in between them: their lowest, highest and mean values.
+#[derive(Debug, Default, PartialEq)]
+pub struct ColumnBand {
+    pub times: Vec<f64>,
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+    pub mean: Vec<PlotPoint>,
+}
+
 /// Points of one line without gaps in between them, and which belong together.
 #[derive(Debug, Default)]
 pub struct Stretches {
     key: Option<LineWindow>,
     points: Vec<PlotPoint>,
     ranges: Vec<Range<usize>>,
+    /// Where not every sample is drawn.
+    bands: Vec<ColumnBand>,
     y: Option<[f64; 2]>,
     drawn: DrawStatistics,
     found: u64,
@@ -59,27 +76,62 @@ impl Stretches {
             ranges.push(start..points.len());
         }
         self.y = (low <= high).then_some([low, high]);
+        self.bands.clear();
+        if self.drawn.samples_per_column > 1 {
+            self.find_bands(track, column, own, window);
+        }
     }
 
-    /// The points of each stretch.
+    fn find_bands(&mut self, track: &SignalTrack, column: usize, own: [f64; 2], of: LineWindow) {
+        let bands = &mut self.bands;
+        let mut is_broken = true;
+        track.columns(column, own, of.pixels, |[from, to], found| {
+            let Some(found) = found else {
+                is_broken = true;
+                return;
+            };
+            if std::mem::replace(&mut is_broken, found.has_gap) {
+                bands.push(ColumnBand::default());
+            }
+            let Some(band) = bands.last_mut() else { return };
+            let t = 0.5 * (from + to) - of.shift;
+            band.times.push(t);
+            band.low.push(f64::from(found.low));
+            band.high.push(f64::from(found.high));
+            band.mean.push(PlotPoint::new(t, f64::from(found.mean)));
+        });
+    }
+
+    /// The areas between the lowest and the highest samples; none where every sample is drawn.
+    pub fn bands(&self) -> &[ColumnBand] {
+        &self.bands
+    }
+
+    /// The line of each stretch: every sample, or the means of columns.
     pub fn parts(&self) -> impl Iterator<Item = &[PlotPoint]> {
-        self.ranges.iter().map(|range| &self.points[range.clone()])
+        let samples = self.ranges.iter().map(|range| &self.points[range.clone()]);
+        let has_all = self.bands.is_empty();
+        let means = self.bands.iter().map(|band| band.mean.as_slice());
+        samples.filter(move |_| has_all).chain(means)
     }
 
-    /// A line for each stretch, all of one name.
-    pub fn lines<'a>(
+    /// Draws the line, and the area of the samples behind it where it is the one of their means.
+    pub fn paint<'a>(
         &'a self,
+        plot_ui: &mut PlotUi<'a>,
         name: &'a str,
         id: usize,
-        color: Color32,
-    ) -> impl Iterator<Item = Line<'a>> {
-        self.ranges.iter().enumerate().map(move |(number, range)| {
-            Line::new(name, PlotPoints::Borrowed(&self.points[range.clone()]))
-                .id((id, number))
-                .color(color)
-                .width(1.4)
-                .allow_hover(false)
-        })
+        (color, width): (Color32, f32),
+    ) {
+        for (number, band) in self.bands.iter().enumerate() {
+            let area = FilledArea::new(name, &band.times, &band.low, &band.high);
+            let area = area.fill_color(color.gamma_multiply(AREA)).id((id, "area", number));
+            plot_ui.add(area.allow_hover(false));
+        }
+        for (number, points) in self.parts().enumerate() {
+            let line = Line::new(name, PlotPoints::Borrowed(points)).id((id, number));
+            plot_ui.line(line.color(color).width(width).allow_hover(false));
+        }
     }
 
     /// Lowest and highest of what is drawn.
@@ -126,7 +178,12 @@ mod tests {
         // The first and the last sample, on the axis that begins where it was asked to.
         assert_eq!((ends[0][0], ends[1][1]), (-1.0, 4999.0 * 1e-3 - 1.0));
         assert!(ends[0][1] < 1.0 && ends[1][0] >= 1.6);
-        assert_eq!(stretches.lines("force", 0, Color32::TRANSPARENT).count(), 2);
+        // What is drawn is the mean with the area around it, whose highest is the one sample that stands out.
+        let highest = |one: &ColumnBand| one.high.iter().copied().fold(0.0, f64::max);
+        assert!(stretches.bands().iter().any(|one| highest(one) == 9.0));
+        let drawn: Vec<&PlotPoint> = stretches.parts().flatten().collect();
+        assert!(drawn.iter().all(|point| (1.0..1.2).contains(&point.y)));
+        assert!(drawn.len() < 100, "one point of a column");
         window.version = 2;
         stretches.update(&track, 0, window);
         window.window = [2.0, 2.5];

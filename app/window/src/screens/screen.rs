@@ -9,7 +9,9 @@ pub use crate::shell::sizes::Sizes;
 use crate::workbench::Occupation;
 pub use crate::workbench::Workbench;
 use eframe::egui::{CentralPanel, Context, Key, Ui};
+use serde_json::Value;
 use std::any::Any;
+use std::collections::BTreeMap;
 
 /// A screen before it is opened.
 #[derive(Clone, Copy)]
@@ -51,6 +53,10 @@ pub trait Screen: Any {
     /// Draws facts and results.
     fn right_ui(&mut self, _ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {}
 
+    fn has_left(&self) -> bool {
+        true
+    }
+
     fn has_right(&self) -> bool {
         true
     }
@@ -68,9 +74,11 @@ pub trait Screen: Any {
         workbench: &mut Workbench,
         commands: &mut Commands,
     ) {
-        side_ui(ui, sizes, PanelEdge::Left, !self.has_own_scroll(), |ui| {
-            self.left_ui(ui, workbench, commands);
-        });
+        if self.has_left() {
+            side_ui(ui, sizes, PanelEdge::Left, !self.has_own_scroll(), |ui| {
+                self.left_ui(ui, workbench, commands);
+            });
+        }
         if self.has_right() {
             side_ui(ui, sizes, PanelEdge::Right, true, |ui| {
                 self.right_ui(ui, workbench, commands);
@@ -122,11 +130,22 @@ pub trait Screen: Any {
         false
     }
 
+    /// How its parts are arranged, to be kept; none where that is as usual.
+    fn layout(&self) -> Option<Value> {
+        None
+    }
+
+    /// Arranges its parts as they were kept.
+    fn take_layout(&mut self, _kept: &Value) {}
+
     /// Its actions for the palette, each possible or with the reason why not.
     fn actions(&self, _workbench: &Workbench) -> Vec<PaletteAction> {
         Vec::new()
     }
 }
+
+/// How the parts of screens are arranged, by the names of the screens.
+pub type ScreenLayouts = BTreeMap<String, Value>;
 
 /// Every screen, and which is shown.
 pub struct Screens {
@@ -137,12 +156,23 @@ pub struct Screens {
 impl Screens {
     /// Opens all screens and shows the one of this name, or the run screen.
     #[must_use]
-    pub fn open(workbench: &Workbench, name: &str) -> Self {
+    pub fn open(workbench: &Workbench, name: &str, layouts: &ScreenLayouts) -> Self {
         let all = screens().map(|one| (one.name, (one.open)(workbench)));
         let mut screens = Self { all: all.collect(), shown: 0 };
+        for (name, screen) in &mut screens.all {
+            if let Some(kept) = layouts.get(*name) {
+                screen.take_layout(kept);
+            }
+        }
         screens.show(super::run::SCREEN.name);
         screens.show(name);
         screens
+    }
+
+    /// How the screens are arranged that are not as usual.
+    pub fn layouts(&self) -> ScreenLayouts {
+        let all = self.all.iter();
+        all.filter_map(|(name, one)| Some(((*name).to_owned(), one.layout()?))).collect()
     }
 
     /// Shows a screen; an unknown name changes nothing.

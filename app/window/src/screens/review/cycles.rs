@@ -1,9 +1,9 @@
 //! Every cycle: hysteresis loops of the session in front over each other, and the peaks of every session shown, next to
 //! the first.
 
-use super::ReviewScreen;
 use super::middle::head_ui;
 use super::subject::ReviewSubject;
+use super::{ReviewScreen, View};
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::widgets::{Column, TableRow, quiet_ui, table_ui, tick_box, tokens_of};
 use crate::workers::review::Quantity;
@@ -99,7 +99,7 @@ impl ReviewScreen {
             quiet_ui(ui, "None of the sessions shown has cycles.");
             return;
         }
-        self.remarks_ui(ui);
+        self.remarks_ui(ui, View::Cycles);
         let height = (0.55 * ui.available_height()).max(160.0);
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
         let words = "peak force of every cycle; 'palpate analyse' also computes hysteresis, relaxation and the shift of the loops";
@@ -160,7 +160,7 @@ impl ReviewScreen {
                 cursors: [None; 2],
             })
             .collect();
-        let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);
+        let gesture = self.loop_lines.ui(ui, &lines, [&self.depth, &self.force]);
         self.follow_over_depth(&gesture);
     }
 }

@@ -1,6 +1,6 @@
 //! The view as it stands as a figure: copied as a picture, or saved by the same painters as those of reports.
 
-use super::groups::groups;
+use super::groups::{Coloring, SessionGroup, groups};
 use super::side_by_side::fitted_over_depth;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
@@ -14,7 +14,7 @@ use egui_plot::PlotPoint;
 use palpate_analysis::report::panels::FigurePanels;
 use palpate_analysis::session_actions::{ActionReport, SessionDocument, write_document};
 use palpate_figures::drawing::Drawing;
-use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries, PlotStretch};
+use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries, PlotStretch};
 use palpate_figures::raster::{Raster, raster};
 use palpate_figures::tokens::LIGHT;
 use palpate_model::signal::track::SignalTrack;
@@ -140,13 +140,27 @@ fn over_time(stretches: &Stretches, x: [f64; 2], ink: Ink) -> impl Iterator<Item
     lines(within(stretches.parts(), [x, EVERYWHERE]), ink)
 }
 
+/// The areas of samples behind the lines of their means, as far as they are within the axes.
+fn areas(stretches: &Stretches, [from, to]: [f64; 2], ink: Ink) -> impl Iterator<Item = PlotBand> {
+    stretches.bands().iter().filter_map(move |band| {
+        let first = band.times.partition_point(|t| *t < from);
+        let end = band.times.partition_point(|t| *t <= to);
+        let edge = |values: &[f64]| {
+            let points = band.times.iter().zip(values).map(|(t, value)| [*t, *value]);
+            points.take(end).skip(first).collect()
+        };
+        let edges = [edge(&band.low), edge(&band.high)];
+        (first < end).then(|| PlotBand { name: String::new(), ink, edges })
+    })
+}
+
 /// The ink of a fit over its session, as on the screen: the second session's own is too close to the usual one.
 fn fitted_ink(subject: &ReviewSubject) -> Ink {
-    if subject.id % LIGHT.sessions.len() as u64 == 1 { Ink::Text } else { Ink::Limit }
+    if subject.color % LIGHT.sessions.len() == 1 { Ink::Text } else { Ink::Limit }
 }
 
 fn ink_of(subject: &ReviewSubject) -> Ink {
-    Ink::Session(usize::try_from(subject.id).unwrap_or_default())
+    Ink::Session(subject.color)
 }
 
 impl ReviewScreen {
@@ -181,7 +195,7 @@ impl ReviewScreen {
         let mut panels = FigurePanels { columns: 1, ..FigurePanels::default() };
         let mut loops = Vec::new();
         let track = |one: &ReviewSubject| one.recording.track.clone();
-        let named = self.subjects.iter().map(|one| (one.name.clone(), ink_of(one)));
+        let named = self.legend();
         let fitted = |is_drawn: bool, name: &str, ink| is_drawn.then(|| (name.to_owned(), ink));
         match self.view {
             View::SideBySide => {
@@ -206,18 +220,29 @@ impl ReviewScreen {
                 panels.words = format!("time from {}", self.time_origin.name());
                 panels.plots = self.plots_over_time();
                 let is_fitted = self.front().is_some_and(|front| front.fitted().is_some());
-                panels.legend = named.chain(fitted(is_fitted, "fitted", Ink::Limit)).collect();
+                panels.legend =
+                    named.into_iter().chain(fitted(is_fitted, "fitted", Ink::Limit)).collect();
             }
             _ => {
                 panels.title = "Sessions over depth".into();
                 panels.words = "force over depth from contact".into();
                 let [x, y] = self.depth_axes();
                 panels.plots = vec![Plot::new("", x, y)];
-                panels.legend = named.collect();
+                panels.legend = named;
                 loops = self.subjects.iter().map(|one| (0, track(one), ink_of(one))).collect();
             }
         }
         PendingFigure { panels, loops, shown: [self.depth.shown(), self.force.shown()] }
+    }
+
+    /// What each colour stands for: a session, or a group of them.
+    fn legend(&self) -> Vec<(String, Ink)> {
+        if self.coloring() == Coloring::Session {
+            return self.subjects.iter().map(|one| (one.name.clone(), ink_of(one))).collect();
+        }
+        let groups = groups(&self.subjects, self.grouping).into_iter();
+        let first = |group: &SessionGroup| ink_of(&self.subjects[group.members[0]]);
+        groups.map(|group| (group.name.clone(), first(&group))).collect()
     }
 
     fn time_axis(&self) -> PlotAxis {
@@ -256,7 +281,13 @@ impl ReviewScreen {
             if place == Quantity::Force as usize && front.fitted().is_some() {
                 series.extend(over_time(&front.lines[LINE_MODELLED], shown, Ink::Limit));
             }
-            let values = || series.iter().flat_map(|one| &one.points).map(|point| point[1]);
+            let back_to_front = self.subjects.iter().rev().filter(is_drawn);
+            let bands: Vec<PlotBand> = back_to_front
+                .flat_map(|one| areas(&one.lines[place], shown, ink_of(one)))
+                .collect();
+            let edges = || bands.iter().flat_map(|one| one.edges.iter().flatten());
+            let points = || series.iter().flat_map(|one| &one.points).chain(edges());
+            let values = || points().map(|point| point[1]);
             let (low, high) = values()
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), one| {
                     (low.min(one), high.max(one))
@@ -267,6 +298,7 @@ impl ReviewScreen {
             Plot {
                 stretches: phases.clone(),
                 x_levels: cursors.clone(),
+                bands,
                 ..Plot::new("", self.time_axis(), y).with(series)
             }
         };
@@ -295,18 +327,21 @@ impl ReviewScreen {
     /// The plot of a session; over depth its own line comes later.
     fn plot_side_by_side(&self, (index, title): (usize, String)) -> Plot {
         let subject = &self.subjects[index];
-        let [depth, force] = self.depth_axes();
+        let [depth, force_axis] = self.depth_axes();
         let y = self.force.shown();
         if self.side.is_over_depth {
             let over = fitted_over_depth(subject);
             let over = within(std::iter::once(over.as_slice()), [self.depth.shown(), y]);
-            return Plot::new(&title, depth, force).with(lines(over, fitted_ink(subject)));
+            return Plot::new(&title, depth, force_axis).with(lines(over, fitted_ink(subject)));
         }
         let shown = [self.time.shown(), y];
-        let own = within(subject.lines[Quantity::Force as usize].parts(), shown);
+        let force = &subject.lines[Quantity::Force as usize];
+        let own = within(force.parts(), shown);
+        let bands = areas(force, shown[0], ink_of(subject)).collect();
         let over = subject.fitted().map(|_| within(subject.lines[LINE_MODELLED].parts(), shown));
         let over = lines(over.unwrap_or_default(), fitted_ink(subject));
-        Plot::new(&title, self.time_axis(), force).with(lines(own, ink_of(subject)).chain(over))
+        let plot = Plot::new(&title, self.time_axis(), force_axis);
+        Plot { bands, ..plot.with(lines(own, ink_of(subject)).chain(over)) }
     }
 }
 

@@ -18,6 +18,18 @@ palpate_model::named! {
     }
 }
 
+palpate_model::named! {
+    /// What a colour stands for.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Coloring {
+        Session = "session",
+        Group = "group",
+    }
+}
+
+/// So many sessions are told apart by colours of their own; of more, groups have one each where nothing was chosen.
+const OWN_COLORS: usize = 4;
+
 /// Sessions of one group, by their places among those shown, in the order in which they were added.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct SessionGroup {
@@ -61,13 +73,53 @@ pub(super) fn groups(subjects: &[ReviewSubject], by: Grouping) -> Vec<SessionGro
 }
 
 impl ReviewScreen {
-    /// Draws the choice of groups in a line.
-    pub(super) fn grouping_ui(&mut self, ui: &mut Ui) {
-        ui.label("groups:");
-        for by in Grouping::ALL {
-            let name = format!("group by {by}");
-            let choice = ui.selectable_value(&mut self.grouping, by, by.name());
-            choice.accessible_name(&name).named(&name);
+    /// What a colour stands for now.
+    pub(super) fn coloring(&self) -> Coloring {
+        self.chosen_coloring.unwrap_or_else(|| {
+            let count = groups(&self.subjects, self.grouping).len();
+            match self.subjects.len() > OWN_COLORS && count > 1 {
+                true => Coloring::Group,
+                false => Coloring::Session,
+            }
+        })
+    }
+
+    /// Gives every session its colour.
+    pub(super) fn set_colors(&mut self) {
+        match self.coloring() {
+            Coloring::Session => {
+                for subject in &mut self.subjects {
+                    subject.color = usize::try_from(subject.id).unwrap_or_default();
+                }
+            }
+            Coloring::Group => {
+                for (color, group) in groups(&self.subjects, self.grouping).iter().enumerate() {
+                    group.members.iter().for_each(|member| self.subjects[*member].color = color);
+                }
+            }
         }
+    }
+
+    /// Draws the choices of groups and of colours, a line each.
+    pub(super) fn grouping_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.label("groups");
+            for by in Grouping::ALL {
+                let name = format!("group by {by}");
+                let choice = ui.selectable_value(&mut self.grouping, by, by.name());
+                choice.accessible_name(&name).named(&name);
+            }
+        });
+        ui.horizontal(|ui| {
+            ui.label("colours");
+            let now = self.coloring();
+            for of in Coloring::ALL {
+                let name = format!("a colour for each {of}");
+                let choice = ui.selectable_label(of == now, of.name());
+                if choice.accessible_name(&name).named(&name).clicked() {
+                    self.chosen_coloring = Some(of);
+                }
+            }
+        });
     }
 }

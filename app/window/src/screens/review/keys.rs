@@ -55,7 +55,7 @@ impl ReviewScreen {
         if !is_typing && ctx.input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Z)) {
             self.undo();
         }
-        if !has_moves || ctx.egui_wants_keyboard_input() {
+        if ctx.egui_wants_keyboard_input() {
             return;
         }
         // The modifiers are the event's own: those of the frame may have been let go already.
@@ -70,9 +70,10 @@ impl ReviewScreen {
         });
         for (key, modifiers) in pressed {
             match key_action(key, modifiers) {
-                Some(KeyAction::Go(to)) => self.go(to),
-                Some(KeyAction::Step(number, way)) => self.step_cursor(number, way),
-                None => {}
+                Some(KeyAction::Widen) => self.is_wide = !self.is_wide,
+                Some(KeyAction::Go(to)) if has_moves => self.go(to),
+                Some(KeyAction::Step(number, way)) if has_moves => self.step_cursor(number, way),
+                _ => {}
             }
         }
     }
@@ -91,6 +92,8 @@ enum KeyAction {
     Go(ViewMove),
     /// A cursor moves: which, and to which side.
     Step(usize, f64),
+    /// Plots have the whole width, or the panels beside them come back.
+    Widen,
 }
 
 /// What a key asks for with the modifiers held; with Ctrl it belongs to the window.
@@ -111,6 +114,7 @@ fn key_action(key: Key, modifiers: Modifiers) -> Option<KeyAction> {
         (Key::Home, ..) => KeyAction::Go(ViewMove::Reset),
         (Key::A, ..) => KeyAction::Go(ViewMove::Cursor(0)),
         (Key::B, ..) => KeyAction::Go(ViewMove::Cursor(1)),
+        (Key::W, ..) => KeyAction::Widen,
         (Key::Delete, ..) => KeyAction::Go(ViewMove::ClearCursors),
         _ => return None,
     })

@@ -15,6 +15,9 @@ impl ReviewScreen {
     pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
         section_ui(ui, "Sessions shown");
         self.sessions_ui(ui);
+        if self.subjects.len() > 1 {
+            self.grouping_ui(ui);
+        }
         self.add_ui(ui);
         if ui.button("Find sessions in the library").clicked() {
             commands.push(UiCommand::Show(library::SCREEN.name));

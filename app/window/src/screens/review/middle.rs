@@ -3,15 +3,17 @@
 use super::keys::ViewMove;
 use super::session_list::color_of;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
+use super::tiles::ViewTiles;
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
+use crate::plots::stretches::{FRONT_WIDTH, WIDTH};
 use crate::plots::style::AXIS_WIDTH;
 use crate::theme::icon_text;
 use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
-use eframe::egui::{Button, RichText, Ui, vec2};
+use eframe::egui::{Button, RichText, Ui, WidgetText, vec2};
 use lucide_icons::Icon;
 use palpate_model::signal::track::SignalTrack;
 
@@ -24,16 +26,20 @@ impl ReviewScreen {
     pub fn draw_middle(&mut self, ui: &mut Ui) {
         // In the view of parameters, keys choose in the table.
         self.read_keys(ui.ctx(), self.view != View::Parameters);
-        self.head_ui(ui);
         if self.subjects.is_empty() {
             quiet_ui(ui, "no session is shown; choose some in the library");
             return;
         }
-        match self.view {
+        ui.horizontal_wrapped(|ui| self.tools_ui(ui));
+        self.tiles_ui(ui);
+    }
+
+    pub(super) fn view_ui(&mut self, ui: &mut Ui, view: View) {
+        match view {
             View::OverTime | View::OverDepth => {
-                self.remarks_ui(ui);
+                self.remarks_ui(ui, view);
                 self.readout_ui(ui);
-                match self.view {
+                match view {
                     View::OverTime => self.over_time_ui(ui),
                     _ => self.over_depth_ui(ui),
                 }
@@ -45,20 +51,28 @@ impl ReviewScreen {
         }
     }
 
-    /// The views, and below them what the pointer and the keys can do in the one that is shown.
-    fn head_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| {
-            for view in View::ALL {
-                ui.selectable_value(&mut self.view, view, view.name()).named(view.name());
-            }
-        });
-        if !self.subjects.is_empty() && self.view.has_axes() {
-            ui.horizontal_wrapped(|ui| self.tools_ui(ui));
+    /// What the pointer and the keys can do in the plots that are seen.
+    fn tools_ui(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        let seen = std::iter::once(self.view).chain(self.tiles.seen());
+        if let Some(view) = seen.into_iter().find(|view| view.has_axes()) {
+            self.moves_ui(ui, view);
+        }
+        let figured = [View::OverTime, View::OverDepth, View::SideBySide];
+        if figured.contains(&self.view) {
+            self.figure_ui(ui);
+            ui.separator();
+        }
+        if tool_ui(ui, icon_text(Icon::UnfoldHorizontal), "Whole width", "W") {
+            self.is_wide = !self.is_wide;
+        }
+        if self.tiles.is_split() && tool_ui(ui, "One view", "One view at a time", "behind tabs") {
+            self.tiles = ViewTiles::default();
+            self.tiles.bring(self.view);
         }
     }
 
-    fn tools_ui(&mut self, ui: &mut Ui) {
-        ui.spacing_mut().item_spacing.x = 2.0;
+    fn moves_ui(&mut self, ui: &mut Ui, view: View) {
         let word = |text: &str| RichText::new(text);
         for (text, name, key, to) in [
             (icon_text(Icon::ZoomIn), "Zoom in", "+", ViewMove::ZoomIn),
@@ -72,42 +86,45 @@ impl ReviewScreen {
         ] {
             // Cursors stand in time, which the view of cycles does not have.
             let is_cursor = matches!(to, ViewMove::Cursor(_) | ViewMove::ClearCursors);
-            if is_cursor && self.view == View::Cycles {
+            if is_cursor && view == View::Cycles {
                 continue;
             }
             if to == ViewMove::Cursor(0) {
                 ui.separator();
             }
-            let button = ui.add(Button::new(text).min_size(vec2(34.0, 30.0)));
-            let button = button.accessible_name(name).named(name);
-            if button.on_hover_text(format!("{name}: {key}")).clicked() {
+            if tool_ui(ui, text, name, key) {
+                self.view = view;
                 self.go(to);
             }
         }
-        if self.view != View::Cycles {
-            ui.separator();
-            self.figure_ui(ui);
-        }
+        ui.separator();
     }
 
     /// What a reader of the plots must know.
-    pub(super) fn remarks_ui(&self, ui: &mut Ui) {
+    pub(super) fn remarks_ui(&self, ui: &mut Ui, view: View) {
         for subject in self.subjects.iter().filter(|one| one.recording.is_reading()) {
             let share = 100.0 * subject.recording.share();
             quiet_ui(ui, format!("{}: still reading {share:.0} %", subject.name));
         }
-        let words = match self.view {
-            View::OverDepth | View::Cycles if self.depth_lines.is_busy() => {
+        let lines = if view == View::Cycles { &self.loop_lines } else { &self.depth_lines };
+        let words = match view {
+            View::OverDepth | View::Cycles if lines.is_busy() => {
                 Some("computing the lines of this view".to_owned())
             }
-            View::OverDepth | View::Cycles => self.depth_lines.remark(),
+            View::OverDepth | View::Cycles => lines.remark(),
             _ if self.thinned > 1 => {
-                Some(format!("thinned to min/max of every {} samples", self.thinned))
+                Some(format!("line: mean of {} samples; area: lowest to highest", self.thinned))
             }
             _ => Some("every sample is drawn".to_owned()),
         };
-        if let Some(words) = words {
-            quiet_ui(ui, words);
+        let front = self.front().filter(|_| self.subjects.len() > 1 && view == View::OverTime);
+        let front = front.map(|front| {
+            let fit = if front.fitted().is_some() { ", events and fit" } else { " and events" };
+            format!("phases{fit} of {}, in front", front.name)
+        });
+        let words: Vec<String> = words.into_iter().chain(front).collect();
+        if !words.is_empty() {
+            quiet_ui(ui, words.join("; "));
         }
     }
 
@@ -176,9 +193,11 @@ impl ReviewScreen {
                 if quantity.is_none() && subject.fitted().is_none() {
                     continue;
                 }
+                let is_front = subject.id == front.id && self.subjects.len() > 1;
                 layers.push(TimeLayer {
                     name: &subject.name,
-                    color: color_of(tokens, subject.id),
+                    color: color_of(tokens, subject),
+                    width: if is_front { FRONT_WIDTH } else { WIDTH },
                     stretches: &subject.lines[place],
                 });
             }
@@ -186,6 +205,7 @@ impl ReviewScreen {
                 layers.push(TimeLayer {
                     name: "fitted",
                     color: tokens.limit,
+                    width: WIDTH,
                     stretches: &front.lines[LINE_MODELLED],
                 });
             }
@@ -223,7 +243,7 @@ impl ReviewScreen {
             id: subject.id,
             version: subject.fifths(),
             rows: [0, subject.recording.track.len()],
-            color: color_of(tokens, subject.id),
+            color: color_of(tokens, subject),
         };
         let lines: Vec<DepthLine<'_>> = self
             .subjects
@@ -244,6 +264,13 @@ impl ReviewScreen {
         self.depth.follow(gesture, 0);
         self.force.follow(gesture, 1);
     }
+}
+
+/// Draws a small button with a name that is read aloud and a key; returns whether it was pressed.
+fn tool_ui(ui: &mut Ui, text: impl Into<WidgetText>, name: &str, key: &str) -> bool {
+    let button = ui.add(Button::new(text.into()).min_size(vec2(34.0, 30.0)));
+    let button = button.accessible_name(name).named(name);
+    button.on_hover_text(format!("{name}: {key}")).clicked()
 }
 
 /// A heading with a line of words below it.

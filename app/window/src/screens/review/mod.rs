@@ -4,6 +4,7 @@ pub mod analyses;
 mod cycles;
 mod deviation;
 mod figure;
+mod group_rows;
 mod groups;
 mod keys;
 mod left;
@@ -15,6 +16,7 @@ mod right;
 mod session_list;
 mod side_by_side;
 mod subject;
+mod tiles;
 
 use subject::ReviewSubject;
 
@@ -27,6 +29,8 @@ use crate::workers::review::fit::{FitAnswer, SessionPrediction};
 use crate::workers::review::{Quantity, TimeOrigin};
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Key, Ui};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::path::PathBuf;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
@@ -46,7 +50,7 @@ pub struct ReviewSource {
 
 palpate_model::named! {
     /// A view of the sessions shown.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
     pub enum View {
         #[default]
         OverTime = "Over time",
@@ -68,6 +72,8 @@ impl View {
     }
 }
 
+/// Share of the time after contact or ramp that is shown before it.
+const BEFORE_ORIGIN: f64 = 0.05;
 /// Sessions that are read at once: the disk and two cores are busy with them.
 const READING_MAX: usize = 2;
 
@@ -79,8 +85,14 @@ pub struct ReviewScreen {
     /// Changes of that list, the last one at the end.
     changes: Vec<session_list::ListChange>,
     analyses: AnalysesPanel,
+    tiles: tiles::ViewTiles,
+    /// The one that keys, tools and figures are of.
     view: View,
     grouping: groups::Grouping,
+    /// None: it follows from how many sessions and groups there are.
+    chosen_coloring: Option<groups::Coloring>,
+    /// Plots have the width of the panels beside them too.
+    is_wide: bool,
     side: side_by_side::SideBySide,
     parameter_table: parameters::ParameterTable,
     figure: figure::FigureExport,
@@ -92,6 +104,7 @@ pub struct ReviewScreen {
     force: AxisRange,
     cursors: [Option<f64>; 2],
     depth_lines: DepthLines,
+    loop_lines: DepthLines,
     fits: BackgroundTask<Vec<FitAnswer>>,
     model: ModelChoice,
     /// The answer of the fits under way is not handed to their sessions yet.
@@ -128,6 +141,8 @@ impl ReviewScreen {
         self.time.show_all();
         self.depth.show_all();
         self.force.show_all();
+        // Searches for contact take their own time each: ramps stand over each other from their starts.
+        self.time_origin = if sessions.len() > 1 { TimeOrigin::Ramp } else { TimeOrigin::Start };
         sessions.into_iter().for_each(|session| self.add(session, ctx));
     }
 
@@ -143,6 +158,7 @@ impl ReviewScreen {
     }
 
     pub fn show(&mut self, view: View) {
+        self.tiles.bring(view);
         self.view = view;
     }
 
@@ -155,7 +171,11 @@ impl ReviewScreen {
     pub fn is_settled(&self) -> bool {
         let is_working = self.fits.is_busy() || self.prediction.is_busy();
         let is_read = self.subjects.iter().all(ReviewSubject::is_settled);
-        is_read && !is_working && !self.depth_lines.is_busy() && !self.side.is_busy()
+        is_read
+            && !is_working
+            && !self.depth_lines.is_busy()
+            && !self.loop_lines.is_busy()
+            && !self.side.is_busy()
     }
 
     /// Fetches what threads have answered.
@@ -180,6 +200,7 @@ impl ReviewScreen {
             }
         }
         distinguish(&mut self.subjects);
+        self.set_colors();
         self.set_wholes();
     }
 
@@ -225,6 +246,11 @@ impl ReviewScreen {
             one.recording.span().map(|end| end - shift)
         });
         if let Some([low, high]) = times.reduce(join) {
+            // What came before contact or ramp is seen from the start of the session.
+            let low = match self.time_origin {
+                TimeOrigin::Start => low,
+                _ => low.max(-BEFORE_ORIGIN * high),
+            };
             let room = 0.01 * (high - low);
             self.time.set_whole([low - room, high + room]);
         }
@@ -282,6 +308,22 @@ impl Screen for ReviewScreen {
         if let Some(front) = self.subjects.first_mut() {
             self.analyses.ui(ui, &mut front.source, commands);
         }
+    }
+
+    fn has_left(&self) -> bool {
+        !self.is_wide
+    }
+
+    fn has_right(&self) -> bool {
+        !self.is_wide
+    }
+
+    fn layout(&self) -> Option<Value> {
+        self.tiles.kept()
+    }
+
+    fn take_layout(&mut self, kept: &Value) {
+        self.tiles = tiles::ViewTiles::from_kept(kept);
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {

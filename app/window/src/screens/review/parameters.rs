@@ -2,6 +2,7 @@
 
 use super::ReviewScreen;
 use super::deviation::{OUTLIER, deviations, median};
+use super::group_rows::{GROUPS_MEANING, group_lines};
 use super::groups::{Grouping, SessionGroup, groups};
 use super::session_list::{color_of, doubt_of};
 use super::subject::ReviewSubject;
@@ -80,14 +81,22 @@ impl Value {
 }
 
 /// A session of the table.
-struct Row {
+pub(super) struct Row {
     /// Among the sessions shown.
-    index: usize,
+    pub index: usize,
     group: String,
     /// What of its name the others of the group do not have.
     short: String,
     values: Vec<Option<Value>>,
     rmse_mn: f64,
+}
+
+impl Row {
+    /// The value of a parameter, if its fit has found it.
+    pub fn finding(&self, number: usize) -> Option<f64> {
+        let parameter = &self.values.get(number)?.as_ref()?.parameter;
+        is_finding(parameter).then_some(parameter.value)
+    }
 }
 
 /// What was kept at a value is not a finding.
@@ -96,11 +105,11 @@ fn is_finding(parameter: &FittedParameter) -> bool {
 }
 
 /// The sessions that are fitted, group by group, and the parameters of the first.
-struct Parameters {
-    names: Vec<FittedParameter>,
+pub(super) struct Parameters {
+    pub names: Vec<FittedParameter>,
     /// Of each, so that two digits of the smallest standard error are seen.
-    decimals: Vec<usize>,
-    rows: Vec<Row>,
+    pub decimals: Vec<usize>,
+    pub rows: Vec<Row>,
 }
 
 impl Parameters {
@@ -180,7 +189,6 @@ impl Parameters {
 
 impl ReviewScreen {
     pub(super) fn parameters_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| self.grouping_ui(ui));
         let groups = groups(&self.subjects, self.grouping);
         refusals_ui(ui, &self.subjects);
         let Some(mut found) = Parameters::of(&self.subjects, &groups) else {
@@ -197,11 +205,11 @@ impl ReviewScreen {
         let room = 0.5 * ui.available_height();
         let strips = strips.max_height(room);
         let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, room, &groups, &found)).inner;
-        let words = "tint: below (blue) or above (orange) the median of its group; red ring: outlier; black ring: in front";
+        let words = "bars: statistical 95 % intervals; tint: below (blue) or above (orange) the median of its group; red ring: outlier; black ring: in front";
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
-        ui.add(Label::new(words).truncate()).on_hover_text(MEANING);
+        ui.add(Label::new(words).truncate()).on_hover_text(format!("{MEANING}\n{GROUPS_MEANING}"));
         found.sort(&self.subjects, self.parameter_table.sorted);
-        chosen = chosen.or(self.parameter_table_ui(ui, &found));
+        chosen = chosen.or(self.parameter_table_ui(ui, &found, &group_lines(&found, &groups)));
         if let Some(index) = chosen {
             self.bring_to_front(index);
         }
@@ -263,9 +271,8 @@ impl ReviewScreen {
             let values: Vec<DistributionLane> = lanes
                 .iter()
                 .map(|rows| {
-                    let known = rows.iter().filter_map(|row| row.values[number].as_ref());
-                    let known = known.map(|one| &one.parameter).filter(|one| is_finding(one));
-                    let known: Vec<f64> = known.map(|one| one.value).collect();
+                    let known = rows.iter().filter_map(|row| row.finding(number));
+                    let known: Vec<f64> = known.collect();
                     let median = median(&known).filter(|_| known.len() > 2);
                     let dots = rows.iter().map(|row| self.dot(row, number, tokens)).collect();
                     DistributionLane { dots, median }
@@ -292,15 +299,20 @@ impl ReviewScreen {
         DistributionDot {
             value: value.map_or(f64::NAN, |one| one.parameter.value),
             ends: value.and_then(Value::ends),
-            color: color_of(tokens, subject.id),
+            color: color_of(tokens, subject),
             is_front: row.index == 0,
             is_outlier: value.is_some_and(Value::is_outlier),
             words,
         }
     }
 
-    /// Draws the table; returns the session that was chosen in it.
-    fn parameter_table_ui(&mut self, ui: &mut Ui, found: &Parameters) -> Option<usize> {
+    /// Draws the table, groups before sessions; returns the session that was chosen in it.
+    fn parameter_table_ui(
+        &mut self,
+        ui: &mut Ui,
+        found: &Parameters,
+        groups: &[TableLine],
+    ) -> Option<usize> {
         let tokens = tokens_of(ui);
         let group = match self.grouping {
             Grouping::None => "group",
@@ -314,6 +326,9 @@ impl ReviewScreen {
         }
         columns.push(Column::numbers("rmse (mN)", 80.0));
         let line = |number: usize| {
+            let Some(number) = number.checked_sub(groups.len()) else {
+                return groups[number].clone();
+            };
             let row = &found.rows[number];
             let name = &self.subjects[row.index].name;
             let mut words = name.clone();
@@ -335,12 +350,13 @@ impl ReviewScreen {
             TableLine { name: words, cells }
         };
         let front = found.rows.iter().position(|row| row.index == 0);
+        let front = front.map(|place| place + groups.len());
         let table = ChoiceTable {
             name: "parameters of the sessions shown",
             columns: &columns,
             can_sort: &|_| true,
             sorted: self.parameter_table.sorted,
-            count: found.rows.len(),
+            count: groups.len() + found.rows.len(),
             at: front,
             line: &line,
             is_chosen: &|number| Some(number) == front,
@@ -349,7 +365,10 @@ impl ReviewScreen {
         let mut chosen = None;
         for act in acts {
             match act {
-                TableAction::Choose(number, _) => chosen = Some(found.rows[number].index),
+                TableAction::Choose(number, _) => {
+                    let row = number.checked_sub(groups.len()).map(|number| &found.rows[number]);
+                    chosen = row.map(|row| row.index).or(chosen);
+                }
                 TableAction::Sort(column) => {
                     let sorted = &mut self.parameter_table.sorted;
                     let is_same =

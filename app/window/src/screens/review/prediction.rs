@@ -6,6 +6,7 @@ use super::session_list::color_of;
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
 use crate::plots::stretches::LineWindow;
+use crate::plots::stretches::WIDTH;
 use crate::widgets::{alarm_ui, quiet_ui, require, task_ui, tokens_of};
 use crate::workers::review::Quantity;
 use crate::workers::review::fit::{MODELLED, RESIDUAL, SessionPrediction, predict};
@@ -69,8 +70,8 @@ impl ReviewScreen {
         subject
             .update(Quantity::Force, LineWindow { version: subject.recording.version, ..window });
         let (width, height) = (ui.available_width(), ui.available_height());
-        let color = color_of(tokens, subject.id);
-        let layer = |name, color, stretches| TimeLayer { name, color, stretches };
+        let color = color_of(tokens, subject);
+        let layer = |name, color, stretches| TimeLayer { name, color, width: WIDTH, stretches };
         let measured = layer("measured", color, &subject.lines[Quantity::Force as usize]);
         let force = TimePanel {
             id: "Predicted force",

@@ -47,9 +47,9 @@ impl ListChange {
     }
 }
 
-/// The colour of a session.
-pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
-    tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
+/// The colour of a session, or of its group.
+pub(super) fn color_of(tokens: &Tokens, subject: &ReviewSubject) -> Color32 {
+    tokens.sessions[subject.color % tokens.sessions.len()]
 }
 
 /// What all sessions shown have in common; nothing of one alone.
@@ -155,7 +155,7 @@ fn row_ui(ui: &mut Ui, subject: &ReviewSubject, short: &str, is_front: bool) -> 
     let middle = place.center().y;
     let swatch =
         Rect::from_center_size(pos2(place.left() + 0.5 * SWATCH, middle), vec2(10.0, 14.0));
-    ui.painter().rect_filled(swatch, 2.0, color_of(tokens, subject.id));
+    ui.painter().rect_filled(swatch, 2.0, color_of(tokens, subject));
     let font = TextStyle::Body.resolve(ui.style());
     let mut job =
         LayoutJob::single_section(short.to_owned(), TextFormat::simple(font.clone(), tokens.text));

@@ -6,6 +6,7 @@ use super::session_list::color_of;
 use super::subject::{LINE_MODELLED, ReviewSubject};
 use crate::plots::over_depth::{DepthLine, DepthLineKey, DepthLines};
 use crate::plots::small::{HEAD, SmallGrid, SmallPlot, SmallResponse, small_plot_ui};
+use crate::plots::stretches::WIDTH;
 use crate::theme::Tokens;
 use crate::widgets::{NamedControl, quiet_ui, tokens_of};
 use crate::workers::review::Quantity;
@@ -128,8 +129,6 @@ impl ReviewScreen {
                 let choice = ui.selectable_value(&mut self.side.is_over_depth, is_over_depth, word);
                 choice.accessible_name(&name).named(&name);
             }
-            ui.separator();
-            self.grouping_ui(ui);
         });
         let groups = groups(&self.subjects, self.grouping);
         // What the cursor says is known only after the plots.
@@ -229,7 +228,7 @@ impl ReviewScreen {
             shown: [x_axis.shown(), self.force.shown()],
             names: [has_x.then_some(x_name.as_str()), has_y.then_some("force (N)")],
         };
-        let color = color_of(tokens, self.subjects[index].id);
+        let color = color_of(tokens, &self.subjects[index]);
         let fitted = fitted_ink(tokens, color);
         let response = if self.side.is_over_depth {
             let busy = self.side.depth_lines.values().filter(|one| one.is_busy()).count();
@@ -270,9 +269,7 @@ impl ReviewScreen {
                 let mut layers = vec![(Quantity::Force as usize, color)];
                 layers.extend(subject.fitted().map(|_| (LINE_MODELLED, fitted)));
                 for (layer, color) in layers {
-                    for line in subject.lines[layer].lines(&subject.name, layer, color) {
-                        plot_ui.line(line);
-                    }
+                    subject.lines[layer].paint(plot_ui, &subject.name, layer, (color, WIDTH));
                 }
             })
         };
@@ -312,7 +309,7 @@ impl ReviewScreen {
             head_ui(
                 ui,
                 cell,
-                color_of(tokens, subject.id),
+                color_of(tokens, subject),
                 [&subject.name, read.as_deref().unwrap_or("")],
                 is_front,
             );

@@ -13,8 +13,10 @@ use std::sync::Arc;
 /// A session that is shown.
 pub struct ReviewSubject {
     pub source: ReviewSource,
-    /// Its own as long as it is shown; its colour follows from it.
+    /// Its own as long as it is shown.
     pub id: u64,
+    /// Place of its colour among those of sessions.
+    pub color: usize,
     pub name: String,
     /// The parts of its name; none before they are read.
     pub parts: Option<SessionNameParts>,
@@ -40,6 +42,7 @@ impl ReviewSubject {
             parts: None,
             source,
             id,
+            color: 0,
             recording,
             fit: None,
             lines: Default::default(),
@@ -138,6 +141,7 @@ impl ReviewSubject {
         let first = begins.into_iter().flatten().reduce(f64::min);
         fit::FitSubject {
             path: self.source.session.clone(),
+            name: self.name.clone(),
             analysis: self.source.analysis.clone(),
             family: model.family.clone(),
             is_rejected_included: model.is_rejected_included,

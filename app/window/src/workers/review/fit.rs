@@ -18,6 +18,8 @@ pub const RESIDUAL: usize = 1;
 #[derive(Clone, Debug, PartialEq)]
 pub struct FitSubject {
     pub path: PathBuf,
+    /// What it is called on the screen.
+    pub name: String,
     /// The analysis by which it is read.
     pub analysis: Option<String>,
     /// Key of the model family; none for the modified Kelvin model of third order.
@@ -114,9 +116,7 @@ pub fn fit_sessions(
 ) -> Result<Vec<FitAnswer>, String> {
     let mut answers = Vec::with_capacity(subjects.len());
     for (number, subject) in subjects.iter().enumerate() {
-        let name = subject.path.file_name().unwrap_or_default();
-        let what = name.to_string_lossy();
-        if progress.report(number, subjects.len(), &what).is_break() {
+        if progress.report(number, subjects.len(), &subject.name).is_break() {
             return Err("cancelled".into());
         }
         answers.push((subject.clone(), fit_session(subject).map(Arc::new)));
@@ -169,6 +169,7 @@ mod tests {
     fn recorded() -> FitSubject {
         FitSubject {
             path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab"),
+            name: "recorded".to_owned(),
             analysis: None,
             family: None,
             is_rejected_included: false,
