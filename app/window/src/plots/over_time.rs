@@ -47,19 +47,21 @@ pub struct TimePanel<'a> {
 
 /// Room above and below the lines, as a share of their height.
 const MARGIN: f64 = 0.06;
-/// Room above for the names of phases.
-const NAMES: f64 = 0.1;
+/// Room above for the names of phases in points, and the most of it as a share of the height of the lines.
+const NAMES: f32 = 20.0;
+const NAMES_SHARE: f64 = 0.4;
 /// Width of a letter in points: the name of a phase that is narrower is left out.
 const LETTER: f64 = 8.0;
 
 /// Lowest and highest of all lines with room around them.
-fn heights(panel: &TimePanel<'_>) -> [f64; 2] {
+fn heights(panel: &TimePanel<'_>, points: f32) -> [f64; 2] {
     let known = panel.layers.iter().filter_map(|layer| layer.stretches.y());
     let ends = known.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
     let [low, high] = ends.unwrap_or([0.0, 1.0]);
     // A line without height has some all the same.
     let height = (high - low).max(1e-9 * high.abs().max(low.abs())).max(1e-6);
-    [low - MARGIN * height, high + (MARGIN + NAMES) * height]
+    let names = f64::from(NAMES / points.max(1.0)).min(NAMES_SHARE);
+    [low - MARGIN * height, high + (MARGIN + names) * height]
 }
 
 /// Draws what all plots of a session have behind their lines: phases, what is left out, what happened.
@@ -108,7 +110,7 @@ pub fn over_time_ui(
     time_axis: Option<&str>,
 ) -> Gesture {
     let tokens = tokens_of(ui);
-    let (shown, [low, high]) = (span.shown(), heights(panel));
+    let (shown, [low, high]) = (span.shown(), heights(panel, ui.available_height()));
     let plot = still(ui, Plot::new(panel.id), tokens)
         .y_axis_label(name_up(ui, panel.axis, time_axis.is_some()))
         .x_axis_label(time_axis.unwrap_or_default())

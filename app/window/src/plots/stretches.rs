@@ -19,9 +19,10 @@ pub struct LineWindow {
     pub version: u64,
 }
 
-/// Width of a line, and of the one in front of others, in points.
+/// Width of a line, of the one in front of others, and of a fit over them, in points.
 pub const WIDTH: f32 = 1.4;
 pub const FRONT_WIDTH: f32 = 2.2;
+pub const FIT_WIDTH: f32 = 0.9;
 /// Share of the colour of a line in the area around it, so that ten of them over each other are still told apart.
 const AREA: f32 = 0.22;
 

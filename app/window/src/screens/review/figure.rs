@@ -1,7 +1,7 @@
 //! The view as it stands as a figure: copied as a picture, or saved by the same painters as those of reports.
 
 use super::groups::{Coloring, SessionGroup, groups};
-use super::side_by_side::fitted_over_depth;
+use super::side_by_side::{LIKE_TEXT, fitted_over_depth};
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::over_depth::loop_for_figure;
@@ -154,9 +154,9 @@ fn areas(stretches: &Stretches, [from, to]: [f64; 2], ink: Ink) -> impl Iterator
     })
 }
 
-/// The ink of a fit over its session, as on the screen: the second session's own is too close to the usual one.
+/// The ink of a fit over its session, as on the screen.
 fn fitted_ink(subject: &ReviewSubject) -> Ink {
-    if subject.color % LIGHT.sessions.len() == 1 { Ink::Text } else { Ink::Limit }
+    if subject.color % LIGHT.sessions.len() == LIKE_TEXT { Ink::Limit } else { Ink::Text }
 }
 
 fn ink_of(subject: &ReviewSubject) -> Ink {
@@ -207,8 +207,8 @@ impl ReviewScreen {
                     let mut fits = self.subjects.iter().filter(|one| one.fitted().is_some());
                     fits.any(|one| fitted_ink(one) == ink)
                 };
-                panels.legend.extend(fitted(has(Ink::Limit), "fitted", Ink::Limit));
-                panels.legend.extend(fitted(has(Ink::Text), "fitted, over orange", Ink::Text));
+                panels.legend.extend(fitted(has(Ink::Text), "fitted", Ink::Text));
+                panels.legend.extend(fitted(has(Ink::Limit), "fitted, over black", Ink::Limit));
                 if self.side.is_over_depth {
                     let tracks = order.iter().map(|(index, _)| &self.subjects[*index]).enumerate();
                     loops = tracks.map(|(plot, one)| (plot, track(one), ink_of(one))).collect();
@@ -219,9 +219,9 @@ impl ReviewScreen {
                 panels.title = "Sessions over time".into();
                 panels.words = format!("time from {}", self.time_origin.name());
                 panels.plots = self.plots_over_time();
-                let is_fitted = self.front().is_some_and(|front| front.fitted().is_some());
-                panels.legend =
-                    named.into_iter().chain(fitted(is_fitted, "fitted", Ink::Limit)).collect();
+                let front = self.front().filter(|front| front.fitted().is_some());
+                let fit = front.map(|front| (format!("fit of {}", front.name), fitted_ink(front)));
+                panels.legend = named.into_iter().chain(fit).collect();
             }
             _ => {
                 panels.title = "Sessions over depth".into();
@@ -279,7 +279,7 @@ impl ReviewScreen {
                 .flat_map(|one| over_time(&one.lines[place], shown, ink_of(one)))
                 .collect();
             if place == Quantity::Force as usize && front.fitted().is_some() {
-                series.extend(over_time(&front.lines[LINE_MODELLED], shown, Ink::Limit));
+                series.extend(over_time(&front.lines[LINE_MODELLED], shown, fitted_ink(front)));
             }
             let back_to_front = self.subjects.iter().rev().filter(is_drawn);
             let bands: Vec<PlotBand> = back_to_front

@@ -1,22 +1,24 @@
 //! The plots: over time above each other, over depth, and the tables.
 
 use super::keys::ViewMove;
-use super::session_list::color_of;
+use super::session_list::{CommonParts, color_of};
+use super::side_by_side::fitted_ink;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
-use super::tiles::ViewTiles;
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
-use crate::plots::stretches::{FRONT_WIDTH, WIDTH};
+use crate::plots::stretches::{FIT_WIDTH, FRONT_WIDTH, WIDTH};
 use crate::plots::style::AXIS_WIDTH;
 use crate::theme::icon_text;
 use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
-use eframe::egui::{Button, RichText, Ui, WidgetText, vec2};
+use eframe::egui::{Button, RichText, Ui, Vec2, WidgetText, vec2};
 use lucide_icons::Icon;
 use palpate_model::signal::track::SignalTrack;
 
+/// Least size of a tool's button in points.
+const TOOL: Vec2 = vec2(34.0, 30.0);
 /// Points that the axis below a plot takes of it.
 const AXIS_HEIGHT: f32 = 34.0;
 /// Sessions that are drawn with two points a pixel each; of more than that, each has fewer.
@@ -54,21 +56,16 @@ impl ReviewScreen {
     /// What the pointer and the keys can do in the plots that are seen.
     fn tools_ui(&mut self, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 2.0;
+        // The tabs below stay where they are in views without tools.
+        ui.set_min_height(TOOL.y);
         let seen = std::iter::once(self.view).chain(self.tiles.seen());
         if let Some(view) = seen.into_iter().find(|view| view.has_axes()) {
             self.moves_ui(ui, view);
         }
         let figured = [View::OverTime, View::OverDepth, View::SideBySide];
         if figured.contains(&self.view) {
-            self.figure_ui(ui);
             ui.separator();
-        }
-        if tool_ui(ui, icon_text(Icon::UnfoldHorizontal), "Whole width", "W") {
-            self.is_wide = !self.is_wide;
-        }
-        if self.tiles.is_split() && tool_ui(ui, "One view", "One view at a time", "behind tabs") {
-            self.tiles = ViewTiles::default();
-            self.tiles.bring(self.view);
+            self.figure_ui(ui);
         }
     }
 
@@ -97,7 +94,6 @@ impl ReviewScreen {
                 self.go(to);
             }
         }
-        ui.separator();
     }
 
     /// What a reader of the plots must know.
@@ -120,7 +116,8 @@ impl ReviewScreen {
         let front = self.front().filter(|_| self.subjects.len() > 1 && view == View::OverTime);
         let front = front.map(|front| {
             let fit = if front.fitted().is_some() { ", events and fit" } else { " and events" };
-            format!("phases{fit} of {}, in front", front.name)
+            let common = CommonParts::of(self.subjects.iter());
+            format!("phases{fit}: {}", common.short_name(front))
         });
         let words: Vec<String> = words.into_iter().chain(front).collect();
         if !words.is_empty() {
@@ -204,8 +201,8 @@ impl ReviewScreen {
             if quantity == Some(Quantity::Force) && front.fitted().is_some() {
                 layers.push(TimeLayer {
                     name: "fitted",
-                    color: tokens.limit,
-                    width: WIDTH,
+                    color: fitted_ink(tokens, color_of(tokens, front)),
+                    width: FIT_WIDTH,
                     stretches: &front.lines[LINE_MODELLED],
                 });
             }
@@ -267,8 +264,8 @@ impl ReviewScreen {
 }
 
 /// Draws a small button with a name that is read aloud and a key; returns whether it was pressed.
-fn tool_ui(ui: &mut Ui, text: impl Into<WidgetText>, name: &str, key: &str) -> bool {
-    let button = ui.add(Button::new(text.into()).min_size(vec2(34.0, 30.0)));
+pub(super) fn tool_ui(ui: &mut Ui, text: impl Into<WidgetText>, name: &str, key: &str) -> bool {
+    let button = ui.add(Button::new(text.into()).min_size(TOOL));
     let button = button.accessible_name(name).named(name);
     button.on_hover_text(format!("{name}: {key}")).clicked()
 }

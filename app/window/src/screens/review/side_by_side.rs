@@ -6,7 +6,7 @@ use super::session_list::color_of;
 use super::subject::{LINE_MODELLED, ReviewSubject};
 use crate::plots::over_depth::{DepthLine, DepthLineKey, DepthLines};
 use crate::plots::small::{HEAD, SmallGrid, SmallPlot, SmallResponse, small_plot_ui};
-use crate::plots::stretches::WIDTH;
+use crate::plots::stretches::{FIT_WIDTH, WIDTH};
 use crate::theme::Tokens;
 use crate::widgets::{NamedControl, quiet_ui, tokens_of};
 use crate::workers::review::Quantity;
@@ -100,10 +100,12 @@ fn first_reaching(subject: &ReviewSubject, depth: f64) -> Option<usize> {
     Some(high - 1)
 }
 
+/// Place of the colour of sessions that is too close to the usual ink of fits.
+pub(super) const LIKE_TEXT: usize = 5;
+
 /// The ink of a fit over the line of a session.
-fn fitted_ink(tokens: &Tokens, own: Color32) -> Color32 {
-    // The second session's own ink is too close to that of fits.
-    if own == tokens.sessions[1] { tokens.text } else { tokens.limit }
+pub(super) fn fitted_ink(tokens: &Tokens, own: Color32) -> Color32 {
+    if own == tokens.sessions[LIKE_TEXT] { tokens.limit } else { tokens.text }
 }
 
 /// The fit of a session over depth.
@@ -151,7 +153,7 @@ impl ReviewScreen {
         let fits = self.subjects.iter().filter(|one| one.fitted().is_some()).count();
         let words = match fits {
             0 => words,
-            fits => format!("{words}; {fits} of {} have their fit on top", self.subjects.len()),
+            fits => format!("thin: fits of {fits}; {words}"),
         };
         let mut line = ui.new_child(UiBuilder::new().max_rect(place));
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
@@ -198,6 +200,7 @@ impl ReviewScreen {
                         if ui.is_rect_visible(cell.expand2(grid.axes)) {
                             let response = self.cell_ui(ui, *index, cell, grid.axes, written);
                             let head = Rect::from_min_size(cell.min, vec2(cell.width(), HEAD));
+                            let title = title.trim_end_matches(" UTC").to_owned();
                             cells.push(DrawnCell { index: *index, title, head, response });
                         }
                     }
@@ -254,7 +257,7 @@ impl ReviewScreen {
             let response = small_plot_ui(ui, plot, place, axes, move |plot_ui| {
                 drawn.paint(plot_ui, &[line]);
                 let over = Line::new("fitted", PlotPoints::Owned(over)).color(fitted);
-                plot_ui.line(over.width(1.2).allow_hover(false));
+                plot_ui.line(over.width(FIT_WIDTH).allow_hover(false));
             });
             lines.measure(ui, response.rect);
             response
@@ -266,10 +269,10 @@ impl ReviewScreen {
             subject.update_fit(window);
             let subject = &self.subjects[index];
             small_plot_ui(ui, plot, place, axes, move |plot_ui| {
-                let mut layers = vec![(Quantity::Force as usize, color)];
-                layers.extend(subject.fitted().map(|_| (LINE_MODELLED, fitted)));
-                for (layer, color) in layers {
-                    subject.lines[layer].paint(plot_ui, &subject.name, layer, (color, WIDTH));
+                let mut layers = vec![(Quantity::Force as usize, (color, WIDTH))];
+                layers.extend(subject.fitted().map(|_| (LINE_MODELLED, (fitted, FIT_WIDTH))));
+                for (layer, look) in layers {
+                    subject.lines[layer].paint(plot_ui, &subject.name, layer, look);
                 }
             })
         };
@@ -305,7 +308,7 @@ impl ReviewScreen {
             let is_front = front == Some(subject.id);
             let value = cursor
                 .and_then(|cursor| value_at(subject, cursor, subject.shift(self.time_origin)));
-            let read = value.and_then(|value| value.force).map(|force| format!("{force:.4} N"));
+            let read = value.and_then(|value| value.force).map(|force| format!("{force:.3} N"));
             head_ui(
                 ui,
                 cell,

@@ -1,10 +1,11 @@
 //! The views of the sessions shown as tiles: behind each other with a tab each, or beside each other.
 
+use super::middle::tool_ui;
 use super::{ReviewScreen, View};
 use crate::shell::panels::frame;
 use crate::theme::icon_text;
 use crate::widgets::NamedControl;
-use eframe::egui::{Button, Color32, Id, Response, Stroke, Style, Ui, Visuals, WidgetText};
+use eframe::egui::{Color32, Id, Response, Stroke, Style, Ui, Visuals, WidgetText};
 use egui_tiles::{
     Behavior, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
@@ -83,8 +84,11 @@ impl ViewTiles {
 /// Draws the tiles of a screen, which they are taken out of as long.
 struct Drawn<'a> {
     screen: &'a mut ReviewScreen,
+    is_split: bool,
     /// A view that is to have a tile of its own.
     split_off: Option<View>,
+    /// All views are to be behind their tabs again.
+    is_joined: bool,
 }
 
 impl Behavior<View> for Drawn<'_> {
@@ -121,13 +125,19 @@ impl Behavior<View> for Drawn<'_> {
         tabs: &Tabs,
         _: &mut f32,
     ) {
+        if tool_ui(ui, icon_text(Icon::UnfoldHorizontal), "Whole width", "W") {
+            self.screen.is_wide = !self.screen.is_wide;
+        }
         let active = tabs.active.and_then(|id| tiles.get_pane(&id).copied());
-        let Some(view) = active.filter(|_| tabs.children.len() > 1) else { return };
-        let name = format!("Split off: {view}");
-        let button = Button::new(icon_text(Icon::Columns2)).frame_when_inactive(false);
-        let button = ui.add(button).accessible_name(&name).named("Split off");
-        if button.on_hover_text(format!("show {view} beside the other views")).clicked() {
-            self.split_off = Some(view);
+        if let Some(view) = active.filter(|_| tabs.children.len() > 1) {
+            let hint = format!("shows {view} beside the other views");
+            if tool_ui(ui, icon_text(Icon::Columns2), "Split off", &hint) {
+                self.split_off = Some(view);
+            }
+        }
+        let hint = "all views behind their tabs again";
+        if self.is_split && tool_ui(ui, icon_text(Icon::Square), "One view", hint) {
+            self.is_joined = true;
         }
     }
 
@@ -181,11 +191,16 @@ impl ReviewScreen {
     pub(super) fn tiles_ui(&mut self, ui: &mut Ui) {
         let is_beside = ui.available_width() > ROOM_BESIDE;
         let mut tiles = std::mem::take(&mut self.tiles);
-        let mut drawn = Drawn { screen: self, split_off: None };
+        let is_split = tiles.is_split();
+        let mut drawn = Drawn { screen: self, is_split, split_off: None, is_joined: false };
         tiles.0.ui(&mut drawn, ui);
-        if let Some(view) = drawn.split_off {
+        let (split_off, is_joined) = (drawn.split_off, drawn.is_joined);
+        if let Some(view) = split_off {
             tiles.split_off(view, is_beside);
             self.view = view;
+        } else if is_joined {
+            tiles = ViewTiles::default();
+            tiles.bring(self.view);
         }
         // A tile may have been dragged over the view that keys and tools moved.
         let seen = tiles.seen();
