@@ -14,6 +14,7 @@
 //! with `g` the depth less what the shape takes from it. The force is `2 pi` times the integral of `phi`. Where the contact
 //! radius is free, `phi(a) = 0` finds it: the pressure ends without a step.
 
+use crate::invalid_value::{InvalidValue, check_poisson, positive};
 use crate::quadrature::gauss_legendre;
 use crate::shape::{Contact, IndenterShape};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -37,8 +38,8 @@ pub struct Layer {
 /// A contact outside of what the equation describes.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum LayerError {
-    #[error("{name} is {value}; give {wanted}")]
-    Value { name: &'static str, value: f64, wanted: &'static str },
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
     #[error(
         "the contact radius would be more than {RADIUS_OVER_THICKNESS_MAX} times the thickness of the layer; use a smaller depth or a thicker specimen"
     )]
@@ -46,7 +47,7 @@ pub enum LayerError {
 }
 
 /// Contact radii over thicknesses that are solved to 1e-8: beyond, the linear theory of a layer says little of tissue.
-const RADIUS_OVER_THICKNESS_MAX: f64 = 8.0;
+pub(crate) const RADIUS_OVER_THICKNESS_MAX: f64 = 8.0;
 /// Nodes across the contact.
 const NODES: usize = 48;
 /// Nodes of the integral over `k h`, and more for each thickness in the contact radius, over which its cosines turn.
@@ -75,31 +76,22 @@ impl Base {
 }
 
 /// Pressure functions over the contact, for a contact radius of one: of a depth of one, and of what the shape takes.
-struct Solved {
+pub(crate) struct Solved {
     /// The integral, and the value at the edge.
-    depth: [f64; 2],
-    shape: [f64; 2],
+    pub depth: [f64; 2],
+    pub shape: [f64; 2],
 }
 
 impl Layer {
-    fn check(&self) -> Result<(), LayerError> {
-        let value = |name, value, wanted| Err(LayerError::Value { name, value, wanted });
-        if !(self.thickness_mm > 0.0 && self.thickness_mm.is_finite()) {
-            return value("the thickness", self.thickness_mm, "a length above 0 mm");
-        }
-        if !(0.0..=0.5).contains(&self.poisson) {
-            return value("Poisson's ratio", self.poisson, "a number from 0 to 0.5");
-        }
-        Ok(())
+    pub(crate) fn check(&self) -> Result<(), LayerError> {
+        positive("the thickness", self.thickness_mm, "a length above 0 mm")?;
+        Ok(check_poisson(self.poisson)?)
     }
 
     /// The contact at a depth in mm. A sphere is taken as a parabola.
     pub fn contact(&self, shape: IndenterShape, depth_mm: f64) -> Result<Contact, LayerError> {
         self.check()?;
-        if !(depth_mm > 0.0 && depth_mm.is_finite()) {
-            let (name, wanted) = ("the depth", "a length above 0 mm");
-            return Err(LayerError::Value { name, value: depth_mm, wanted });
-        }
+        positive("the depth", depth_mm, "a length above 0 mm")?;
         // Force over modulus is force over shear modulus over 2 (1 + nu).
         let scale = 1.0 / ((1.0 - self.poisson) * 2.0 * (1.0 + self.poisson));
         match shape {
@@ -119,11 +111,8 @@ impl Layer {
         }
     }
 
-    fn check_radius(&self, radius_mm: f64) -> Result<(), LayerError> {
-        if radius_mm.is_nan() || radius_mm <= 0.0 {
-            let wanted = "a length above 0 mm";
-            return Err(LayerError::Value { name: "the radius", value: radius_mm, wanted });
-        }
+    pub(crate) fn check_radius(&self, radius_mm: f64) -> Result<(), LayerError> {
+        positive("the radius", radius_mm, "a length above 0 mm")?;
         match radius_mm <= RADIUS_OVER_THICKNESS_MAX * self.thickness_mm {
             true => Ok(()),
             false => Err(LayerError::TooThin),
@@ -160,11 +149,22 @@ impl Layer {
     }
 
     /// Solves the equation for a radius of one, `ratio` times the thickness.
-    fn solve(&self, ratio: f64, taken: impl Fn(f64) -> f64) -> Solved {
-        let nodes = gauss_legendre(NODES, 1.0);
+    pub(crate) fn solve(&self, ratio: f64, taken: impl Fn(f64) -> f64) -> Solved {
+        self.solve_with(1, ratio, taken)
+    }
+
+    /// As `solve`, with `finer` times the nodes of both integrals.
+    pub(crate) fn solve_with(
+        &self,
+        finer: usize,
+        ratio: f64,
+        taken: impl Fn(f64) -> f64,
+    ) -> Solved {
+        let node_count = finer * NODES;
+        let nodes = gauss_legendre(node_count, 1.0);
         // Wave numbers of a radius of one are those of the thickness times the ratio.
         let [fixed, turning] = KERNEL_NODES;
-        let count = (fixed + turning * ratio) as usize;
+        let count = finer * (fixed + turning * ratio) as usize;
         let waves: Vec<(f64, f64)> = gauss_legendre(count, KERNEL_END)
             .into_iter()
             .map(|(y, weight)| (ratio * y, ratio * weight * self.base.softness(y, self.poisson)))
@@ -175,22 +175,22 @@ impl Layer {
             let pairs = a.iter().zip(b).zip(&waves);
             pairs.map(|((a, b), (_, weight))| weight * a * b).sum()
         };
-        let mut system: Vec<Vec<f64>> = (0..NODES)
+        let mut system: Vec<Vec<f64>> = (0..node_count)
             .map(|i| {
                 let entry = |j: usize| {
                     let own = if i == j { FRAC_PI_2 } else { 0.0 };
                     own - kernel(&rows[i], &rows[j]) * nodes[j].1
                 };
                 let right = [1.0, taken(nodes[i].0)];
-                (0..NODES).map(entry).chain(right).collect()
+                (0..node_count).map(entry).chain(right).collect()
             })
             .collect();
         let solutions = eliminate(&mut system);
         let edge = cosines(1.0);
         let summed = |number: usize, right: f64| {
             let phi = |i: usize| nodes[i].1 * solutions[i][number];
-            let integral: f64 = (0..NODES).map(phi).sum();
-            let over: f64 = (0..NODES).map(|i| kernel(&edge, &rows[i]) * phi(i)).sum();
+            let integral: f64 = (0..node_count).map(phi).sum();
+            let over: f64 = (0..node_count).map(|i| kernel(&edge, &rows[i]) * phi(i)).sum();
             [integral, (right + over) / FRAC_PI_2]
         };
         Solved { depth: summed(0, 1.0), shape: summed(1, taken(1.0)) }

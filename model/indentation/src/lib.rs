@@ -1,9 +1,13 @@
 //! Contact laws: the force of a rigid, frictionless indenter in an elastic specimen, over the specimen's modulus.
 
 mod half_space;
+mod hayes;
+mod invalid_value;
 mod layer;
 mod quadrature;
 mod shape;
 
+pub use hayes::HayesFactor;
+pub use invalid_value::InvalidValue;
 pub use layer::{Base, Layer, LayerError};
 pub use shape::{Contact, IndenterShape};
