@@ -17,11 +17,13 @@
 use crate::invalid_value::{InvalidValue, check_poisson, positive};
 use crate::quadrature::gauss_legendre;
 use crate::shape::{Contact, IndenterShape};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 use thiserror::Error;
 
 /// Whether the layer sticks to its base.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Base {
     Bonded,
     Frictionless,
