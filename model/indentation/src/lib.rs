@@ -8,6 +8,7 @@ mod layer;
 mod quadrature;
 mod shape;
 mod validity;
+mod viscoelastic;
 
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
 pub use hayes::HayesFactor;
@@ -15,3 +16,7 @@ pub use invalid_value::InvalidValue;
 pub use layer::{Base, Layer, LayerError};
 pub use shape::{Contact, IndenterShape};
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
+pub use viscoelastic::{
+    DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm, lee_radok_force,
+    lee_radok_force_of, ting_force,
+};

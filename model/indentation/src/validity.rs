@@ -184,11 +184,15 @@ mod tests {
             let found = law.assess(&sphere(1.0), &specimen(thickness), depth).unwrap();
             found.0.force_over_modulus
         };
-        let shape =
-            force(ContactLaw::Hertz, 1e6, 0.05) / force(ContactLaw::Sneddon, 1e6, 0.05) - 1.0;
+        let shape = force(ContactLaw::Hertz, 1e6, DEPTH_OVER_RADIUS_MAX)
+            / force(ContactLaw::Sneddon, 1e6, DEPTH_OVER_RADIUS_MAX)
+            - 1.0;
         assert!((0.004..0.006).contains(&shape), "{shape}");
         // A punch is stiffened most.
-        let (punch, thick) = (Indenter::FlatPunch { radius_mm: exact(1.0) }, specimen(100.0));
+        let (punch, thick) = (
+            Indenter::FlatPunch { radius_mm: exact(1.0) },
+            specimen(1.0 / HALF_SPACE_RADIUS_OVER_THICKNESS_MAX),
+        );
         let force = |law: ContactLaw| law.contact(&punch, &thick, 0.1).unwrap().force_over_modulus;
         let base = force(ContactLaw::Layer) / force(ContactLaw::Sneddon) - 1.0;
         assert!((0.011..0.0131).contains(&base), "{base}");

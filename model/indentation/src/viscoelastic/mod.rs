@@ -1,0 +1,12 @@
+//! Rigid indenters on a linear viscoelastic half-space with a constant Poisson's ratio.
+
+mod contact;
+mod history;
+mod prony;
+
+#[cfg(test)]
+mod tests;
+
+pub use contact::{PowerLaw, lee_radok_force, lee_radok_force_of, ting_force};
+pub use history::{DepthHistory, HistoryError};
+pub use prony::{PronySeries, PronyTerm};
