@@ -1,16 +1,22 @@
-//! Contact laws: the force of a rigid, frictionless indenter in an elastic specimen, over the specimen's modulus.
+//! Contact laws: the force of a rigid, frictionless indenter in an elastic or viscoelastic specimen, how far each law holds, and
+//! the relaxation modulus of a record.
+//!
+//! This crate never reads a file or a clock and starts no thread. Start reading at [`IndenterShape`] and [`ContactLaw`].
 
 mod document;
+mod fit;
 mod half_space;
 mod hayes;
 mod invalid_value;
 mod layer;
 mod quadrature;
 mod shape;
+mod triangle;
 mod validity;
 mod viscoelastic;
 
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
+pub use fit::{RelaxationFit, RelaxationFitError, fit_relaxation};
 pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;
 pub use layer::{Base, Layer, LayerError};

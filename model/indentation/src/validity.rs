@@ -38,7 +38,7 @@ pub struct Validity {
     pub strain: Bounded,
 }
 
-/// A contact that no law or not the chosen one describes.
+/// A contact that the chosen law does not describe.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ContactError {
     #[error(transparent)]

@@ -17,7 +17,7 @@ pub(crate) struct Knot {
     pub depth: f64,
 }
 
-/// A history of which no force can be told.
+/// A history or a modulus without a force.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum HistoryError {
     #[error(

@@ -9,4 +9,5 @@ mod tests;
 
 pub use contact::{PowerLaw, lee_radok_force, lee_radok_force_of, ting_force};
 pub use history::{DepthHistory, HistoryError};
+pub(crate) use history::{Knot, Memory, Mode};
 pub use prony::{PronySeries, PronyTerm};

@@ -273,6 +273,26 @@ fn any_modulus_is_integrated_as_the_recursion_does() {
     }
 }
 
+#[test]
+fn slope_over_the_time_is_that_of_the_memory() {
+    use super::history::{Knot, Mode};
+    let knots: Vec<Knot> = [(0.0, 0.0), (1.0, 0.2), (1.0, 0.3), (3.0, 0.3), (4.0, 0.1)]
+        .map(|(time, depth)| Knot { time, depth })
+        .to_vec();
+    for exponent in [1.0, 1.5, 2.0] {
+        for time in [0.01, 0.4, 30.0, f64::INFINITY] {
+            let memories = Mode::new(time, exponent).memories(&knots);
+            let step: f64 = 1e-5;
+            let at = |sign: f64| Mode::new(time * (sign * step).exp(), exponent).memories(&knots);
+            for (index, (above, below)) in at(1.0).iter().zip(&at(-1.0)).enumerate() {
+                let slope = (above.value - below.value) / (2.0 * step);
+                let off = (memories[index].slope - slope).abs();
+                assert!(off < 1e-9, "{exponent} {time} {index}: {off:e}");
+            }
+        }
+    }
+}
+
 /// Samples far apart against a relaxation time, and a depth that rests at zero.
 #[test]
 fn coarse_samples_change_nothing() {

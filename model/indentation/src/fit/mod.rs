@@ -1,0 +1,157 @@
+//! The relaxation modulus of a record of depth and force, whatever the ramp that leads to its hold.
+//!
+//! By Lee and Radok the force is linear in the moduli, and each relaxation time has a column that the recursion gives exactly for
+//! the depth as it was. The times are found by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413-432,
+//! with the step of Ruhe and Wedin, SIAM Rev. 22 (1980) 318-337), from the best set of a grid.
+
+mod search;
+
+#[cfg(test)]
+mod tests;
+
+use crate::viscoelastic::{DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm};
+use search::{Fitted, Record};
+use thiserror::Error;
+
+/// A relaxation modulus and how well it is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RelaxationFit {
+    /// Terms from the shortest relaxation time to the longest.
+    pub modulus: PronySeries,
+    /// The standard error of each number of `modulus`, from the covariance of residuals that are independent of each other.
+    pub standard_errors: PronySeries,
+    /// Standard deviation of the residuals in N.
+    pub residual_newtons: f64,
+    /// Of the moduli, the equilibrium behind the terms, and of the logarithms of the times.
+    covariance: Vec<Vec<f64>>,
+}
+
+/// A record that gives no relaxation modulus.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum RelaxationFitError {
+    #[error(transparent)]
+    History(#[from] HistoryError),
+    #[error("{count} terms are asked for; give 1 to {TERMS_MAX}")]
+    TermCount { count: usize },
+    #[error("there are {forces} forces for {depths} depths; give one for each")]
+    Lengths { forces: usize, depths: usize },
+    #[error("the force of sample {index} is {value}; give a number of newtons")]
+    Force { index: usize, value: f64 },
+    #[error(
+        "the record has {samples} samples at different times; give at least {needed} for these terms"
+    )]
+    Samples { samples: usize, needed: usize },
+    #[error(
+        "the relaxation time of {time_secs:.3e} s is not identifiable behind a ramp of {ramp_secs:.3e} s; give a ramp of less than {RAMP_OVER_TIME_MAX} times the shortest time, or take fewer terms"
+    )]
+    RampTooLong { time_secs: f64, ramp_secs: f64 },
+    #[error(
+        "the relaxation time of {time_secs:.3e} s is not identifiable in this record; take fewer terms, a faster ramp, a longer hold or less noise"
+    )]
+    NotIdentifiable { time_secs: f64 },
+    #[error(
+        "no set of {count} relaxation times describes the record with moduli above 0; take fewer terms"
+    )]
+    NoSet { count: usize },
+}
+
+/// Records identify no more.
+const TERMS_MAX: usize = 5;
+/// At the end of a ramp a term has relaxed but for its time over that of the ramp: a tenth here, and what else bends the ramp,
+/// such as its first contact, weighs more.
+const RAMP_OVER_TIME_MAX: f64 = 10.0;
+/// Standard errors of a modulus and of a time, over the value, beyond which the linear covariance no longer describes them.
+const RELATIVE_ERROR_MAX: f64 = 0.1;
+
+/// The relaxation modulus of so many terms that fits the forces in N at the samples of the history best. The contact must not
+/// shrink but by noise.
+pub fn fit_relaxation(
+    law: PowerLaw,
+    history: &DepthHistory,
+    forces_newtons: &[f64],
+    term_count: usize,
+) -> Result<RelaxationFit, RelaxationFitError> {
+    if !(1..=TERMS_MAX).contains(&term_count) {
+        return Err(RelaxationFitError::TermCount { count: term_count });
+    }
+    let (forces, depths) = (forces_newtons.len(), history.knots().len() - 1);
+    if forces != depths {
+        return Err(RelaxationFitError::Lengths { forces, depths });
+    }
+    if let Some(index) = forces_newtons.iter().position(|force| !force.is_finite()) {
+        return Err(RelaxationFitError::Force { index, value: forces_newtons[index] });
+    }
+    let needed = 2 * term_count + 2;
+    let samples = 1 + history.knots()[1..].windows(2).filter(|w| w[1].time > w[0].time).count();
+    if samples < needed {
+        return Err(RelaxationFitError::Samples { samples, needed });
+    }
+    let record = Record { law, knots: history.knots(), forces: forces_newtons };
+    let fitted = record.fit(term_count).ok_or(RelaxationFitError::NoSet { count: term_count })?;
+    report(&fitted, ramp_secs(history), depths)
+}
+
+/// The time from 1 % to 99 % of the greatest depth.
+fn ramp_secs(history: &DepthHistory) -> f64 {
+    let knots = history.knots();
+    let deepest = knots.iter().map(|knot| knot.depth).fold(0.0, f64::max);
+    let first = |share: f64| knots.iter().find(|knot| knot.depth >= share * deepest);
+    let time = |share: f64| first(share).map_or(knots[0].time, |knot| knot.time);
+    time(0.99) - time(0.01)
+}
+
+fn report(
+    fitted: &Fitted,
+    ramp_secs: f64,
+    samples: usize,
+) -> Result<RelaxationFit, RelaxationFitError> {
+    let Fitted { times, moduli, left_over, covariance } = fitted;
+    let count = times.len();
+    if let Some(&time_secs) = times.iter().find(|time| ramp_secs > RAMP_OVER_TIME_MAX * **time) {
+        return Err(RelaxationFitError::RampTooLong { time_secs, ramp_secs });
+    }
+    let variance = left_over / (samples - 2 * count - 1) as f64;
+    let covariance = covariance
+        .as_ref()
+        .ok_or_else(|| RelaxationFitError::NotIdentifiable { time_secs: times[0] })?;
+    let covariance: Vec<Vec<f64>> =
+        covariance.iter().map(|row| row.iter().map(|value| variance * value).collect()).collect();
+    let error = |index: usize| covariance[index][index].sqrt();
+    let term = |index: usize| {
+        let (modulus_mpa, time_secs) = (moduli[index], times[index]);
+        let of_time = error(count + 1 + index);
+        // A NaN is no answer either.
+        let is_known =
+            error(index) <= RELATIVE_ERROR_MAX * modulus_mpa && of_time <= RELATIVE_ERROR_MAX;
+        let errors = PronyTerm { modulus_mpa: error(index), time_secs: of_time * time_secs };
+        if is_known {
+            Ok((PronyTerm { modulus_mpa, time_secs }, errors))
+        } else {
+            Err(RelaxationFitError::NotIdentifiable { time_secs })
+        }
+    };
+    let both: Result<Vec<_>, _> = (0..count).map(term).collect();
+    let (terms, errors) = both?.into_iter().unzip();
+    Ok(RelaxationFit {
+        modulus: PronySeries { equilibrium_mpa: moduli[count], terms },
+        standard_errors: PronySeries { equilibrium_mpa: error(count), terms: errors },
+        residual_newtons: variance.sqrt(),
+        covariance,
+    })
+}
+
+impl RelaxationFit {
+    /// The standard error in MPa of the modulus at a time in s after a step.
+    #[must_use]
+    pub fn modulus_standard_error(&self, time_secs: f64) -> f64 {
+        let terms = &self.modulus.terms;
+        let age = |term: &PronyTerm| time_secs / term.time_secs;
+        let of_moduli = terms.iter().map(|term| (-age(term)).exp());
+        let of_times = terms.iter().map(|term| term.modulus_mpa * age(term) * (-age(term)).exp());
+        let gradient: Vec<f64> = of_moduli.chain([1.0]).chain(of_times).collect();
+        let along = |row: &Vec<f64>| row.iter().zip(&gradient).map(|(a, b)| a * b).sum::<f64>();
+        let variance: f64 =
+            self.covariance.iter().map(along).zip(&gradient).map(|(a, b)| a * b).sum();
+        variance.max(0.0).sqrt()
+    }
+}
