@@ -24,5 +24,5 @@ pub use shape::{Contact, IndenterShape};
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
 pub use viscoelastic::{
     DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm, lee_radok_force,
-    lee_radok_force_of, ting_force,
+    lee_radok_force_of, repeated_contact_force, ting_force,
 };

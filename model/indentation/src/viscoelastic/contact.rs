@@ -93,7 +93,8 @@ pub fn lee_radok_force_of(
 
 /// Forces in N at the samples of the history, by Ting: one growth of the contact and one shrinking, until it is lost and the
 /// force is zero. A flat punch, whose contact does not change, may move as it likes while it touches. Exact for depths that are
-/// straight between samples; a contact that grows again is refused.
+/// straight between samples; a contact that grows again is refused,
+/// and is what `repeated_contact_force` is for.
 pub fn ting_force(
     law: PowerLaw,
     modulus: &PronySeries,

@@ -29,7 +29,7 @@ pub enum HistoryError {
     #[error(transparent)]
     Value(#[from] crate::InvalidValue),
     #[error(
-        "the contact grows again at {time_secs} s after it shrank; end the history before, or take Lee and Radok's law where the depth fell by noise only"
+        "the contact grows again at {time_secs} s after it shrank; end the history before, or take the force of a repeated contact"
     )]
     GrowsAgain { time_secs: f64 },
 }

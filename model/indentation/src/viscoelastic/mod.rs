@@ -3,6 +3,7 @@
 mod contact;
 mod history;
 mod prony;
+mod repeated;
 
 #[cfg(test)]
 mod tests;
@@ -11,3 +12,4 @@ pub use contact::{PowerLaw, lee_radok_force, lee_radok_force_of, ting_force};
 pub use history::{DepthHistory, HistoryError};
 pub(crate) use history::{Knot, Memory, Mode};
 pub use prony::{PronySeries, PronyTerm};
+pub use repeated::repeated_contact_force;

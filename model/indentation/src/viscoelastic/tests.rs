@@ -293,6 +293,94 @@ fn slope_over_the_time_is_that_of_the_memory() {
     }
 }
 
+/// Where Ting's law holds the springs are as he says, the nearer the closer the samples.
+#[test]
+fn springs_follow_ting_where_the_contact_grows_once() {
+    let knots = [(0.0, 0.0), (1.0, 0.3), (1.6, 0.3), (2.6, 0.0)];
+    for shape in [PUNCH, SPHERE, CONE] {
+        let off = |steps: usize| {
+            let path = history(&knots, steps);
+            let ting = forces_of(ting_force, shape, &three_terms(), &path);
+            let springs = forces_of(repeated_contact_force, shape, &three_terms(), &path);
+            let largest = ting.iter().copied().fold(0.0, f64::max);
+            let off = ting.iter().zip(&springs).map(|(a, b)| (a - b).abs() / largest);
+            off.fold(0.0, f64::max)
+        };
+        let [coarse, fine] = [off(25), off(100)];
+        println!("{shape:?}: {coarse:e} {fine:e}");
+        // One spring is a punch; for the others four times the samples leave a sixteenth.
+        let is_second_order = shape == PUNCH || (14.0..18.0).contains(&(coarse / fine));
+        assert!(is_second_order && fine < 2e-5, "{shape:?}: {coarse:e} {fine:e}");
+    }
+}
+
+#[test]
+fn elastic_body_repeats_its_curve() {
+    let path =
+        history(&[(0.0, 0.0), (1.0, 0.3), (1.5, 0.1), (2.0, 0.4), (3.0, 0.0), (4.0, 0.2)], 9);
+    for shape in [PUNCH, SPHERE, CONE] {
+        let law = law(shape);
+        let forces = forces_of(repeated_contact_force, shape, &series(0.02, &[]), &path);
+        for (force, depth) in forces.iter().zip(&path.1) {
+            let elastic = 0.02 * law.coefficient() * depth.powf(law.exponent());
+            assert!((force - elastic).abs() < 1e-7, "{shape:?} {depth}: {force} {elastic}");
+        }
+    }
+}
+
+/// A Zener body (moduli `E` and `G`, time `tau`) beneath a punch that steps in to `h` at 0 s, out at 1 s and in again at 3 s:
+/// out of contact the surface stands at `u = h G (1 - exp(-1 s / tau)) / (E + G)` and creeps back with the time
+/// `tau (E + G) / E`, and the second step finds `(E + G) (depth - u)`.
+#[test]
+fn surface_that_creeps_back_is_met_by_a_second_step() {
+    let (equilibrium, modulus, time, depth) = (0.02, 0.05, 0.7, 0.3);
+    let sum = equilibrium + modulus;
+    let jump = depth * modulus * -(-1.0f64 / time).exp_m1() / sum;
+    let surface = jump * (-2.0 / (time * sum / equilibrium)).exp();
+    for second in [0.3, 1.1 * surface, 0.9 * surface] {
+        let knots =
+            [(0.0, depth), (1.0, depth), (1.0, 0.0), (3.0, 0.0), (3.0, second), (3.1, second)];
+        let path = history(&knots, 400);
+        let body = series(equilibrium, &[(modulus, time)]);
+        let forces = forces_of(repeated_contact_force, PUNCH, &body, &path);
+        let exact = law(PUNCH).coefficient() * sum * (second - surface).max(0.0);
+        let found = forces[1600];
+        assert!((found - exact).abs() < 1e-6, "{second}: {found} {exact}");
+        assert!(forces[800..=1200].iter().all(|force| *force == 0.0));
+    }
+}
+
+/// Cycles, and a wait on the way back.
+#[test]
+fn contact_that_grows_again_converges_with_the_samples() {
+    let knots = [
+        (0.0, 0.0),
+        (1.0, 0.3),
+        (2.0, 0.12),
+        (6.0, 0.12),
+        (7.0, 0.35),
+        (8.0, 0.0),
+        (9.0, 0.0),
+        (10.0, 0.3),
+    ];
+    for shape in [SPHERE, CONE] {
+        let forces = |steps: usize| {
+            let path = history(&knots, steps);
+            let all = forces_of(repeated_contact_force, shape, &three_terms(), &path);
+            all.into_iter().step_by(steps).collect::<Vec<f64>>()
+        };
+        let [coarse, fine, finest] = [25, 100, 400].map(forces);
+        let largest = finest.iter().copied().fold(0.0, f64::max);
+        for ((coarse, fine), finest) in coarse.iter().zip(&fine).zip(&finest) {
+            let off = [(coarse - finest).abs() / largest, (fine - finest).abs() / largest];
+            assert!(off[0] < 1e-3 && off[1] < 1e-4, "{shape:?}: {off:?}");
+        }
+        // The wait lets the specimen rise, and the force with it.
+        assert!(finest[3] > 1.1 * finest[2], "{finest:?}");
+        assert!(finest[5] == 0.0 && finest[6] == 0.0 && finest[7] > 0.0, "{finest:?}");
+    }
+}
+
 /// Samples far apart against a relaxation time, and a depth that rests at zero.
 #[test]
 fn coarse_samples_change_nothing() {
