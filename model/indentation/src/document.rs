@@ -77,8 +77,8 @@ impl Quantity {
 impl PyramidFaces {
     /// Tangent of the half angle of the cone with the same projected area at each depth, over that of the pyramid: a regular
     /// pyramid of `n` faces has the area `n tan(pi / n) (depth tan(angle))^2`, so the factor is 1.2861 for three faces and
-    /// 1.1284 for four (Oliver and Pharr, J. Mater. Res. 7 (1992) 1564-1583, take 70.3° for Berkovich's). The force of an
-    /// elastic specimen on a four-sided pyramid is up to 4 % higher by Bilodeau (J. Appl. Mech. 59 (1992) 519-523).
+    /// 1.1284 for four (Oliver and Pharr, J. Mater. Res. 7 (1992) 1564-1583, take 70.3° for Berkovich's). What the edges
+    /// add is left out.
     #[must_use]
     pub fn cone_factor(self) -> f64 {
         let count = match self {
