@@ -52,7 +52,7 @@ fn one_session_is_looked_at_closely() {
         "SHA-256 of its files",
         "health",
         "contact",
-        "thinned to min/max of",
+        "line: mean of ",
     ] {
         assert!(flow.says(words), "{words}");
     }
@@ -88,7 +88,7 @@ fn one_session_is_looked_at_closely() {
     flow.window.key_press(Key::Minus);
     flow.window.key_press(Key::Home);
     flow.window.run_steps(2);
-    assert!(flow.says("thinned to min/max of"));
+    assert!(flow.says("line: mean of "));
     // Which quantities, and where time begins.
     for name in ["Raw signal", "Depth", "Force"] {
         flow.click(name);
