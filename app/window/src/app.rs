@@ -42,6 +42,8 @@ pub struct WorkbenchApp {
     settings: SettingsFile,
     sizes: Sizes,
     keys: KeyReader,
+    /// Pressed in this frame, and done once its letters have reached their fields.
+    after_letters: Commands,
     meter: FrameMeter,
     pace: FramePace,
     is_zoom_set: bool,
@@ -91,6 +93,7 @@ impl WorkbenchApp {
             sizes: Sizes::from_changes([settings.now.left, settings.now.right, settings.now.log]),
             settings,
             keys: KeyReader::default(),
+            after_letters: Commands::default(),
             meter: FrameMeter::from_environment(),
             pace,
             is_zoom_set: false,
@@ -270,7 +273,7 @@ impl WorkbenchApp {
 
     /// Reads the keys that stop nothing, and takes what was dropped.
     fn read_input(&mut self, ctx: &Context, commands: &mut Commands) {
-        if self.keys.read(ctx, commands) {
+        if self.keys.read(ctx, commands, &mut self.after_letters) {
             let dropped = ctx.input(|input| input.raw.dropped_files.clone());
             let paths = dropped.iter().map(|file| file.path().to_owned());
             push_dropped(paths.collect(), self.screens.shown(), commands);
@@ -401,6 +404,8 @@ impl eframe::App for WorkbenchApp {
         self.workbench.refresh_form();
         let ctx = ui.ctx().clone();
         self.act(&ctx, &mut commands);
+        let mut keys = std::mem::take(&mut self.after_letters);
+        self.act(&ctx, &mut keys);
         self.meter.end();
     }
 

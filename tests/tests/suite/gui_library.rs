@@ -1,5 +1,5 @@
 //! The library's screen: found, chosen, looked at, spoken of, taken back, written out.
-use eframe::egui::{Key, Modifiers, Role};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Role};
 use egui_kittest::kittest::Queryable;
 use palpate_analysis::edited_session;
 use palpate_runner::TimeScale;
@@ -128,6 +128,27 @@ fn sessions_are_chosen_by_keys_and_by_the_pointer_and_reviewed() {
     assert!(flow.says(", 2 chosen"));
     click_row(&mut flow, 8, Modifiers::SHIFT);
     assert!(flow.says(", 4 chosen"));
+    // A hand that is fast: the click on a row and the key that chooses all come in one frame.
+    let pos = flow.window.get_by_label_contains(&row(8)).rect().center();
+    let button = |pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    let key = Event::Key {
+        key: Key::A,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::COMMAND,
+    };
+    flow.type_into("note", "x");
+    flow.window.event(Event::PointerMoved(pos));
+    flow.window.run_steps(2);
+    flow.window.input_mut().events.extend([button(true), button(false), key]);
+    flow.window.run_steps(3);
+    assert!(flow.says(&format!(", {SESSIONS} chosen")));
     click_row(&mut flow, 3, Modifiers::NONE);
     assert!(flow.says("finished, no sample missing"));
     assert!(flow.says(&format!("palpate replay \"{}\" --window", sessions[3].display())));

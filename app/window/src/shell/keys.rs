@@ -66,19 +66,34 @@ impl KeyReader {
         push_stop_buttons(ctx, commands);
     }
 
-    /// Pushes the commands of other keys; true if this frame is read for the first time.
-    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) -> bool {
+    /// Pushes the commands of other keys; true if this frame is read for the first time. Those that take what is typed
+    /// are to be done after the frame's letters have reached their fields.
+    pub fn read(
+        &mut self,
+        ctx: &Context,
+        commands: &mut Commands,
+        after_letters: &mut Commands,
+    ) -> bool {
         let frame = ctx.cumulative_frame_nr();
         if self.frame_read.replace(frame) == Some(frame) {
             return false;
         }
         ctx.input(|input| {
-            push_keys(&input.events, false, commands);
+            let mut pressed = Commands::default();
+            push_keys(&input.events, false, &mut pressed);
             for (key, command) in [(Key::K, UiCommand::Palette), (Key::Enter, UiCommand::AcceptRun)]
             {
                 if is_pressed(&input.events, key, true) {
-                    commands.push(command);
+                    pressed.push(command);
                 }
+            }
+            for command in pressed.take() {
+                let to = if takes_what_is_typed(&command) {
+                    &mut *after_letters
+                } else {
+                    &mut *commands
+                };
+                to.push(command);
             }
             for screen in screens() {
                 if screen.key.is_some_and(|key| is_pressed(&input.events, key, true)) {
@@ -88,6 +103,12 @@ impl KeyReader {
         });
         true
     }
+}
+
+/// Whether a command reads the fields of the window.
+const fn takes_what_is_typed(command: &UiCommand) -> bool {
+    use UiCommand::{AcceptRun, NoteTyped, Start, Work};
+    matches!(command, NoteTyped | Start | Work | AcceptRun)
 }
 
 /// Pushes the commands of [`KEYS`] among events: the stops, or the others.

@@ -5,7 +5,7 @@ use super::table::{Column, Emphasis, GAP, ROW, row_ui, width_of};
 use super::text::tokens_of;
 use eframe::egui::text::{LayoutJob, TextFormat, TextWrapping};
 use eframe::egui::{
-    Align2, Button, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
+    Align2, Button, Event, EventFilter, Id, InputState, Key, Label, Popup, Rect, RichText, Role,
     ScrollArea, Sense, Stroke, StrokeKind, TextStyle, Ui, Vec2, WidgetInfo, WidgetText, pos2, vec2,
 };
 use std::ops::Range;
@@ -109,11 +109,12 @@ impl ChoiceTable<'_> {
                 let filter = EventFilter { vertical_arrows: true, ..EventFilter::default() };
                 ui.memory_mut(|memory| memory.set_focus_lock_filter(id, filter));
             }
-            let is_free = ui.memory(|memory| memory.focused().is_none());
-            if (body.has_focus() || is_free) && !Popup::is_any_open(ui.ctx()) {
+            shown = self.body_ui(ui, width, id, scrolled, &mut acts);
+            // After the rows: a click on one gives the table the focus, and a key of the same frame comes after it.
+            let focused = ui.memory(|memory| memory.focused());
+            if focused.is_none_or(|one| one == id) && !Popup::is_any_open(ui.ctx()) {
                 self.keys(ui, scrolled, &mut acts);
             }
-            shown = self.body_ui(ui, width, id, scrolled, &mut acts);
         });
         (acts, shown)
     }
@@ -217,7 +218,9 @@ impl ChoiceTable<'_> {
             if input.modifiers.shift {
                 how = SelectionMode::Extend;
             }
-            if input.modifiers.command && input.key_pressed(Key::A) {
+            // The modifiers are the event's own: those of the frame may have been let go already.
+            let is_all = |event: &Event| matches!(event, Event::Key { key: Key::A, pressed: true, modifiers, .. } if modifiers.command);
+            if input.events.iter().any(is_all) {
                 acts.push(TableAction::ChooseAll);
             }
             if let Some(at) = self.at.filter(|_| input.key_pressed(Key::Space)) {

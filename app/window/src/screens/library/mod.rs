@@ -250,7 +250,7 @@ impl Screen for LibraryScreen {
     fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.heading_ui(ui);
         let help = "Arrow keys choose a session, Shift extends the choice, Space or Ctrl+click adds a session, Ctrl+A chooses all, Enter opens the chosen sessions in Review.";
-        ui.add(Label::new(RichText::new(help).small().weak()).truncate());
+        ui.add(Label::new(RichText::new(help).small().weak()).wrap());
         let sorted = (self.form.order, self.form.is_reversed);
         for request in self.list.ui(ui, sorted) {
             match request {
