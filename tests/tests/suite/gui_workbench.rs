@@ -121,6 +121,9 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     assert!(flow.says("not a finite number") && !flow.is_enabled("Jog"));
     flow.type_into("distance", "500");
     assert!(flow.says("at most 150 mm in either direction"));
+    // A move by hand leaves the facts beside the curves as it leaves the curves: there was no other run.
+    flow.show(&run::SCREEN);
+    assert!(flow.says("no run yet") && !flow.says("Step "));
 }
 
 #[test]

@@ -5,14 +5,13 @@ use crate::widgets::{StepState, fact_ui, placeholder_ui, quiet_ui, section_ui, s
 use eframe::egui::Ui;
 use palpate_analysis::report::live::LiveCycle;
 use palpate_protocols::engine::EndingKind;
-use palpate_runner::{RunView, RunnerSnapshot};
+use palpate_runner::RunView;
 
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;
 
 /// Draws what is known of a run so far.
-pub fn findings_ui(ui: &mut Ui, snapshot: &RunnerSnapshot, cycles: &[LiveCycle]) {
-    let run = snapshot.run.as_ref();
+pub fn findings_ui(ui: &mut Ui, run: Option<&RunView>, cycles: &[LiveCycle]) {
     section_ui(ui, "Live parameters");
     parameters_ui(ui, run);
     section_ui(ui, "Measured");

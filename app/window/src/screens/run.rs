@@ -154,7 +154,7 @@ impl Screen for RunScreen {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        let run = workbench.run();
+        let run = workbench.measured_run();
         views_ui(ui, self.middle, run, commands);
         let limits = &workbench.bench.limits;
         match (self.middle, run) {
@@ -182,7 +182,9 @@ impl Screen for RunScreen {
         if let Some(run) = workbench.run() {
             after_stop_ui(ui, run, commands);
         }
-        findings_ui(ui, &workbench.snapshot, workbench.latest_run.plots().cycles());
+        // Of the run whose curves are drawn: a move by hand leaves both as they are.
+        let (run, latest) = (workbench.measured_run(), &workbench.latest_run);
+        findings_ui(ui, run, latest.plots().cycles());
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
@@ -279,7 +281,7 @@ impl Screen for RunScreen {
         let mut actions: Vec<PaletteAction> = views
             .into_iter()
             .map(|(view, name)| {
-                let is_offered = is_offered(view, workbench.run());
+                let is_offered = is_offered(view, workbench.measured_run());
                 let verdict = require(is_offered, "the run does not have this view");
                 PaletteAction::new(name, "", UiCommand::View(view)).if_ok(verdict)
             })
