@@ -18,11 +18,11 @@ use crate::shell::sizes::{PanelEdge, STEP, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::shell::tour::Tour;
 use crate::theme;
-use crate::widgets::{places, require};
+use crate::widgets::{alarm_ui, places, require};
 use crate::window::WindowOptions;
 use crate::workbench::Workbench;
-use crate::workers::PathPurpose;
 use crate::workers::fit::Refit;
+use crate::workers::{PathPurpose, pick};
 use eframe::egui::{Context, Panel, RawInput, Theme, Ui, ViewportCommand, Visuals};
 use palpate_analysis::demonstration_library::has_no_session;
 use palpate_analysis::window_requests::WorkbenchRequest;
@@ -151,6 +151,10 @@ impl WorkbenchApp {
             }
             UiCommand::TextSize(size) => set_text_size(ctx, size),
             UiCommand::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
+            UiCommand::Choose(ask) => {
+                let pick = move |dialog| pick(ask, dialog);
+                self.workbench.open_dialog(ctx, self.screens.shown(), pick);
+            }
             UiCommand::Palette => self.palette.toggle(),
             UiCommand::TourStart => {
                 self.tour.start();
@@ -294,6 +298,9 @@ impl WorkbenchApp {
         if let Some(run) = run_in_progress(&snapshot).filter(|run| is_controllable(run)) {
             panel("run_strip", ui).show(ui, |ui| run_strip_ui(ui, run, &mut self.note, commands));
         }
+        if let Some(reason) = self.workbench.dialog_refusal(self.screens.shown()) {
+            panel("dialog_refusal", ui).show(ui, |ui| alarm_ui(ui, reason));
+        }
         if self.tour.is_on() {
             panel("tour", ui).show(ui, |ui| self.tour.ui(ui, commands));
         }
@@ -356,11 +363,7 @@ impl eframe::App for WorkbenchApp {
         self.read_input(ctx, &mut commands);
         self.follow_monitor(ctx);
         self.workbench.poll(ctx);
-        let chosen = self.workbench.dialog.poll();
-        if let Some(reason) = self.workbench.dialog.take_refusal() {
-            self.workbench.notice = Some(reason);
-        }
-        if let Some((ask, path)) = chosen {
+        if let Some((ask, path)) = self.workbench.poll_dialog() {
             commands.push(match ask {
                 PathPurpose::Opened => UiCommand::Review(vec![path]),
                 ask => UiCommand::Chosen(ask, path),

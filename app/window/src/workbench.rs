@@ -7,7 +7,7 @@ use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
 use crate::workers::queue_desk::QueueDesk;
-use crate::workers::{BackgroundTask, Dialog, PathPurpose, pick};
+use crate::workers::{BackgroundTask, Dialog, PathPurpose};
 use eframe::egui::{Context, Ui};
 use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
@@ -15,6 +15,7 @@ use palpate_haptics::surface::SceneCurves;
 use palpate_protocols::engine::Operator;
 use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
 use palpate_sessions::folder::HolderLock;
+use rfd::FileDialog;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -69,6 +70,8 @@ pub struct Workbench {
     /// Dropped after the runner, which has the rig.
     _locks: Vec<HolderLock>,
     pub dialog: Dialog<(PathPurpose, PathBuf)>,
+    /// The screen that opened the last dialog, and why the dialog was not shown.
+    dialog_of: Option<(&'static str, Option<String>)>,
     /// What a person must know since the window opened.
     pub notice: Option<String>,
     /// Why the last command was refused.
@@ -133,6 +136,7 @@ impl Workbench {
             next_rig: None,
             _locks: request.locks,
             dialog: Dialog::default(),
+            dialog_of: None,
             notice: None,
             refusal: None,
             front: ScreenOffers::default(),
@@ -247,11 +251,6 @@ impl Workbench {
                 self.keep_refusal(sent);
             }
             UiCommand::ListPorts => self.refresh_ports(ctx),
-            UiCommand::Choose(ask) => {
-                let ask = *ask;
-                let opened = self.dialog.open(ctx, move |dialog| pick(ask, dialog));
-                self.keep_refusal(opened);
-            }
             UiCommand::Queue(work, reason) => {
                 let by = self.form.label_text("operator").to_owned();
                 self.queue.ask(work.clone(), &by, reason);
@@ -259,6 +258,33 @@ impl Workbench {
             _ => return false,
         }
         true
+    }
+
+    /// Opens the dialog of a screen for a folder or a file.
+    pub fn open_dialog(
+        &mut self,
+        ctx: &Context,
+        screen: &'static str,
+        pick: impl FnOnce(FileDialog) -> Option<(PathPurpose, PathBuf)> + Send + 'static,
+    ) {
+        self.dialog_of = Some((screen, self.dialog.open(ctx, pick).err()));
+    }
+
+    /// The path that a dialog gave, once.
+    pub fn poll_dialog(&mut self) -> Option<(PathPurpose, PathBuf)> {
+        let chosen = self.dialog.poll();
+        if let (Some(reason), Some((_, refusal))) =
+            (self.dialog.take_refusal(), &mut self.dialog_of)
+        {
+            *refusal = Some(reason);
+        }
+        chosen
+    }
+
+    /// Why the dialog that a screen opened last was not shown.
+    pub fn dialog_refusal(&self, screen: &str) -> Option<&str> {
+        let (_, refusal) = self.dialog_of.as_ref().filter(|(of, _)| *of == screen)?;
+        refusal.as_deref()
     }
 
     fn keep_refusal(&mut self, done: Result<(), String>) {

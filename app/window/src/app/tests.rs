@@ -162,3 +162,23 @@ fn a_log_that_the_window_opens_with_shows_its_session_for_review() {
     app.screens.poll(&ctx, &mut app.workbench);
     assert_eq!(app.workbench.front.review.as_deref(), Some(folder.path()));
 }
+
+#[test]
+#[cfg(not(any(target_os = "windows", target_os = "macos")))]
+fn a_dialog_that_the_desktop_does_not_show_is_missed_on_the_screen_that_asked_for_it() {
+    let ctx = Context::default();
+    let (mut app, _) = open(&ctx);
+    app.workbench.open_dialog(&ctx, "Today", |_| None);
+    let reason = until(
+        || {
+            assert_eq!(app.workbench.poll_dialog(), None);
+            app.workbench.dialog_refusal("Today").map(str::to_owned)
+        },
+        || "no refusal".to_owned(),
+    );
+    assert!(reason.contains("type the path"), "{reason}");
+    assert_eq!(app.workbench.dialog_refusal("Run"), None);
+    // The next one is another attempt.
+    app.workbench.open_dialog(&ctx, "Today", |_| Some((PathPurpose::Rig, "rig.toml".into())));
+    assert_eq!(app.workbench.dialog_refusal("Today"), None);
+}

@@ -32,7 +32,13 @@ pub enum PathPurpose {
 
 /// A person needs more time than this to cancel a dialog, in s.
 const SEEN_S: f64 = 0.4;
-const NO_DIALOG: &str = "this desktop shows no file dialog (on Linux it needs xdg-desktop-portal or zenity); type the path into the field instead";
+const NO_DIALOG: &str = "this desktop shows no file dialog (it needs xdg-desktop-portal or zenity); type the path into the field instead, or drop the file on the window";
+
+/// Why a dialog gave nothing after so many seconds, where it may not have been shown at all: only a desktop of X11 or
+/// Wayland can lack it. Windows and macOS always show it, and a quick Escape cancelled it.
+fn unseen_reason(seconds: f64, can_lack_dialogs: bool) -> Option<String> {
+    (can_lack_dialogs && seconds < SEEN_S).then(|| NO_DIALOG.to_owned())
+}
 
 /// A dialog that may be open, and gives a `T`.
 #[derive(Debug)]
@@ -70,9 +76,10 @@ impl<T: Send + 'static> Dialog<T> {
     pub fn poll(&mut self) -> Option<T> {
         let answer = self.job.poll()?;
         // The library for dialogs does not say why it showed none.
-        let is_unseen = self.opened.as_ref().is_some_and(|opened| opened.seconds() < SEEN_S);
-        if answer.is_none() && is_unseen {
-            self.refusal = Some(NO_DIALOG.to_owned());
+        let seconds = self.opened.as_ref().map_or(f64::INFINITY, Stopwatch::seconds);
+        if answer.is_none() {
+            let can_lack_dialogs = !cfg!(any(target_os = "windows", target_os = "macos"));
+            self.refusal = unseen_reason(seconds, can_lack_dialogs);
         }
         answer
     }
@@ -121,4 +128,16 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
         PathPurpose::Protocol => of_kind("Protocol", "protocols", &["toml"]),
     };
     Some((ask, path?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_desktop_that_may_lack_dialogs_is_said_to_show_none() {
+        assert!(unseen_reason(0.1, true).is_some_and(|words| words.contains("zenity")));
+        assert_eq!(unseen_reason(2.0, true), None);
+        assert_eq!(unseen_reason(0.1, false), None);
+    }
 }
