@@ -3,7 +3,8 @@
 use crate::widgets::{quiet_ui, tokens_of};
 use eframe::egui::text::LayoutJob;
 use eframe::egui::{
-    Align, Color32, FontSelection, Label, Layout, Response, RichText, Role, Ui, WidgetInfo, vec2,
+    Align, Color32, FontSelection, Label, Layout, Response, RichText, Role, TextStyle, Ui,
+    WidgetInfo, vec2,
 };
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{FittedParameter, LiveEstimate};
@@ -114,21 +115,37 @@ pub(super) fn value_ui(ui: &mut Ui, name: &str, value: &str, ink: Color32, unit:
 
 /// Draws a number with its power of ten as in print; as typed, it is what a screen reader says.
 pub(super) fn number_ui(ui: &mut Ui, text: &str, ink: Color32) -> Response {
-    let mut job = LayoutJob::default();
-    let mut append = |text: RichText, align: Align| {
-        let text = text.color(ink).monospace();
-        text.append_to(&mut job, ui.style(), FontSelection::Default, align);
-    };
-    match text.rsplit_once('e').filter(|(_, exponent)| exponent.parse::<i32>().is_ok()) {
-        Some((number, exponent)) => {
-            append(RichText::new(format!("{number}·10")), Align::BOTTOM);
-            append(RichText::new(exponent).size(INDEX_SIZE), Align::TOP);
-        }
-        None => append(RichText::new(text), Align::BOTTOM),
+    let full = TextStyle::Monospace.resolve(ui.style()).size;
+    let mut job = number_job(ui, text, ink, full);
+    let (has, needs) = (ui.available_width(), width_of_job(ui, &job));
+    if needs > has {
+        // Rather in smaller letters than broken in two.
+        job = number_job(ui, text, ink, (full * has / needs - 0.1).max(INDEX_SIZE));
     }
     let label = ui.add(Label::new(job).wrap());
     label.widget_info(|| WidgetInfo::labeled(Role::Label, true, text));
     label
+}
+
+/// A number in digits of this size.
+fn number_job(ui: &Ui, text: &str, ink: Color32, size: f32) -> LayoutJob {
+    let mut job = LayoutJob::default();
+    let mut append = |text: RichText, size: f32, align: Align| {
+        let text = text.color(ink).monospace().size(size);
+        text.append_to(&mut job, ui.style(), FontSelection::Default, align);
+    };
+    match text.rsplit_once('e').filter(|(_, exponent)| exponent.parse::<i32>().is_ok()) {
+        Some((number, exponent)) => {
+            append(RichText::new(format!("{number}·10")), size, Align::BOTTOM);
+            append(RichText::new(exponent), INDEX_SIZE, Align::TOP);
+        }
+        None => append(RichText::new(text), size, Align::BOTTOM),
+    }
+    job
+}
+
+fn width_of_job(ui: &Ui, job: &LayoutJob) -> f32 {
+    ui.fonts_mut(|fonts| fonts.layout_job(job.clone())).size().x
 }
 
 /// Draws a parameter's symbol as in print; its key is the tooltip and what a screen reader says.
@@ -222,6 +239,7 @@ fn remark(phase: Phase, parameters: &[FittedParameter]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use eframe::egui::{Context, RawInput};
 
     #[test]
     fn symbols_are_those_of_print() {
@@ -234,6 +252,28 @@ mod tests {
             ("alpha", "α", ""),
         ] {
             assert_eq!(symbol(key), (letter.to_owned(), index.to_owned()), "{key}");
+        }
+    }
+
+    #[test]
+    fn a_wide_value_stands_in_one_line() {
+        let ctx = Context::default();
+        crate::theme::apply(&ctx);
+        let height = |value: &str| {
+            let mut height = 0.0;
+            let mut drawn = ctx.run_ui(RawInput::default(), |ui| {
+                let ink = tokens_of(ui).text;
+                tight(ui, |ui| {
+                    height = value_ui(ui, "tau_sig", value, ink, "N·s/mm²").rect.height()
+                });
+            });
+            drawn.textures_delta.clear();
+            height
+        };
+        let usual = height("1.50 ± 0.10");
+        assert!(usual > 10.0);
+        for value in ["(5.18013 ± 0.00031)e-2", "(-5.180132 ± 0.000031)e-12"] {
+            assert!(height(value) <= usual + 1.0, "{value}: {} over {usual}", height(value));
         }
     }
 
