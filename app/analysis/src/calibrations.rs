@@ -36,7 +36,11 @@ pub struct CalibrationView {
 impl CalibrationView {
     fn of(entry: CalibrationEntry, calibration: Calibration, rig: &str) -> Self {
         let details = CalibrationDetails::of(&calibration).and_then(|details| {
-            let plots = plots(&calibration, &details)?;
+            let mut plots = plots(&calibration, &details)?;
+            // A name would be cut off where its stretch is narrow: the legend has it.
+            for plot in &mut plots {
+                plot.stretches.iter_mut().for_each(|one| one.name.clear());
+            }
             Ok((details, plots))
         });
         Self {

@@ -186,6 +186,10 @@ fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
         if flow.run().unwrap().outcome.is_some() {
             break;
         }
+        // What is to be done is what the prompt says, be it to put a weight on or to take it off.
+        let prompt = flow.run().unwrap().prompt.unwrap();
+        let deed = format!("{}, then press Done F2", prompt.message);
+        assert!(flow.says(&deed) && !flow.says("Live parameters"), "{deed}");
         if weighed(&flow) == 2 && !redone {
             assert!(flow.says("Reading 3 of 7: 540 g in all"), "no place");
             flow.window.check_accessibility();

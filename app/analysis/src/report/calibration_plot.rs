@@ -11,6 +11,8 @@ use palpate_model::calibration::{
 };
 use palpate_model::units::{Newtons, Volts};
 
+/// Name of a stretch where the signal tells little of the force.
+pub const FLAT_STRETCH: &str = "flat stretch";
 /// Places along the force axis: more than a pixel has.
 const PLACES: u32 = 900;
 /// The axis goes on beyond the heaviest weight by this share.
@@ -85,7 +87,7 @@ pub fn plots(
 
 fn flat(one: &FlatStretch) -> PlotStretch {
     PlotStretch {
-        name: "flat stretch".to_owned(),
+        name: FLAT_STRETCH.to_owned(),
         ends: [one.from_n, one.to_n],
         ink: Some(Ink::Line),
     }
@@ -105,7 +107,8 @@ fn uncertainties(details: &CalibrationDetails, axis: Axis) -> Vec<PlotSeries> {
     if !own.is_stated() {
         return Vec::new();
     }
-    let inks = [Ink::Series, Ink::Quiet, Ink::Notice, Ink::Alarm, Ink::Active, Ink::Limit];
+    // The sixth session is in the ink of all terms together.
+    let inks = [0, 1, 2, 3, 4, 6].map(Ink::Session);
     let terms = UncertaintyTerm::ALL.into_iter().zip(inks);
     let stated = terms.filter(|(term, _)| own.errors().any(|one| one == *term));
     let mut series: Vec<PlotSeries> = stated
@@ -154,4 +157,24 @@ pub fn drawing(calibration: &Calibration, details: &CalibrationDetails) -> Drawi
         y = sentence_lines(&mut svg, y, TextInk::plain(LIGHT.text), finding);
     }
     svg.drawing(y, LIGHT.canvas, &format!("Calibration {}", calibration.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_term_of_the_uncertainty_has_a_colour_of_its_own() {
+        let calibration = Calibration::thesis();
+        let details = CalibrationDetails::of(&calibration).unwrap();
+        let [.., uncertainty] = plots(&calibration, &details).unwrap();
+        assert!(uncertainty.series.len() >= 3, "{}", uncertainty.series.len());
+        let color = |one: &PlotSeries| one.ink.of(&LIGHT).to_array();
+        let colors: BTreeSet<[u8; 4]> = uncertainty.series.iter().map(color).collect();
+        assert_eq!(colors.len(), uncertainty.series.len());
+        // Greys next to the ink of the text are not told apart.
+        let dark = colors.iter().filter(|color| color[..3].iter().all(|one| *one < 0x60));
+        assert_eq!(dark.count(), 1, "{colors:?}");
+    }
 }

@@ -237,7 +237,8 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
 /// Draws the expected course of the plan.
 pub fn expected_ui(ui: &mut Ui, checked: Option<&CheckedPlan>, limits: CourseLimits) {
     match checked {
-        Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
+        // A search for the surface retracts from it, to a depth below zero.
+        Some(checked) if checked.outline.iter().all(|point| point.depth.0 <= 0.0) => {
             placeholder_ui(
                 ui,
                 "this protocol does not indent the specimen, so no depth or force can be drawn",

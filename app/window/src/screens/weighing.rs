@@ -1,6 +1,7 @@
 //! Calibration weights one by one: the next weight, whether the signal is steady, and each reading next to the value that
 //! the calibration in use expects.
 
+use super::calibration::calibration_session;
 use super::form::RunSetup;
 use crate::plots::figure::{PlotLook, legend_ui, plot_ui};
 use crate::theme::reading_style;
@@ -11,6 +12,7 @@ use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::live::weighing_plot;
 use palpate_model::calibration::{CalibrationCurve, SettleProgress, newtons_of};
 use palpate_model::units::Volts;
+use palpate_protocols::engine::PauseView;
 use palpate_protocols::weight_readings::WeightReading;
 use palpate_runner::{PlannedWeight, RunView};
 
@@ -93,15 +95,33 @@ fn now_ui(
         let signal = signal.map_or_else(|| "--".to_owned(), |volts| format!("{volts:.4}"));
         ui.label(RichText::new(signal).text_style(reading_style()));
         ui.add_space(12.0);
-        match &run.settling {
-            Some(settling) => steady_ui(ui, settling),
-            None if next.is_none() => {}
-            None => {
-                let words = "Put the weight on the load cell and press Done F2; the signal is then checked.";
-                ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
-            }
+        if let Some(settling) = &run.settling {
+            steady_ui(ui, settling);
         }
+        let words = RichText::new(deed_words(run)).color(tokens.text_quiet);
+        ui.add(Label::new(words).wrap());
     });
+}
+
+/// What the operator is to do now.
+fn deed_words(run: &RunView) -> String {
+    if run.outcome.is_some() || run.holding.is_some() {
+        return match calibration_session(Some(run)) {
+            Ok(_) => "All weights are read; the calibration can be saved.".to_owned(),
+            Err(_) => String::new(),
+        };
+    }
+    match (&run.prompt, &run.settling, &run.pause) {
+        (Some(prompt), _, _) => {
+            let deed = prompt.message.trim_end_matches('.');
+            format!("{deed}, then press Done F2; the signal is then checked.")
+        }
+        (None, _, PauseView::Paused { .. }) => {
+            "The run is paused: leave the load cell as it is.".to_owned()
+        }
+        (None, Some(_), _) => "Wait and touch nothing.".to_owned(),
+        (None, None, _) => "Wait: nothing is to be done at the load cell.".to_owned(),
+    }
 }
 
 /// The stability indicator: how full the window is that must be steady, and what is not steady yet.

@@ -131,10 +131,13 @@ impl StepState {
     }
 }
 
+/// Height of a step's row in points.
+pub const STEP_HEIGHT: f32 = 19.0;
+
 /// Draws one step with its state and expected duration.
 pub fn step_ui(ui: &mut Ui, name: &str, seconds: f64, state: StepState) {
     let tokens = tokens_of(ui);
-    let size = vec2(ui.available_width(), 19.0);
+    let size = vec2(ui.available_width(), STEP_HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let label = format!("Step {name}: {}", state.name());
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));

@@ -6,7 +6,7 @@ mod verdict;
 use super::after_stop::ended_ui;
 use super::calibration::calibration_session;
 use super::exact_fit::exact_ui;
-use super::live_panel::{cycles_ui, facts_ui};
+use super::live_panel::{cycles_ui, facts_ui, may_indent};
 use super::parameters::parameters_ui;
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::today;
@@ -103,7 +103,7 @@ impl Screen for ResultScreen {
 
     fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
         let run = workbench.measured_run();
-        if !run.is_some_and(has_weighed) {
+        if run.is_none_or(may_indent) {
             found_ui(ui, run, workbench.latest_run.refit(run));
         }
         if let Some(run) = run {
