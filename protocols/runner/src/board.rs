@@ -177,6 +177,7 @@ impl Board {
         let (time_left, fraction) = self.progress(step_index, step_started);
         RunView {
             plan_name: state.config().plan.name.clone(),
+            plan_crc32: state.config().plan.source.as_ref().map(|source| source.crc32.clone()),
             folder: self.folder.clone(),
             phase: state.phase(),
             power: state.power(),

@@ -48,6 +48,8 @@ pub struct Lateness {
 #[derive(Clone, Debug)]
 pub struct RunView {
     pub plan_name: String,
+    /// CRC-32 of the text that the plan was written out from; none for a plan made by the program.
+    pub plan_crc32: Option<String>,
     pub folder: PathBuf,
     pub phase: Phase,
     pub power: Power,

@@ -1,6 +1,7 @@
 //! The protocols that come with the program: files like any other, and the examples to copy.
 
 use super::Protocol;
+use super::document::text_crc32;
 use super::problem::{ProtocolProblem, nearest};
 
 macro_rules! built_in {
@@ -35,6 +36,14 @@ built_in! {
 pub fn built_in(name: &str) -> Option<Result<Protocol, Vec<ProtocolProblem>>> {
     let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
     Some(Protocol::read(text))
+}
+
+/// Whether a plan of this name was written out from the text of the built-in protocol, by the CRC-32 of its text: a file
+/// may have any name.
+#[must_use]
+pub fn is_built_in(plan_name: &str, crc32: Option<&str>) -> bool {
+    let known = BUILT_IN.iter().find(|(name, _)| *name == plan_name);
+    known.is_some_and(|(_, text)| crc32 == Some(&text_crc32(text)))
 }
 
 /// The built-in name nearest to one that is not known, for a hint; `None` if nothing is near.

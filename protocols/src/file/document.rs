@@ -71,7 +71,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
         source,
         ask,
         parameters,
-        crc32: format!("{:08x}", crc32fast::hash(text.as_bytes())),
+        crc32: text_crc32(text),
         limits: root.get("limits").cloned(),
         monitors: root.get("monitor").cloned(),
         procedure,
@@ -218,4 +218,9 @@ fn check_used(protocol: &Protocol, problems: &mut Problems) {
             format!("parameter '{name}' is not used; write \"${name}\" where its value belongs, or remove the parameter"),
         );
     }
+}
+
+/// CRC-32 of a protocol's text, eight hexadecimal digits.
+pub(super) fn text_crc32(text: &str) -> String {
+    format!("{:08x}", crc32fast::hash(text.as_bytes()))
 }

@@ -19,7 +19,7 @@ mod scope;
 pub mod tree;
 
 pub(crate) use args::Args;
-pub use builtin::{BUILT_IN, built_in, nearest_built_in};
+pub use builtin::{BUILT_IN, built_in, is_built_in, nearest_built_in};
 pub use check::{ProtocolCheck, check};
 pub(crate) use keys::Key;
 pub use parameter::ProtocolParameter;

@@ -7,15 +7,19 @@ use crate::source::{SourceError, calibration_of, decisions, records};
 use palpate_model::calibration::{Calibration, KnownWeight, WeightCheck};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
+use palpate_protocols::file::is_built_in;
 use palpate_protocols::plans::{Plan, RampHold, Step};
 use palpate_protocols::weight_readings::{WeightReading, WeightReadings};
+use palpate_runner::RunView;
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, last_check_of_day, read_checks};
 use palpate_sessions::{ChainError, Session};
+use serde::Deserialize;
 use std::path::Path;
 use std::time::SystemTime;
 
 pub use trends::{CONTROL_CHECKS, PastCheck, control_limits, past_checks, trends};
 
+/// Name of the built-in protocol. A file may have it too: [`is_daily_check`] tells them apart.
 pub const DAILY_CHECK: &str = "daily-check";
 /// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
 const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
@@ -23,6 +27,22 @@ const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
 const ZERO_SHARE: f64 = 0.01;
 /// Two homings may differ by so many pulses: the switch closes between two of them.
 const HOME_PULSES: i64 = 1;
+
+/// Whether a plan is the built-in daily check, and not a file of its name.
+#[must_use]
+pub fn is_daily_check(plan: &Plan) -> bool {
+    plan.name == DAILY_CHECK && is_built_in_plan(plan)
+}
+
+/// The same of a run.
+#[must_use]
+pub fn is_daily_check_run(run: &RunView) -> bool {
+    run.plan_name == DAILY_CHECK && is_built_in(&run.plan_name, run.plan_crc32.as_deref())
+}
+
+fn is_built_in_plan(plan: &Plan) -> bool {
+    is_built_in(&plan.name, plan.source.as_ref().map(|source| source.crc32.as_str()))
+}
 
 fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
     let (is_passed, sentence) = found.unwrap_or_else(|missing| (false, missing));
@@ -77,7 +97,9 @@ pub fn keep_daily_check(
     let session = Session::open(folder).map_err(|err| err.to_string())?;
     let ending = session.end.as_ref().map(|end| end.outcome.as_str());
     let is_stopped = [EndingKind::Stop.name(), EndingKind::Halt.name()].map(Some).contains(&ending);
-    if session.manifest.plan["name"] != DAILY_CHECK || is_stopped {
+    // What has no plan, such as an import, is no check.
+    let plan = Plan::deserialize(&session.manifest.plan).ok();
+    if is_stopped || !plan.is_some_and(|plan| is_daily_check(&plan)) {
         return Ok(None);
     }
     let library = library.ok_or("there is no library that could keep it")?;
@@ -192,7 +214,7 @@ pub enum DailyCheckGate {
 /// Whether a plan may touch something, so that the rig's daily check has a say in it.
 #[must_use]
 pub fn needs_daily_check(plan: &Plan) -> bool {
-    let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
+    let may_jog = HOMING_CHECKS.contains(&plan.name.as_str()) && is_built_in_plan(plan);
     let is_touching = |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog(_)));
     plan.steps.iter().any(|planned| is_touching(&planned.step))
 }
@@ -247,6 +269,7 @@ pub const DAILY_CHECK_COMMAND: &str = "palpate daily-check";
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_protocols::file::Protocol;
 
     fn weighed(mass_g: f64, volts: f64) -> Record {
         Record::Weighed {
@@ -376,9 +399,18 @@ mod tests {
         let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
         assert_eq!(open, ["daily-check", "load-cell-calibration", "check-home"]);
         assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));
-        // Nor does the name of the check open what it does not do.
+        // Nor does the name of the check open what it does not do, nor what another file of that name does.
         let plan = Plan { name: DAILY_CHECK.into(), ..RampHold::default().plan() };
         assert!(!is_open(&plan));
+        assert!(is_daily_check(&built_in(DAILY_CHECK, &[])));
+        let (_, text) = palpate_protocols::file::BUILT_IN
+            .iter()
+            .find(|(name, _)| *name == DAILY_CHECK)
+            .unwrap();
+        let own = Protocol::read(&text.replace("20 mm", "90 mm").replace("max = \"30 mm\", ", ""));
+        let own = own.unwrap().plan(&std::collections::BTreeMap::new()).unwrap();
+        assert_eq!(own.name, DAILY_CHECK);
+        assert!(!is_daily_check(&own) && !is_open(&own));
         check.is_passed = true;
         add_check(library.path(), &check).unwrap();
         assert_eq!(gate(false), DailyCheckGate::Open);

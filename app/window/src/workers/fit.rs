@@ -3,7 +3,7 @@
 use super::task::BackgroundTask;
 use crate::plots::figure::PlacedPlot;
 use eframe::egui::Context;
-use palpate_analysis::daily::{DAILY_CHECK, keep_daily_check};
+use palpate_analysis::daily::{is_daily_check_run, keep_daily_check};
 use palpate_analysis::fit::{FitRecipe, SourceFit};
 use palpate_analysis::report::picture::fit_plots;
 use palpate_analysis::run_quality::assess_folder;
@@ -78,7 +78,7 @@ impl Refitter {
         }
         self.answer = BackgroundTask::default();
         self.session = folder.cloned();
-        self.is_judging = ended.is_some_and(|run| run.plan_name == DAILY_CHECK);
+        self.is_judging = ended.is_some_and(is_daily_check_run);
         if let Some(folder) = folder.cloned() {
             let library = library.cloned();
             self.answer.start("fit", ctx, move |_| assess(&folder, library.as_deref()));
@@ -140,7 +140,7 @@ impl Refitter {
 
 /// Whether a run pressed or weighed anything, and so has something to be judged.
 pub fn has_result(run: &RunView) -> bool {
-    has_ramp(run) || has_weighed(run) || run.plan_name == DAILY_CHECK
+    has_ramp(run) || has_weighed(run) || is_daily_check_run(run)
 }
 
 /// Whether a run indented anything: nothing else can be fitted.
