@@ -57,18 +57,22 @@ impl CalibrationView {
     }
 }
 
-/// Reads the library. `own` is the calibration with which the rig was opened: its own, or one of the library.
+/// Reads the library. `own` are the calibrations with which the rig was opened, its own or one of the library, and which
+/// comes with it; and the rig's name.
 pub fn read(
     library: &Path,
-    own: (Calibration, String),
+    own: (Vec<Calibration>, String),
     kept: Option<Result<String, String>>,
 ) -> CalibrationOverview {
     let (own, rig) = own;
     let now = wall_now();
     let shelf = CalibrationStore::open(library);
-    let is_kept = shelf.documents.iter().any(|stored| stored.document == own);
-    let mut shown = Vec::new();
-    if !is_kept {
+    let mut shown: Vec<CalibrationView> = Vec::new();
+    for own in own {
+        let is_kept = shelf.documents.iter().any(|stored| stored.document == own);
+        if is_kept || shown.iter().any(|one| one.calibration == own) {
+            continue;
+        }
         let entry = CalibrationEntry::built_in(&own);
         shown.push(CalibrationView {
             // The calibration that comes with the rig needs no date.

@@ -20,6 +20,10 @@ pub struct WorkbenchRequest {
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
+    /// The calibration that comes with the rig, where that is another one.
+    pub built_in: Option<Calibration>,
+    /// Reasons to doubt the calibration, which must be acknowledged before any run that reads forces with it.
+    pub doubts: Vec<String>,
     pub limits: Limits,
     /// Sentences that must be acknowledged before any run, such as a failed daily check.
     pub to_acknowledge: Vec<String>,
@@ -45,6 +49,8 @@ impl WorkbenchRequest {
         Self {
             rig,
             calibration,
+            built_in: None,
+            doubts: Vec::new(),
             limits,
             to_acknowledge: Vec::new(),
             scale,

@@ -131,6 +131,8 @@ pub struct OpenRig {
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
+    /// The calibration of a simulated rig, whichever is used.
+    pub built_in: Option<Calibration>,
     /// Reasons to doubt that calibration, one sentence each.
     pub doubts: Vec<String>,
     /// A sentence with the calibration of the library that is used, where the command line names none.
@@ -170,15 +172,17 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         (name, _) => CalibrationSource::wanted(name.as_deref(), &rig.description().name)?,
     };
     let from_library = remark(args, source.as_ref());
+    let built_in = palpate_drivers::sim::calibration(settings.profile);
     let (calibration, mut doubts) = match source {
-        None => (palpate_drivers::sim::calibration(settings.profile), Vec::new()),
+        None => (built_in.clone(), Vec::new()),
         Some(source) => {
             let doubts = source.doubts(&rig.description().name);
             (source.calibration, doubts)
         }
     };
     doubts.extend(unreadable);
-    Ok(OpenRig { rig, calibration, doubts, from_library, limits, locks })
+    let built_in = Some(built_in);
+    Ok(OpenRig { rig, calibration, built_in, doubts, from_library, limits, locks })
 }
 
 fn remark(args: &RigArgs, source: Option<&CalibrationSource>) -> Option<String> {
@@ -261,7 +265,7 @@ fn calibrated(
             )));
         }
     };
-    Ok(OpenRig { rig, calibration, doubts, from_library, limits, locks })
+    Ok(OpenRig { rig, calibration, built_in: None, doubts, from_library, limits, locks })
 }
 
 /// Opens the rig of a file and locks it against other programs.

@@ -31,15 +31,16 @@ pub(super) fn run(
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     // Doubts about a calibration that the command line does not name must be acknowledged before a run.
     let doubts = if args.rig.calibration.is_none() { bench.doubts.clone() } else { Vec::new() };
-    let mut request = WorkbenchRequest { to_open, ..request(bench, args.rig.time_scale)? };
-    request.to_acknowledge.extend(doubts);
+    let request = request(bench, args.rig.time_scale)?;
+    let request = WorkbenchRequest { to_open, doubts, ..request };
     windows.workbench(request).map_err(Failure::Failed)
 }
 
 fn request(bench: OpenRig, scale: TimeScale) -> Result<WorkbenchRequest, Failure> {
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
-    let OpenRig { rig, calibration, limits, locks, .. } = bench;
+    let OpenRig { rig, calibration, built_in, limits, locks, .. } = bench;
     Ok(WorkbenchRequest {
+        built_in,
         to_acknowledge: gate.to_acknowledge(),
         locks,
         open_rig: Some(opener()),
@@ -52,9 +53,8 @@ fn opener() -> RigOpener {
     Arc::new(|name| {
         let opened = open_in_window(name).and_then(|mut bench| {
             let doubts = std::mem::take(&mut bench.doubts);
-            let mut request = request(bench, RigArgs::default().time_scale)?;
-            request.to_acknowledge.extend(doubts);
-            Ok(request)
+            let request = request(bench, RigArgs::default().time_scale)?;
+            Ok(WorkbenchRequest { doubts, ..request })
         });
         opened.map_err(|failure| failure.sentence().to_owned())
     })

@@ -12,6 +12,7 @@ use eframe::egui::{Context, Ui};
 use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
+use palpate_model::calibration::Calibration;
 use palpate_protocols::engine::Operator;
 use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
 use palpate_sessions::folder::HolderLock;
@@ -58,6 +59,8 @@ pub struct Workbench {
     measured: Arc<RunnerSnapshot>,
     /// Calibration and limits of new sessions.
     pub bench: RunSetup,
+    /// The calibration that comes with the rig, where the window was opened with another one.
+    pub built_in: Option<Calibration>,
     pub form: ProtocolForm,
     /// The folder of recorded sessions, or why there is none.
     pub library: Result<PathBuf, String>,
@@ -123,9 +126,11 @@ impl Workbench {
             bench: RunSetup {
                 calibration: request.calibration,
                 curve,
+                doubts: request.doubts,
                 limits: request.limits,
                 to_acknowledge: request.to_acknowledge,
             },
+            built_in: request.built_in,
             form,
             queue: QueueDesk::new(library.clone()),
             library,

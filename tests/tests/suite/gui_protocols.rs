@@ -2,11 +2,15 @@
 
 use eframe::egui::Key;
 use egui_kittest::kittest::Queryable;
-use palpate_model::rig::Phase;
+use palpate_analysis::window_requests::WorkbenchRequest;
+use palpate_drivers::sim::{SimProfile, SimSettings};
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{Limits, Phase};
 use palpate_protocols::engine::{EndingKind, PauseView};
 use palpate_runner::{RunView, TimeScale};
-use palpate_sessions::{CalibrationStore, Session};
+use palpate_sessions::{CalibrationStore, Session, save_document};
 use palpate_tests::flow::WindowFlow;
+use palpate_window::window::WindowOptions;
 
 /// Opens the list of protocols and takes one by its title.
 fn choose(flow: &mut WindowFlow, title: &str) {
@@ -245,4 +249,32 @@ fn a_declined_prompt_stops_and_keeps_nothing() {
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
     assert!(flow.window.query_by_label("Save this calibration").is_none());
+}
+
+#[test]
+fn a_built_in_calibration_takes_the_place_of_one_of_the_library_and_of_its_doubts() {
+    let folder = tempfile::tempdir().unwrap();
+    let rig = palpate_drivers::open("sim", &SimSettings::default()).unwrap();
+    let limits = Limits::for_travel(rig.description().travel);
+    let built_in = palpate_drivers::sim::calibration(SimProfile::Lab);
+    let own = Calibration { name: "cell of July".into(), ..built_in.clone() };
+    save_document(folder.path(), &own).unwrap();
+    let doubt = "the calibration of July is too old";
+    let id = format!("{} (built in)", built_in.name);
+    let request = WorkbenchRequest {
+        built_in: Some(built_in),
+        doubts: vec![doubt.into()],
+        ..WorkbenchRequest::of(rig, own, limits, TimeScale::Max)
+    };
+    let options = WindowOptions { settings: None, ..WindowOptions::from_request(request) };
+    let mut flow = WindowFlow::open_on(options, folder);
+    flow.click("Run");
+    assert!(flow.says(doubt) && !flow.is_enabled("Start  F5"));
+    flow.click("Calibration");
+    flow.wait_for_words(&id);
+    flow.click(&id);
+    flow.window.key_press(Key::F6);
+    flow.window.run_steps(3);
+    flow.click("Run");
+    assert!(!flow.says(doubt) && flow.is_enabled("Start  F5"));
 }

@@ -120,7 +120,7 @@ fn open_rig(name: &str) -> Result<WorkbenchRequest, String> {
     let limits = Limits::for_travel(rig.description().travel);
     let calibration = palpate_drivers::sim::calibration(settings.profile);
     Ok(WorkbenchRequest {
-        to_acknowledge: vec!["the calibration is old".into()],
+        doubts: vec!["the calibration is old".into()],
         ..WorkbenchRequest::of(rig, calibration, limits, TimeScale::Max)
     })
 }

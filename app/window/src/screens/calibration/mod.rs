@@ -12,7 +12,7 @@ use eframe::egui::{Button, Context, Key, TextEdit, Ui, vec2};
 use palpate_analysis::calibrations::{
     CalibrationOverview, CalibrationView, read, store_calibration,
 };
-use palpate_analysis::daily::DAILY_CHECK;
+use palpate_analysis::daily::is_daily_check_run;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -29,18 +29,19 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 
 pub struct CalibrationScreen {
     library: Result<PathBuf, String>,
-    /// The one with which the rig was opened, and the rig's name.
-    own: (Calibration, String),
+    /// The one with which the rig was opened and the one that comes with it, and the rig's name.
+    own: (Vec<Calibration>, String),
     shelved: BackgroundTask<CalibrationOverview>,
     chosen: usize,
     name: String,
+    /// What became of the last save is to be scrolled into sight: the list above it has grown meanwhile.
+    is_news: bool,
 }
 
 /// The session of a run that measured a calibration, or why there is none to save.
 pub fn calibration_session(run: Option<&RunView>) -> Result<&Path, String> {
     let has_weighed = |run: &&RunView| {
-        let is_check = run.plan_name == DAILY_CHECK;
-        !is_check && run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh)
+        !is_daily_check_run(run) && run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh)
     };
     let Some(run) = run.filter(has_weighed) else {
         return Err("the last run measured no calibration; measure a calibration first".into());
@@ -58,12 +59,15 @@ pub fn calibration_session(run: Option<&RunView>) -> Result<&Path, String> {
 impl CalibrationScreen {
     fn new(workbench: &Workbench) -> Self {
         let rig = &workbench.snapshot.rig.description.name;
+        let opened_with = std::iter::once(&workbench.bench.calibration);
+        let own = opened_with.chain(&workbench.built_in).cloned().collect();
         Self {
             library: workbench.library.clone(),
             name: format!("cell of {rig}"),
-            own: (workbench.bench.calibration.clone(), rig.clone()),
+            own: (own, rig.clone()),
             shelved: BackgroundTask::default(),
             chosen: 0,
+            is_news: false,
         }
     }
 
@@ -88,11 +92,11 @@ impl CalibrationScreen {
     }
 
     /// The chosen calibration, or why it cannot be used now.
-    fn usable(&self, workbench: &Workbench) -> Result<&Calibration, String> {
+    fn usable(&self, workbench: &Workbench) -> Result<&CalibrationView, String> {
         let one = self.shown_one().ok_or("the library is not read yet")?;
         workbench.free_verdict()?;
         require(one.calibration != workbench.bench.calibration, "it is in use")?;
-        one.details.as_ref().map(|_| &one.calibration).map_err(Clone::clone)
+        one.details.as_ref().map(|_| one).map_err(Clone::clone)
     }
 }
 
@@ -133,10 +137,15 @@ impl Screen for CalibrationScreen {
         if reason_button(ui, "Save calibration of last run", vec2(150.0, 28.0), &verdict) {
             commands.push(UiCommand::KeepCalibration);
         }
-        match self.shelved.answer().and_then(|answer| answer.as_ref().ok()?.stored.as_ref()) {
-            Some(Ok(id)) => quiet_ui(ui, format!("saved as {id}")),
-            Some(Err(reason)) => alarm_ui(ui, format!("Not saved: {reason}")),
-            None => {}
+        let said = ui.scope(|ui| {
+            match self.shelved.answer().and_then(|answer| answer.as_ref().ok()?.stored.as_ref()) {
+                Some(Ok(id)) => sentence_ui(ui, format!("saved as {id}")),
+                Some(Err(reason)) => alarm_ui(ui, format!("Not saved: {reason}")),
+                None => {}
+            }
+        });
+        if std::mem::take(&mut self.is_news) {
+            said.response.scroll_to_me(None);
         }
     }
 
@@ -187,6 +196,7 @@ impl Screen for CalibrationScreen {
         else {
             return;
         };
+        self.is_news = stored.is_some();
         let is_it = |one: &CalibrationView| match stored {
             Some(Ok(id)) => one.entry.id == *id,
             _ => one.calibration == workbench.bench.calibration,
@@ -212,10 +222,9 @@ impl Screen for CalibrationScreen {
 
     /// New sessions are read with the calibration that is chosen.
     fn work(&mut self, _ctx: &Context, workbench: &mut Workbench) {
-        let Ok(calibration) = self.usable(workbench).cloned() else { return };
-        if let Ok(curve) = calibration.curve() {
-            workbench.bench.calibration = calibration;
-            workbench.bench.curve = curve;
+        let Ok(one) = self.usable(workbench) else { return };
+        let (calibration, doubts) = (one.calibration.clone(), one.doubts.clone());
+        if workbench.bench.take_calibration(calibration, doubts).is_ok() {
             workbench.form.forget();
         }
     }

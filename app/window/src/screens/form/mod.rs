@@ -6,9 +6,9 @@ pub use field::{LabelField, ParamField};
 
 use crate::command::ManualMove;
 use crate::widgets::require;
-use palpate_analysis::daily::{DAILY_CHECK, DailyCheckGate, needs_daily_check};
+use palpate_analysis::daily::{DAILY_CHECK, DailyCheckGate, is_daily_check, needs_daily_check};
 use palpate_analysis::protocol_sources::ProtocolSource;
-use palpate_model::calibration::{Calibration, CalibrationCurve};
+use palpate_model::calibration::{Calibration, CalibrationCurve, CalibrationError};
 use palpate_model::metadata::{METADATA_KEYS, SessionLabels};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::file::{Protocol, ProtocolProblem, built_in};
@@ -31,6 +31,8 @@ pub struct RunSetup {
     pub calibration: Calibration,
     /// Of the calibration.
     pub curve: CalibrationCurve,
+    /// Reasons to doubt the calibration, to be acknowledged with the others.
+    pub doubts: Vec<String>,
     pub limits: Limits,
     /// What must be acknowledged before any run, such as a daily check that failed.
     pub to_acknowledge: Vec<String>,
@@ -38,7 +40,7 @@ pub struct RunSetup {
 
 /// Why the weight of a daily check proves nothing with this calibration.
 fn uncheckable(plan: &Plan, calibration: &Calibration) -> Option<String> {
-    let is_check = plan.name == DAILY_CHECK;
+    let is_check = is_daily_check(plan);
     let mut masses = plan.steps.iter().filter_map(|planned| match &planned.step {
         Step::Weigh(weigh) if is_check && weigh.mass_g > 0.0 => Some(weigh.mass_g),
         _ => None,
@@ -51,7 +53,23 @@ fn uncheckable(plan: &Plan, calibration: &Calibration) -> Option<String> {
 impl RunSetup {
     /// What must be acknowledged before a plan: nothing where it touches no specimen, as a daily check does.
     pub fn to_acknowledge_for(&self, plan: &Plan) -> Vec<String> {
-        if needs_daily_check(plan) { self.to_acknowledge.clone() } else { Vec::new() }
+        if needs_daily_check(plan) { self.all_to_acknowledge() } else { Vec::new() }
+    }
+
+    /// What must be acknowledged before a run that touches a specimen.
+    pub fn all_to_acknowledge(&self) -> Vec<String> {
+        self.to_acknowledge.iter().chain(&self.doubts).cloned().collect()
+    }
+
+    /// Takes another calibration, with the reasons to doubt it in place of those to doubt the one before.
+    pub fn take_calibration(
+        &mut self,
+        calibration: Calibration,
+        doubts: Vec<String>,
+    ) -> Result<(), CalibrationError> {
+        self.curve = calibration.curve()?;
+        (self.calibration, self.doubts) = (calibration, doubts);
+        Ok(())
     }
 
     /// Takes over what a daily check that was just made has to say of runs, in place of what one before said.
@@ -191,7 +209,7 @@ impl ProtocolForm {
             // Only the built-in plans are known to touch nothing.
             let has_file = self.file.is_some();
             let acknowledgements = if has_file {
-                bench.to_acknowledge.clone()
+                bench.all_to_acknowledge()
             } else {
                 bench.to_acknowledge_for(&written.plan)
             };
@@ -294,7 +312,7 @@ impl ProtocolForm {
         let plan = protocol.and_then(|protocol| protocol.plan(&manual.values)).map_err(words)?;
         let preview = preview(&plan, &rig.description, &bench.limits, &bench.curve, rig.is_homed);
         // A button of a manual move acknowledges nothing.
-        if let (true, Some(reason)) = (needs_daily_check(&plan), bench.to_acknowledge.first()) {
+        if let Some(reason) = bench.to_acknowledge_for(&plan).first() {
             return Err(format!(
                 "{reason}; run the daily check, or acknowledge this on the Run screen, where the protocol {} makes the same move",
                 manual.protocol

@@ -11,6 +11,7 @@ fn bench() -> (RigDescription, RunSetup) {
     let bench = RunSetup {
         curve: calibration.curve().unwrap(),
         calibration,
+        doubts: Vec::new(),
         limits: Limits::for_travel(rig.description().travel),
         to_acknowledge: Vec::new(),
     };
