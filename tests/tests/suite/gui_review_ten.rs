@@ -354,11 +354,11 @@ fn two_views_are_seen_at_once_and_the_panels_fold_away() {
     assert_eq!(sees(&flow), [true, true]);
     flow.window.check_accessibility();
     assert!(flow.says("Time zero at") && flow.says("Session in front"));
-    flow.window.get_all_by_label("Whole width").next().unwrap().click();
+    flow.click("Whole width");
     flow.window.run_steps(3);
     assert!(!flow.says("Time zero at") && !flow.says("Session in front"));
     assert_eq!(sees(&flow), [true, true]);
-    flow.window.get_all_by_label("One view").next().unwrap().click();
+    flow.click("One view");
     flow.window.run_steps(3);
     assert_eq!(sees(&flow), [false, true], "the view that was split off");
     flow.click("Whole width");

@@ -1,16 +1,19 @@
 //! The view as it stands as a figure: copied as a picture, or saved by the same painters as those of reports.
 
 use super::groups::{Coloring, SessionGroup, groups};
+use super::middle::tool_ui;
 use super::side_by_side::{LIKE_TEXT, fitted_over_depth};
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::{ReviewScreen, View};
 use crate::plots::over_depth::loop_for_figure;
 use crate::plots::stretches::Stretches;
-use crate::widgets::{NamedControl, alarm_ui, quiet_ui};
+use crate::theme::icon_text;
+use crate::widgets::{alarm_ui, quiet_ui};
 use crate::workers::review::{Quantity, ReviewRecording};
 use crate::workers::{BackgroundTask, Dialog, Job};
 use eframe::egui::{ColorImage, Context, Ui};
 use egui_plot::PlotPoint;
+use lucide_icons::Icon;
 use palpate_analysis::report::panels::FigurePanels;
 use palpate_analysis::session_actions::{ActionReport, SessionDocument, write_document};
 use palpate_figures::drawing::Drawing;
@@ -178,12 +181,12 @@ impl ReviewScreen {
 
     /// Draws the buttons, where the view has a figure.
     pub(super) fn figure_ui(&mut self, ui: &mut Ui) {
-        if ui.button("Copy figure").named("Copy figure").clicked() {
+        if tool_ui(ui, icon_text(Icon::Copy), "Copy figure", "to the clipboard") {
             self.update_hidden();
             let figure = self.pending_figure();
             self.figure.copy(figure, ui.ctx());
         }
-        if ui.button("Save figure...").named("Save figure").clicked() {
+        if tool_ui(ui, icon_text(Icon::Save), "Save figure", "as .svg or .png") {
             self.update_hidden();
             let figure = self.pending_figure();
             self.figure.save(figure, ui.ctx());

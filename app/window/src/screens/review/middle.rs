@@ -4,6 +4,7 @@ use super::keys::ViewMove;
 use super::session_list::{CommonParts, color_of};
 use super::side_by_side::fitted_ink;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
+use super::tiles::ViewTiles;
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
@@ -58,6 +59,14 @@ impl ReviewScreen {
         ui.spacing_mut().item_spacing.x = 2.0;
         // The tabs below stay where they are in views without tools.
         ui.set_min_height(TOOL.y);
+        if tool_ui(ui, icon_text(Icon::UnfoldHorizontal), "Whole width", "W") {
+            self.is_wide = !self.is_wide;
+        }
+        let hint = "all views behind their tabs again";
+        if self.tiles.is_split() && tool_ui(ui, icon_text(Icon::Square), "One view", hint) {
+            self.tiles = ViewTiles::default();
+            self.tiles.bring(self.view);
+        }
         let seen = std::iter::once(self.view).chain(self.tiles.seen());
         if let Some(view) = seen.into_iter().find(|view| view.has_axes()) {
             self.moves_ui(ui, view);
@@ -70,6 +79,7 @@ impl ReviewScreen {
     }
 
     fn moves_ui(&mut self, ui: &mut Ui, view: View) {
+        ui.separator();
         let word = |text: &str| RichText::new(text);
         for (text, name, key, to) in [
             (icon_text(Icon::ZoomIn), "Zoom in", "+", ViewMove::ZoomIn),

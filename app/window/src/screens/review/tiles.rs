@@ -84,11 +84,8 @@ impl ViewTiles {
 /// Draws the tiles of a screen, which they are taken out of as long.
 struct Drawn<'a> {
     screen: &'a mut ReviewScreen,
-    is_split: bool,
     /// A view that is to have a tile of its own.
     split_off: Option<View>,
-    /// All views are to be behind their tabs again.
-    is_joined: bool,
 }
 
 impl Behavior<View> for Drawn<'_> {
@@ -125,9 +122,6 @@ impl Behavior<View> for Drawn<'_> {
         tabs: &Tabs,
         _: &mut f32,
     ) {
-        if tool_ui(ui, icon_text(Icon::UnfoldHorizontal), "Whole width", "W") {
-            self.screen.is_wide = !self.screen.is_wide;
-        }
         let active = tabs.active.and_then(|id| tiles.get_pane(&id).copied());
         if let Some(view) = active.filter(|_| tabs.children.len() > 1) {
             let hint = format!("shows {view} beside the other views");
@@ -135,10 +129,10 @@ impl Behavior<View> for Drawn<'_> {
                 self.split_off = Some(view);
             }
         }
-        let hint = "all views behind their tabs again";
-        if self.is_split && tool_ui(ui, icon_text(Icon::Square), "One view", hint) {
-            self.is_joined = true;
-        }
+    }
+
+    fn tab_title_spacing(&self, _: &Visuals) -> f32 {
+        6.0
     }
 
     fn tab_bar_height(&self, _: &Style) -> f32 {
@@ -191,16 +185,11 @@ impl ReviewScreen {
     pub(super) fn tiles_ui(&mut self, ui: &mut Ui) {
         let is_beside = ui.available_width() > ROOM_BESIDE;
         let mut tiles = std::mem::take(&mut self.tiles);
-        let is_split = tiles.is_split();
-        let mut drawn = Drawn { screen: self, is_split, split_off: None, is_joined: false };
+        let mut drawn = Drawn { screen: self, split_off: None };
         tiles.0.ui(&mut drawn, ui);
-        let (split_off, is_joined) = (drawn.split_off, drawn.is_joined);
-        if let Some(view) = split_off {
+        if let Some(view) = drawn.split_off {
             tiles.split_off(view, is_beside);
             self.view = view;
-        } else if is_joined {
-            tiles = ViewTiles::default();
-            tiles.bring(self.view);
         }
         // A tile may have been dragged over the view that keys and tools moved.
         let seen = tiles.seen();
