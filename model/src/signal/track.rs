@@ -140,6 +140,17 @@ impl SignalTrack {
         value.is_finite().then_some(value)
     }
 
+    /// The mean of a quantity over the column of so many samples, a power of two, that has a place; `None` without a
+    /// number there.
+    pub fn column_mean(&self, quantity: usize, place: TrackPosition, column: usize) -> Option<f64> {
+        let pyramid = self.segments.get(place.segment)?.columns.get(quantity)?;
+        let mut mean = None;
+        pyramid.columns(place.within, place.within + 1, column, |_, found| {
+            mean = found.map(|found| f64::from(found.mean));
+        });
+        mean
+    }
+
     /// The lowest and the highest value of a quantity between two samples, the second excluded, each with its
     /// time; `None` without a number there.
     pub fn extremes(&self, quantity: usize, from: usize, to: usize) -> Option<[(f64, f64); 2]> {
@@ -369,6 +380,7 @@ mod tests {
             let value = track.value(0, place);
             let known = Some(f64::from(raw[expected].1)).filter(|one| one.is_finite());
             assert_eq!(value, known);
+            assert_eq!(track.column_mean(0, place, 1), known);
             let (a, b) = (random.below(raw.len()), random.below(raw.len()));
             let (from, to) = (a.min(b), a.max(b));
             let own = raw[from..to].iter().filter(|one| one.1.is_finite());

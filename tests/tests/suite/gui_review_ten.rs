@@ -164,9 +164,15 @@ fn sessions_side_by_side_have_one_cursor_that_reads_the_force_of_each() {
         };
         let first = contacts(&session.entries)[0].after_sample as usize;
         let at = t + seconds(first);
-        // The words have three decimals, so the sample may be a neighbour.
+        // The words have three decimals, so the sample may be a neighbour. What is read is the mean of the column that has
+        // it, of a power of two of samples.
         let near = (0..session.rows.len()).filter(|index| (seconds(*index) - at).abs() < 0.0025);
-        let forces: Vec<f64> = near.filter_map(|index| session.rows[index].force).collect();
+        let mean = |index: usize, size: usize| {
+            let own = &session.rows[index / size * size..][..size];
+            own.iter().filter_map(|row| row.force).sum::<f64>() / size as f64
+        };
+        let columns = near.flat_map(|index| (6..11).map(move |power| (index, 1 << power)));
+        let forces: Vec<f64> = columns.map(|(index, size)| mean(index, size)).collect();
         let read: Vec<f64> = values_read(&flow, &session_name(&session.manifest));
         assert!(!read.is_empty() && !forces.is_empty());
         // Three decimals of a newton are read.
@@ -296,12 +302,14 @@ fn parameters_are_sorted_and_an_outlier_is_named() {
         ("liver 2, SD", second.std_dev.unwrap()),
         ("difference, liver 2 \u{2212} liver 1", difference.value),
         ("difference, ± 95 %", difference.half_width),
+        ("difference, % of liver 1", 100.0 * difference.value / first.mean.abs()),
     ];
     for (row, (words, value)) in all_rows(&flow).iter().zip(stated) {
         let number = row.split(&format!("{head} ")).nth(1).and_then(|rest| rest.split(';').next());
         let read: f64 = number.and_then(|number| number.parse().ok()).expect(row);
-        // The table has at least five decimals of this parameter.
-        assert!(row.starts_with(words) && (read - value).abs() < 1e-5, "{row}: {words} {value}");
+        // The table has at least five decimals of this parameter, and one of percents.
+        let digits = if words.contains('%') && !words.contains('±') { 0.051 } else { 1e-5 };
+        assert!(row.starts_with(words) && (read - value).abs() < digits, "{row}: {words} {value}");
     }
     let sorted = |flow: &WindowFlow| -> Vec<String> {
         all_rows(flow).into_iter().filter(|words| !is_of_groups(words)).collect()

@@ -12,8 +12,9 @@ const LINE: [f32; 2] = [5.5, 9.0];
 const LANE_ROOM: f32 = 9.0;
 /// Height of the numbers below.
 const NUMBERS: f32 = 20.0;
-/// Least distance of two numbers, and room around the dots at the edges.
-const NUMBER: f32 = 46.0;
+/// Usual distance of two numbers, the least gap between them, and room around the dots at the edges.
+const NUMBER: f32 = 30.0;
+const GAP: f32 = 6.0;
 const EDGE: f32 = 8.0;
 const RADIUS: f32 = 3.5;
 const ARROW: f32 = 3.0;
@@ -152,23 +153,33 @@ pub fn distribution_ui(
 fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64) -> f32) {
     let tokens = tokens_of(ui);
     let font = TextStyle::Small.resolve(ui.style());
-    let count = f64::from((ground.width() / NUMBER).clamp(1.0, 5.0));
-    let step = round_up((high - low) / count);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    let mut free = ground.left();
-    for mark in first..=last {
-        let value = mark as f64 * step;
-        let x = across(value);
+    let marks = |count: f64| {
+        let step = round_up((high - low) / count);
+        let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+        let mark = |mark: i64| {
+            let value = mark as f64 * step;
+            let text = in_print(&number_text(value, step));
+            let galley = ui.painter().layout_no_wrap(text, font.clone(), tokens.text_quiet);
+            let at = pos2(across(value), ground.bottom() + 2.0);
+            let mut own = Align2::CENTER_TOP.anchor_size(at, galley.size());
+            // A number at an edge moves inwards.
+            let over =
+                (own.right() - ground.right()).max(0.0) - (ground.left() - own.left()).max(0.0);
+            own = own.translate(vec2(-over, 0.0));
+            (at.x, own, galley)
+        };
+        (first..=last).map(mark).collect::<Vec<_>>()
+    };
+    let has_room = |marks: &[(f32, Rect, _)]| {
+        marks.windows(2).all(|two| two[0].1.right() + GAP < two[1].1.left())
+    };
+    // The finest step whose numbers stand apart.
+    let most = (ground.width() / NUMBER).ceil().clamp(1.0, 6.0) as u32;
+    let counts = (1..=most).rev().map(|count| marks(f64::from(count)));
+    let Some(found) = counts.into_iter().find(|marks| has_room(marks)) else { return };
+    for (x, own, galley) in found {
         ui.painter().vline(x, ground.y_range(), Stroke::new(1.0, tokens.line));
-        let text = in_print(&number_text(value, step));
-        let at = pos2(x, ground.bottom() + 2.0);
-        let galley = ui.painter().layout_no_wrap(text, font.clone(), tokens.text_quiet);
-        let own = Align2::CENTER_TOP.anchor_size(at, galley.size());
-        // A number that would touch its neighbour or leave the strip is left to its line.
-        if own.left() >= free && own.right() <= ground.right() {
-            ui.painter().galley(own.min, galley, tokens.text_quiet);
-            free = own.right() + 4.0;
-        }
+        ui.painter().galley(own.min, galley, tokens.text_quiet);
     }
 }
 

@@ -7,9 +7,10 @@ use crate::widgets::tokens_of;
 use crate::workers::Job;
 use crate::workers::review::Quantity;
 use eframe::egui::{
-    Color32, ColorImage, Context, Rect, Shape, TextureHandle, TextureOptions, Ui, vec2,
+    Align2, Color32, ColorImage, Context, Rect, RichText, Shape, TextureHandle, TextureOptions, Ui,
+    vec2,
 };
-use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, PlotUi, Points};
+use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, PlotUi, Points, Text};
 use palpate_model::signal::polyline::{PixelCoverage, PolylineReducer};
 use palpate_model::signal::track::SignalTrack;
 use std::sync::Arc;
@@ -38,6 +39,8 @@ pub struct DepthLine<'a> {
     pub name: &'a str,
     pub track: &'a SignalTrack,
     pub key: DepthLineKey,
+    /// Drawn over it, with its ink and width: the means of the samples, and a fit.
+    pub over: [(&'a [Vec<PlotPoint>], Color32, f32); 2],
     /// Depth and force at the cursors A and B.
     pub cursors: [Option<[f64; 2]>; 2],
 }
@@ -179,12 +182,16 @@ impl DepthLines {
             plot_ui.set_plot_bounds_x(x[0]..=x[1]);
             plot_ui.set_plot_bounds_y(y[0]..=y[1]);
             self.paint(plot_ui, lines);
-            for line in lines.iter().rev() {
+            for (number, line) in lines.iter().enumerate().rev() {
                 for (name, place) in ["A", "B"].into_iter().zip(line.cursors) {
-                    if let Some([depth, force]) = place {
-                        let at = vec![PlotPoint::new(depth, force)];
-                        let mark = Points::new(name, PlotPoints::Owned(at));
-                        plot_ui.points(mark.radius(4.0).color(tokens.text).allow_hover(false));
+                    let Some([depth, force]) = place else { continue };
+                    let at = PlotPoint::new(depth, force);
+                    let mark = Points::new(name, PlotPoints::Owned(vec![at]));
+                    plot_ui.points(mark.radius(4.0).color(tokens.text).allow_hover(false));
+                    if number == 0 {
+                        let words = RichText::new(format!(" {name}")).strong();
+                        let text = Text::new(name, at, words).anchor(Align2::LEFT_BOTTOM);
+                        plot_ui.text(text.color(tokens.text).allow_hover(false));
                     }
                 }
             }
@@ -221,6 +228,14 @@ impl DepthLines {
                     .id((line.key.id, number))
                     .color(line.key.color);
                 plot_ui.line(drawn.width(1.2).allow_hover(false));
+            }
+            for (layer, (stretches, color, width)) in line.over.into_iter().enumerate() {
+                for (number, stretch) in stretches.iter().enumerate() {
+                    let drawn = Line::new(line.name, PlotPoints::Borrowed(stretch))
+                        .id((line.key.id, layer, number))
+                        .color(color);
+                    plot_ui.line(drawn.width(width).allow_hover(false));
+                }
             }
         }
     }

@@ -2,6 +2,7 @@
 //! the first.
 
 use super::middle::head_ui;
+use super::session_list::CommonParts;
 use super::subject::ReviewSubject;
 use super::{ReviewScreen, View};
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
@@ -65,18 +66,20 @@ impl CycleRows {
             return;
         }
         self.key = versions.collect();
-        self.rows = subjects.iter().flat_map(rows_of).collect();
+        let common = CommonParts::of(subjects.iter());
+        let rows = |one: &ReviewSubject| rows_of(one, &common.short_name(one));
+        self.rows = subjects.iter().flat_map(rows).collect();
     }
 }
 
-fn rows_of(subject: &ReviewSubject) -> Vec<TableRow> {
+fn rows_of(subject: &ReviewSubject, name: &str) -> Vec<TableRow> {
     let own = cycles(subject);
     let first = own.first().map(|cycle| cycle.peak_n);
     let row = |cycle: &Cycle| {
         let share = first.filter(|first| *first != 0.0);
         let share = share.map(|first| 100.0 * cycle.peak_n / first);
         let cells = vec![
-            subject.name.clone(),
+            name.to_owned(),
             cycle.number.to_string(),
             format!("{:.2}", cycle.t[0]),
             format!("{:.2}", cycle.t[1] - cycle.t[0]),
@@ -109,7 +112,7 @@ impl ReviewScreen {
             Column::numbers("cycle", 50.0),
             Column::numbers("begins (s)", 84.0),
             Column::numbers("lasts (s)", 84.0),
-            Column::numbers("peak force (N)", 104.0),
+            Column::numbers("peak force (N)", 112.0),
             Column::numbers("depth there (mm)", 120.0),
             Column::numbers("of the first (%)", 110.0),
         ];
@@ -157,6 +160,7 @@ impl ReviewScreen {
                     rows: cycle.rows,
                     color: *color,
                 },
+                over: [(&[], *color, 0.0); 2],
                 cursors: [None; 2],
             })
             .collect();

@@ -31,6 +31,8 @@ const COLUMNS: usize = 3;
 /// Width of a line in px, and room above for the names of phases as a share of the height of lines.
 const WIDTH: f64 = 1.3;
 const NAMES: f64 = 0.1;
+/// Opacity of samples behind the line of their means.
+const SAMPLES: f64 = 0.3;
 /// Loops are drawn for a plot of this size: finer than any of the figure.
 const LOOP_PIXELS: [f64; 2] = [900.0, 400.0];
 
@@ -112,8 +114,9 @@ impl PendingFigure {
         for (plot, track, ink) in self.loops {
             let found = loop_for_figure(&track, self.shown, LOOP_PIXELS);
             let found = within(found.iter().map(Vec::as_slice), self.shown);
-            // Behind what is there: fits, and sessions in front.
-            self.panels.plots[plot].series.splice(0..0, lines(found, ink));
+            // Behind what is there: means, fits, and sessions in front.
+            let samples = lines(found, ink).map(|one| PlotSeries { opacity: SAMPLES, ..one });
+            self.panels.plots[plot].series.splice(0..0, samples);
         }
         self.panels.drawing()
     }
@@ -141,6 +144,15 @@ const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 fn over_time(stretches: &Stretches, x: [f64; 2], ink: Ink) -> impl Iterator<Item = PlotSeries> {
     lines(within(stretches.parts(), [x, EVERYWHERE]), ink)
+}
+
+/// The line of a session's means over depth, as far as it is within the axes.
+fn loop_means(
+    subject: &ReviewSubject,
+    shown: [[f64; 2]; 2],
+) -> impl Iterator<Item = PlotSeries> + use<> {
+    let stretches = subject.loop_means.stretches.iter().map(Vec::as_slice);
+    lines(within(stretches, shown), ink_of(subject))
 }
 
 /// The areas of samples behind the lines of their means, as far as they are within the axes.
@@ -230,7 +242,10 @@ impl ReviewScreen {
                 panels.title = "Sessions over depth".into();
                 panels.words = "force over depth from contact".into();
                 let [x, y] = self.depth_axes();
-                panels.plots = vec![Plot::new("", x, y)];
+                let shown = [self.depth.shown(), self.force.shown()];
+                let means = |one: &ReviewSubject| loop_means(one, shown).collect::<Vec<_>>();
+                let series = self.subjects.iter().rev().flat_map(means);
+                panels.plots = vec![Plot::new("", x, y).with(series)];
                 panels.legend = named;
                 loops = self.subjects.iter().map(|one| (0, track(one), ink_of(one))).collect();
             }
@@ -335,7 +350,9 @@ impl ReviewScreen {
         if self.side.is_over_depth {
             let over = fitted_over_depth(subject);
             let over = within(std::iter::once(over.as_slice()), [self.depth.shown(), y]);
-            return Plot::new(&title, depth, force_axis).with(lines(over, fitted_ink(subject)));
+            let means = loop_means(subject, [self.depth.shown(), y]);
+            let series = means.chain(lines(over, fitted_ink(subject)));
+            return Plot::new(&title, depth, force_axis).with(series);
         }
         let shown = [self.time.shown(), y];
         let force = &subject.lines[Quantity::Force as usize];

@@ -1,13 +1,16 @@
 //! Rows of the table of parameters that state a group: mean, standard deviation, and the difference of two groups.
 
 use super::groups::SessionGroup;
-use super::parameters::Parameters;
+use super::parameters::{Parameters, fixed};
 use crate::widgets::{Emphasis, TableCell, TableLine};
 use palpate_analysis::group_statistics::{GroupStatistics, MeanDifference, mean_difference};
 use palpate_analysis::report::text;
 
 /// What the rows mean.
 pub(super) const GROUPS_MEANING: &str = "Mean and standard deviation (SD) of the values of a group, and the difference of the means of two groups with half of its 95 % interval (Welch). Presses on one specimen repeat a measurement of it: the interval is that of the specimens shown, not of all specimens of their kind.";
+
+/// Standard deviations from zero of a mean of which a difference is stated in percent.
+const FAR: f64 = 3.0;
 
 /// Rows for the groups with a session that is fitted; none where no group has two.
 pub(super) fn group_lines(found: &Parameters, groups: &[SessionGroup]) -> Vec<TableLine> {
@@ -45,6 +48,16 @@ pub(super) fn group_lines(found: &Parameters, groups: &[SessionGroup]) -> Vec<Ta
             lines.push(line(found, ["difference", &of], value, Emphasis::Marked));
             let half = differences.iter().map(|one| Some(one.as_ref()?.half_width)).collect();
             lines.push(line(found, ["difference", "± 95 %"], half, Emphasis::Plain));
+            let share =
+                |(difference, first): (&Option<MeanDifference>, &Option<GroupStatistics>)| {
+                    let (difference, first) = (difference.as_ref()?, first.as_ref()?);
+                    // Of a mean that is not told from zero, a share says nothing.
+                    let is_far = first.mean.abs() > FAR * first.std_dev?;
+                    is_far.then(|| format!("{:+.1}", 100.0 * difference.value / first.mean.abs()))
+                };
+            let shares: Vec<Option<String>> = differences.iter().zip(a).map(share).collect();
+            let of = format!("% of {first}");
+            lines.push(text_line(found, ["difference", &of], &shares, Emphasis::Plain));
         }
     }
     lines
@@ -56,15 +69,27 @@ fn line(
     values: Vec<Option<f64>>,
     emphasis: Emphasis,
 ) -> TableLine {
+    let decimals = found.decimals.iter();
+    let texts = values.iter().zip(decimals);
+    let texts: Vec<_> =
+        texts.map(|(value, decimals)| value.map(|value| fixed(value, *decimals))).collect();
+    text_line(found, [group, what], &texts, emphasis)
+}
+
+fn text_line(
+    found: &Parameters,
+    [group, what]: [&str; 2],
+    texts: &[Option<String>],
+    emphasis: Emphasis,
+) -> TableLine {
     let mut words = format!("{group}, {what}");
     let cell = |text: String| TableCell { text, emphasis, ..TableCell::default() };
     let mut cells = vec![cell(group.to_owned()), cell(what.to_owned())];
-    for ((value, parameter), decimals) in values.iter().zip(&found.names).zip(&found.decimals) {
-        let text = value.map(|value| format!("{value:.decimals$}")).unwrap_or_default();
-        if value.is_some() {
+    for (text, parameter) in texts.iter().zip(&found.names) {
+        if let Some(text) = text {
             words += &format!("; {} {text}", text::parameter_head(parameter));
         }
-        cells.push(cell(text));
+        cells.push(cell(text.clone().unwrap_or_default()));
     }
     // The residual is no property of a specimen.
     cells.push(TableCell::default());

@@ -2,19 +2,20 @@
 
 use super::keys::ViewMove;
 use super::session_list::{CommonParts, color_of};
-use super::side_by_side::fitted_ink;
+use super::side_by_side::{fitted_ink, fitted_over_depth};
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, ReviewSubject};
 use super::tiles::ViewTiles;
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{DepthLine, DepthLineKey};
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimeMark, TimePanel, over_time_ui};
-use crate::plots::stretches::{FIT_WIDTH, FRONT_WIDTH, WIDTH};
+use crate::plots::stretches::{AREA, FIT_WIDTH, FRONT_WIDTH, WIDTH};
 use crate::plots::style::AXIS_WIDTH;
 use crate::theme::icon_text;
 use crate::widgets::{NamedControl, heading_ui, quiet_ui, sentence_ui, tokens_of};
 use crate::workers::review::{Quantity, ReviewRecording};
 use eframe::egui::{Button, RichText, Ui, Vec2, WidgetText, vec2};
+use egui_plot::PlotPoint;
 use lucide_icons::Icon;
 use palpate_model::signal::track::SignalTrack;
 
@@ -41,7 +42,11 @@ impl ReviewScreen {
         match view {
             View::OverTime | View::OverDepth => {
                 self.remarks_ui(ui, view);
-                self.readout_ui(ui);
+                let column = match view {
+                    View::OverTime => self.thinned.max(1),
+                    _ => self.front().map_or(1, |front| front.loop_means.column),
+                };
+                self.readout_ui(ui, column);
                 match view {
                     View::OverTime => self.over_time_ui(ui),
                     _ => self.over_depth_ui(ui),
@@ -239,27 +244,44 @@ impl ReviewScreen {
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = tokens_of(ui);
-        let cursors = |track: &SignalTrack, shift: f64| {
+        let cursors = |track: &SignalTrack, shift: f64, column: usize| {
             self.cursors.map(|cursor| {
                 let place = track.place(cursor? + shift)?;
-                let value = |quantity: Quantity| track.value(quantity as usize, place);
+                let value =
+                    |quantity: Quantity| track.column_mean(quantity as usize, place, column);
                 Some([value(Quantity::Depth)?, value(Quantity::Force)?])
             })
         };
+        let fits: Vec<[Vec<PlotPoint>; 1]> = (self.subjects.iter().enumerate())
+            .map(|(index, one)| [if index == 0 { fitted_over_depth(one) } else { Vec::new() }])
+            .collect();
+        let width = if self.subjects.len() > 1 { [FRONT_WIDTH, WIDTH] } else { [WIDTH; 2] };
         let line = |subject: &'_ ReviewSubject| DepthLineKey {
             id: subject.id,
             version: subject.fifths(),
             rows: [0, subject.recording.track.len()],
-            color: color_of(tokens, subject),
+            color: color_of(tokens, subject).gamma_multiply(AREA),
         };
         let lines: Vec<DepthLine<'_>> = self
             .subjects
             .iter()
-            .map(|subject| DepthLine {
+            .zip(&fits)
+            .enumerate()
+            .map(|(index, (subject, fit))| DepthLine {
                 name: &subject.name,
                 track: &subject.recording.track,
                 key: line(subject),
-                cursors: cursors(&subject.recording.track, subject.shift(self.time_origin)),
+                over: {
+                    let color = color_of(tokens, subject);
+                    let means =
+                        (subject.loop_means.stretches.as_slice(), color, width[index.min(1)]);
+                    [means, (fit, fitted_ink(tokens, color), FIT_WIDTH)]
+                },
+                cursors: cursors(
+                    &subject.recording.track,
+                    subject.shift(self.time_origin),
+                    subject.loop_means.column,
+                ),
             })
             .collect();
         let gesture = self.depth_lines.ui(ui, &lines, [&self.depth, &self.force]);

@@ -1,7 +1,7 @@
 //! The parameters of every session's fit: how each is distributed, and a table that sorts by any of them.
 
 use super::ReviewScreen;
-use super::deviation::{OUTLIER, deviations, median};
+use super::deviation::{Deviation, deviations, median};
 use super::group_rows::{GROUPS_MEANING, group_lines};
 use super::groups::{Grouping, SessionGroup, groups};
 use super::session_list::{color_of, doubt_of};
@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// A tint is full at so many robust standard deviations.
 const FULL: f64 = 5.0;
 /// What tint, triangle and ring mean.
-const MEANING: &str = "A dot stands in its statistical 95 % interval: errors of a calibration move all sessions that it reads alike. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: a tint is full at 5, and beyond 3.5 a triangle in the cell and a ring around the dot mark an outlier. Groups of fewer than four sessions have no tint.";
+const MEANING: &str = "A dot stands in its statistical 95 % interval: errors of a calibration move all sessions that it reads alike. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: together with the value's own standard uncertainty. A tint is full at 5. A triangle in the cell and a ring around the dot mark an outlier: so far from the others is a value in one of twenty groups by chance (8.0 in a group of five, 4.6 in one of ten). Groups of fewer than four sessions have no tint.";
 /// Least width of the strip of a parameter, and most of the names of groups, in points.
 const STRIP_MIN: f32 = 130.0;
 const LANE_NAME_MAX: f32 = 120.0;
@@ -45,8 +45,8 @@ pub(super) struct ParameterTable {
 /// A parameter of a session.
 struct Value {
     parameter: FittedParameter,
-    /// From the median of its group in robust standard deviations.
-    deviation: Option<f64>,
+    /// From the median of its group.
+    deviation: Option<Deviation>,
 }
 
 impl Value {
@@ -58,7 +58,7 @@ impl Value {
     /// How far it is, in words; empty where it is near.
     fn deviation_words(&self) -> String {
         match self.deviation {
-            Some(far) if far.abs() >= OUTLIER => {
+            Some(Deviation { distance: far, is_outlier: true }) => {
                 let side = if far > 0.0 { "above" } else { "below" };
                 format!(", {:.1} robust standard deviations {side} the median", far.abs())
             }
@@ -67,16 +67,27 @@ impl Value {
     }
 
     fn is_outlier(&self) -> bool {
-        self.deviation.is_some_and(|far| far.abs() >= OUTLIER)
+        self.deviation.is_some_and(|deviation| deviation.is_outlier)
     }
 
     fn cell(&self, decimals: usize, tokens: &Tokens) -> TableCell {
-        let text = format!("{:.decimals$}", self.parameter.value);
-        let Some(far) = self.deviation else { return TableCell::text(text) };
+        let text = fixed(self.parameter.value, decimals);
+        let Some(Deviation { distance: far, .. }) = self.deviation else {
+            return TableCell::text(text);
+        };
         let emphasis = Emphasis::Tinted(tokens.deviation((far / FULL) as f32));
         let mark = if far > 0.0 { Glyph::Up } else { Glyph::Down };
         let glyph = self.is_outlier().then_some(mark);
         TableCell { glyph, text, emphasis }
+    }
+}
+
+/// A number with so many decimals; zero has no sign.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if !rest.contains(|digit: char| ('1'..='9').contains(&digit)) => rest.to_owned(),
+        _ => text,
     }
 }
 
@@ -142,8 +153,13 @@ impl Parameters {
                 let found: Vec<Option<&FittedParameter>> =
                     fitted.iter().map(|(_, report)| report.parameter(&name.name)).collect();
                 let known = |one: &&FittedParameter| is_finding(one);
-                let values: Vec<f64> =
-                    found.iter().flatten().copied().filter(known).map(|one| one.value).collect();
+                let values: Vec<(f64, f64)> = found
+                    .iter()
+                    .flatten()
+                    .copied()
+                    .filter(known)
+                    .map(|one| (one.value, one.std_error.unwrap_or(0.0)))
+                    .collect();
                 let mut far = deviations(&values).unwrap_or_default().into_iter();
                 let value = |one: Option<&FittedParameter>| {
                     let one = one?;

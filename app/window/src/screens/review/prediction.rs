@@ -3,10 +3,11 @@
 use super::ReviewScreen;
 use super::middle::head_ui;
 use super::session_list::color_of;
+use super::side_by_side::fitted_ink;
 use crate::plots::navigate::AxisRange;
 use crate::plots::over_time::{TimeBackdrop, TimeLayer, TimePanel, over_time_ui};
 use crate::plots::stretches::LineWindow;
-use crate::plots::stretches::WIDTH;
+use crate::plots::stretches::{FIT_WIDTH, WIDTH};
 use crate::widgets::{alarm_ui, quiet_ui, require, task_ui, tokens_of};
 use crate::workers::review::Quantity;
 use crate::workers::review::fit::{MODELLED, RESIDUAL, SessionPrediction, predict};
@@ -42,6 +43,7 @@ impl ReviewScreen {
             _ => return,
         };
         ui.label(sentence(&found, &known, &other));
+        quiet_ui(ui, "colour: measured; thin line: predicted");
         let Some(index) = self.subjects.iter().position(|one| one.name == other) else {
             return quiet_ui(
                 ui,
@@ -76,7 +78,13 @@ impl ReviewScreen {
         let force = TimePanel {
             id: "Predicted force",
             axis: Quantity::Force.axis(),
-            layers: vec![measured, layer("predicted", tokens.limit, modelled)],
+            layers: vec![
+                measured,
+                TimeLayer {
+                    width: FIT_WIDTH,
+                    ..layer("predicted", fitted_ink(tokens, color), modelled)
+                },
+            ],
             has_zero: false,
         };
         let residual = TimePanel {

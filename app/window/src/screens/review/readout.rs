@@ -23,14 +23,14 @@ struct CursorReadout {
 }
 
 impl CursorReadout {
-    /// `shift`: time of the session in s at the axis' zero.
-    fn of(subject: &ReviewSubject, cursors: [Option<f64>; 2], shift: f64) -> Self {
+    /// `shift`: time of the session in s at the axis' zero; `column`: samples of whose mean a value is, as the line is.
+    fn of(subject: &ReviewSubject, cursors: [Option<f64>; 2], shift: f64, column: usize) -> Self {
         let track = &subject.recording.track;
         let places = cursors.map(|cursor| track.place(cursor? + shift));
         Self {
             t: places.map(|place| Some(place?.t - shift)),
             values: Quantity::ALL
-                .map(|quantity| places.map(|place| track.value(quantity as usize, place?))),
+                .map(|quantity| places.map(|p| track.column_mean(quantity as usize, p?, column))),
         }
     }
 
@@ -86,19 +86,21 @@ const COLUMN: f32 = 88.0;
 
 impl ReviewScreen {
     /// Draws a line for each cursor and one for their difference, a column for each quantity.
-    pub(super) fn readout_ui(&self, ui: &mut Ui) {
+    /// Values are means of so many samples, as the lines are.
+    pub(super) fn readout_ui(&self, ui: &mut Ui, column: usize) {
         let Some(front) = self.front() else { return };
         if self.cursors == [None; 2] {
             quiet_ui(ui, "set cursors A and B to read values and differences");
             return;
         }
-        let readout = CursorReadout::of(front, self.cursors, front.shift(self.time_origin));
+        let readout = CursorReadout::of(front, self.cursors, front.shift(self.time_origin), column);
         let columns = readout.columns();
         let is_wide = columns.len() as f32 * COLUMN + 200.0 < ui.available_width();
         let ink = tokens_of(ui).text_quiet;
         let quiet = |words: &str| RichText::new(words).small().color(ink);
         Grid::new("readout").spacing(vec2(16.0, 0.0)).min_row_height(19.0).show(ui, |ui| {
-            ui.label("");
+            let means = format!("mean of {column}");
+            ui.label(if column > 1 { quiet(&means) } else { RichText::default() });
             for column in &columns {
                 ui.label(quiet(&format!("{} ({})", column.name, column.unit)));
             }

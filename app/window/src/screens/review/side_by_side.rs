@@ -6,7 +6,7 @@ use super::session_list::color_of;
 use super::subject::{LINE_MODELLED, ReviewSubject};
 use crate::plots::over_depth::{DepthLine, DepthLineKey, DepthLines};
 use crate::plots::small::{HEAD, SmallGrid, SmallPlot, SmallResponse, small_plot_ui};
-use crate::plots::stretches::{FIT_WIDTH, WIDTH};
+use crate::plots::stretches::{AREA, FIT_WIDTH, WIDTH};
 use crate::theme::Tokens;
 use crate::widgets::{NamedControl, quiet_ui, tokens_of};
 use crate::workers::review::Quantity;
@@ -16,7 +16,7 @@ use eframe::egui::{
     Align2, Color32, Id, Label, Pos2, Rect, RichText, Role, ScrollArea, Sense, Stroke, StrokeKind,
     TextStyle, Ui, UiBuilder, Vec2, WidgetInfo, pos2, vec2,
 };
-use egui_plot::{Line, PlotPoint, PlotPoints};
+use egui_plot::PlotPoint;
 use std::collections::BTreeMap;
 
 /// Height of the heading of a group in points.
@@ -66,6 +66,13 @@ struct CursorValue {
 }
 
 fn value_at(subject: &ReviewSubject, cursor: SharedCursor, shift: f64) -> Option<CursorValue> {
+    // What is read is what the line shows: the mean of a column.
+    let column = match cursor {
+        SharedCursor::Time(_) => {
+            subject.lines[Quantity::Force as usize].drawn().samples_per_column.max(1)
+        }
+        SharedCursor::Depth(_) => subject.loop_means.column,
+    };
     let track = &subject.recording.track;
     let t = match cursor {
         SharedCursor::Time(t) => t + shift,
@@ -73,7 +80,7 @@ fn value_at(subject: &ReviewSubject, cursor: SharedCursor, shift: f64) -> Option
     };
     let [first, last] = track.span()?;
     let place = track.place(t).filter(|_| (first..=last).contains(&t))?;
-    let value = |quantity: Quantity| track.value(quantity as usize, place);
+    let value = |quantity: Quantity| track.column_mean(quantity as usize, place, column);
     Some(CursorValue {
         t: place.t - shift,
         depth: value(Quantity::Depth),
@@ -242,9 +249,16 @@ impl ReviewScreen {
                 id: subject.id,
                 version: subject.fifths(),
                 rows: [0, track.len()],
-                color,
+                color: color.gamma_multiply(AREA),
             };
-            let line = DepthLine { name: &subject.name, track, key, cursors: [None; 2] };
+            let over = [fitted_over_depth(subject)];
+            let line = DepthLine {
+                name: &subject.name,
+                track,
+                key,
+                over: [(&subject.loop_means.stretches, color, WIDTH), (&over, fitted, FIT_WIDTH)],
+                cursors: [None; 2],
+            };
             let lines = self.side.depth_lines.entry(subject.id).or_default();
             lines.sharing = sharing;
             if lines.is_busy() || busy < SEARCHES_MAX {
@@ -252,12 +266,9 @@ impl ReviewScreen {
             } else {
                 ui.ctx().request_repaint_after(std::time::Duration::from_millis(30));
             }
-            let over = fitted_over_depth(subject);
             let drawn = &*lines;
-            let response = small_plot_ui(ui, plot, place, axes, move |plot_ui| {
+            let response = small_plot_ui(ui, plot, place, axes, |plot_ui| {
                 drawn.paint(plot_ui, &[line]);
-                let over = Line::new("fitted", PlotPoints::Owned(over)).color(fitted);
-                plot_ui.line(over.width(FIT_WIDTH).allow_hover(false));
             });
             lines.measure(ui, response.rect);
             response

@@ -6,8 +6,11 @@ use crate::widgets::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
 use crate::workers::review::{Quantity, ReviewRecording, Stage, TimeOrigin};
 use eframe::egui::Context;
+use egui_plot::PlotPoint;
 use palpate_analysis::report::session::SessionNameParts;
 use palpate_model::rig::Phase;
+use palpate_model::signal::pyramid::column_for;
+use palpate_model::signal::track::SignalTrack;
 use std::sync::Arc;
 
 /// A session that is shown.
@@ -24,8 +27,49 @@ pub struct ReviewSubject {
     /// None before a fit was asked for.
     pub fit: Option<Result<Arc<SessionFit>, String>>,
     pub lines: [Stretches; 6],
+    pub loop_means: LoopMeans,
     /// Lowest and highest of each quantity, found for so many samples.
     ends: (u64, [Option<[f64; 2]>; 4]),
+}
+
+/// The line through the means of force over those of depth.
+#[derive(Debug)]
+pub struct LoopMeans {
+    /// Stretches without a gap.
+    pub stretches: Vec<Vec<PlotPoint>>,
+    /// Samples of whose mean a point is.
+    pub column: usize,
+}
+
+/// Points of such a line: far more than a loop bends, and few enough for a frame.
+const LOOP_POINTS: f64 = 2000.0;
+
+impl Default for LoopMeans {
+    fn default() -> Self {
+        Self { stretches: Vec::new(), column: 1 }
+    }
+}
+
+impl LoopMeans {
+    fn of(track: &SignalTrack) -> Self {
+        let Some(span) = track.span() else { return Self::default() };
+        let means = |quantity: Quantity| {
+            let mut found = Vec::new();
+            track.columns(quantity as usize, span, LOOP_POINTS, |_, column| found.push(column));
+            found
+        };
+        let (depths, forces) = (means(Quantity::Depth), means(Quantity::Force));
+        let pairs = depths.into_iter().zip(forces).map(|(depth, force)| {
+            let (depth, force) = (depth?, force?);
+            Some(PlotPoint::new(f64::from(depth.mean), f64::from(force.mean)))
+        });
+        let pairs: Vec<Option<PlotPoint>> = pairs.collect();
+        let stretches = pairs.split(Option::is_none).filter(|part| !part.is_empty());
+        Self {
+            stretches: stretches.map(|part| part.iter().copied().flatten().collect()).collect(),
+            column: column_for(track.len(), LOOP_POINTS),
+        }
+    }
 }
 
 /// Places of the fit's lines behind those of the quantities.
@@ -46,6 +90,7 @@ impl ReviewSubject {
             recording,
             fit: None,
             lines: Default::default(),
+            loop_means: LoopMeans::default(),
             ends: (0, [None; 4]),
         }
     }
@@ -72,6 +117,7 @@ impl ReviewSubject {
             Some([found[0].1, found[1].1])
         });
         self.ends = (self.recording.version, ends);
+        self.loop_means = LoopMeans::of(track);
     }
 
     /// Begins to read it, if it waits for that.

@@ -102,6 +102,21 @@ impl Behavior<View> for Drawn<'_> {
         UiResponse::None
     }
 
+    fn tab_title_for_tile(&mut self, tiles: &Tiles<View>, id: TileId) -> WidgetText {
+        let mut names = Vec::new();
+        let mut left = vec![id];
+        while let Some(next) = left.pop() {
+            match tiles.get(next) {
+                Some(Tile::Pane(view)) => names.push(view.name()),
+                Some(Tile::Container(container)) => {
+                    left.extend(container.active_children(tiles));
+                }
+                None => {}
+            }
+        }
+        names.join(" + ").into()
+    }
+
     fn tab_title_for_pane(&mut self, view: &View) -> WidgetText {
         view.name().into()
     }
