@@ -264,6 +264,8 @@ fn heads(flow: &WindowFlow) -> Vec<(String, Rect)> {
 #[test]
 fn parameters_are_sorted_and_an_outlier_is_named() {
     let (mut flow, paths) = ten_sessions();
+    // Room for groups and sessions.
+    flow.window.set_size(vec2(1600.0, 1200.0));
     fit_all(&mut flow);
     flow.click("Parameters");
     flow.window.run_steps(3);

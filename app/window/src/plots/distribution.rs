@@ -173,13 +173,18 @@ fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64)
     let has_room = |marks: &[(f32, Rect, _)]| {
         marks.windows(2).all(|two| two[0].1.right() + GAP < two[1].1.left())
     };
-    // The finest step whose numbers stand apart.
-    let most = (ground.width() / NUMBER).ceil().clamp(1.0, 6.0) as u32;
-    let counts = (1..=most).rev().map(|count| marks(f64::from(count)));
-    let Some(found) = counts.into_iter().find(|marks| has_room(marks)) else { return };
-    for (x, own, galley) in found {
+    // The finest step whose numbers stand apart; without two such, the first and the last of a coarse one.
+    let most = (ground.width() / NUMBER).ceil().clamp(2.0, 6.0) as u32;
+    let mut counts = (2..=most).rev().map(|count| marks(f64::from(count)));
+    let found = counts.find(|marks| marks.len() > 1 && has_room(marks));
+    let found = found.unwrap_or_else(|| marks(3.0));
+    let last = found.len().saturating_sub(1);
+    let is_tight = !has_room(&found);
+    for (number, (x, own, galley)) in found.into_iter().enumerate() {
         ui.painter().vline(x, ground.y_range(), Stroke::new(1.0, tokens.line));
-        ui.painter().galley(own.min, galley, tokens.text_quiet);
+        if !is_tight || number == 0 || number == last {
+            ui.painter().galley(own.min, galley, tokens.text_quiet);
+        }
     }
 }
 

@@ -221,7 +221,7 @@ impl ReviewScreen {
         let room = 0.5 * ui.available_height();
         let strips = strips.max_height(room);
         let mut chosen = strips.show(ui, |ui| self.strips_ui(ui, room, &groups, &found)).inner;
-        let words = "bars: statistical 95 % intervals; tint: below (blue) or above (orange) the median of its group; red ring: outlier; black ring: in front";
+        let words = "bars: 95 % intervals; tint: blue below the median, orange above; red ring: outlier; black: in front";
         let words = RichText::new(words).color(tokens_of(ui).text_quiet).small();
         ui.add(Label::new(words).truncate()).on_hover_text(format!("{MEANING}\n{GROUPS_MEANING}"));
         found.sort(&self.subjects, self.parameter_table.sorted);
