@@ -128,7 +128,7 @@ mod tests {
         assert_eq!(wide.columns, 5);
         assert!((wide.cell(4).right() - 1100.0).abs() < 0.01);
         assert!((wide.plot.y - HEIGHT_SHARE * wide.plot.x).abs() < 0.01);
-        let narrow = grid(400.0, 600.0, &[5, 5]);
+        let narrow = grid(300.0, 600.0, &[5, 5]);
         assert_eq!((narrow.columns, narrow.plot.y), (1, HEIGHT_MIN));
         // Two plots do not have a third of the width each.
         assert_eq!(grid(1100.0, 600.0, &[1, 2]).columns, 2);
