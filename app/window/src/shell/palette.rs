@@ -168,8 +168,8 @@ fn is_found(name: &str, typed: &str) -> bool {
 /// How far a name is from what is typed: the same, or the same behind "Go to", or begun with it, or only containing it.
 fn distance(name: &str, typed: &str) -> u8 {
     let (name, typed) = (name.to_lowercase(), typed.trim().to_lowercase());
-    let own = name.strip_prefix("go to ").unwrap_or(&name);
-    match (own == typed, own.starts_with(&typed)) {
+    let [own, typed] = [&name, &typed].map(|one| one.strip_prefix("go to ").unwrap_or(one));
+    match (own == typed, own.starts_with(typed)) {
         _ if typed.is_empty() => 0,
         (true, _) => 0,
         (false, true) => 1,
@@ -186,6 +186,9 @@ mod tests {
         let names = ["Show Result: judge the run and see its parameters", "Go to Parameters"];
         assert!(distance(names[1], "parameters") < distance(names[0], "parameters"));
         assert_eq!(names.map(|name| distance(name, "")), [0, 0]);
+        let near = |name| distance(name, "Go to session");
+        assert!(near("Go to session") < near("Go to session start"));
+        assert!(near("Go to session start") < near("Go to a colour for each session"));
     }
 
     #[test]
