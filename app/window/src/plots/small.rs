@@ -7,7 +7,7 @@ use eframe::egui::{Id, Rangef, Rect, Ui, UiBuilder, Vec2, vec2};
 use egui_plot::{Plot, PlotUi};
 
 /// Least width of a plot in points, and its height for a width.
-const WIDTH_MIN: f32 = 150.0;
+const WIDTH_MIN: f32 = 138.0;
 const HEIGHT_MIN: f32 = 84.0;
 const HEIGHT_SHARE: f32 = 0.75;
 /// Between two plots, and the line above each, in points.
