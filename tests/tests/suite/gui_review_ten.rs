@@ -304,7 +304,7 @@ fn parameters_are_sorted_and_an_outlier_is_named() {
         ("liver 2, SD", second.std_dev.unwrap()),
         ("difference, liver 2 \u{2212} liver 1", difference.value),
         ("difference, ± 95 %", difference.half_width),
-        ("difference, % of liver 1", 100.0 * difference.value / first.mean.abs()),
+        ("difference, % of liver 1", 100.0 * difference.value / first.mean),
     ];
     for (row, (words, value)) in all_rows(&flow).iter().zip(stated) {
         let number = row.split(&format!("{head} ")).nth(1).and_then(|rest| rest.split(';').next());

@@ -177,7 +177,8 @@ fn numbers_ui(ui: &Ui, [low, high]: [f64; 2], ground: Rect, across: &dyn Fn(f64)
     let most = (ground.width() / NUMBER).ceil().clamp(2.0, 6.0) as u32;
     let mut counts = (2..=most).rev().map(|count| marks(f64::from(count)));
     let found = counts.find(|marks| marks.len() > 1 && has_room(marks));
-    let found = found.unwrap_or_else(|| marks(3.0));
+    let coarse = || (2..=most).map(|count| marks(f64::from(count))).find(|marks| marks.len() > 1);
+    let found = found.or_else(coarse).unwrap_or_else(|| marks(1.0));
     let last = found.len().saturating_sub(1);
     let is_tight = !has_room(&found);
     for (number, (x, own, galley)) in found.into_iter().enumerate() {

@@ -53,7 +53,7 @@ pub(super) fn group_lines(found: &Parameters, groups: &[SessionGroup]) -> Vec<Ta
                     let (difference, first) = (difference.as_ref()?, first.as_ref()?);
                     // Of a mean that is not told from zero, a share says nothing.
                     let is_far = first.mean.abs() > FAR * first.std_dev?;
-                    is_far.then(|| format!("{:+.1}", 100.0 * difference.value / first.mean.abs()))
+                    is_far.then(|| format!("{:+.1}", 100.0 * difference.value / first.mean))
                 };
             let shares: Vec<Option<String>> = differences.iter().zip(a).map(share).collect();
             let of = format!("% of {first}");

@@ -295,6 +295,8 @@ impl ReviewScreen {
         let measured =
             vec2(if has_y { taken.x } else { known.x }, if has_x { taken.y } else { known.y });
         if (measured - known).abs().max_elem() > 0.5 || self.side.axes.is_none() {
+            // A plot measures its axes while it is drawn: what was drawn with others is not shown.
+            ui.ctx().request_discard("the axes of small plots were measured");
             ui.ctx().request_repaint();
         }
         self.side.axes = Some(measured);
