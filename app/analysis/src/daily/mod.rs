@@ -19,7 +19,7 @@ use std::time::SystemTime;
 
 pub use trends::{CONTROL_CHECKS, PastCheck, control_limits, past_checks, trends};
 
-/// Name of the built-in protocol. A file may have it too: [`is_daily_check`] tells them apart.
+/// Name of the built-in protocol. A file may have it too: [`is_daily_check`] distinguishes them.
 pub const DAILY_CHECK: &str = "daily-check";
 /// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
 const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];

@@ -11,7 +11,7 @@ use palpate_model::calibration::{
 };
 use palpate_model::units::{Newtons, Volts};
 
-/// Name of a stretch where the signal tells little of the force.
+/// Name of a stretch where the signal says little of the force.
 pub const FLAT_STRETCH: &str = "flat stretch";
 /// Places along the force axis: more than a pixel has.
 const PLACES: u32 = 900;
@@ -173,7 +173,7 @@ mod tests {
         let color = |one: &PlotSeries| one.ink.of(&LIGHT).to_array();
         let colors: BTreeSet<[u8; 4]> = uncertainty.series.iter().map(color).collect();
         assert_eq!(colors.len(), uncertainty.series.len());
-        // Greys next to the ink of the text are not told apart.
+        // Greys next to the ink of the text are not distinct.
         let dark = colors.iter().filter(|color| color[..3].iter().all(|one| *one < 0x60));
         assert_eq!(dark.count(), 1, "{colors:?}");
     }

@@ -23,7 +23,7 @@ pub struct LineWindow {
 pub const WIDTH: f32 = 1.4;
 pub const FRONT_WIDTH: f32 = 2.2;
 pub const FIT_WIDTH: f32 = 0.9;
-/// Share of the colour of a line in the area around it, so that ten of them over each other are still told apart.
+/// Share of the colour of a line in the area around it, so that ten of them over each other stay distinct.
 pub const AREA: f32 = 0.22;
 
 /// Columns of samples without a gap in between them: their lowest, highest and mean values.

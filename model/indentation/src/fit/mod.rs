@@ -31,7 +31,7 @@ pub struct RelaxationFit {
 pub enum RelaxationFitError {
     #[error(transparent)]
     History(#[from] HistoryError),
-    #[error("{count} terms are asked for; give 1 to {TERMS_MAX}")]
+    #[error("the number of terms is {count}; give 1 to {TERMS_MAX}")]
     TermCount { count: usize },
     #[error("there are {forces} forces for {depths} depths; give one for each")]
     Lengths { forces: usize, depths: usize },

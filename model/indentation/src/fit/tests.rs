@@ -143,8 +143,8 @@ fn bad_records_are_refused_in_words() {
     let message = |forces: &[f64], count: usize| {
         fit_relaxation(law, &history, forces, count).unwrap_err().to_string()
     };
-    assert_eq!(message(&forces, 0), "0 terms are asked for; give 1 to 5");
-    assert_eq!(message(&forces, 6), "6 terms are asked for; give 1 to 5");
+    assert_eq!(message(&forces, 0), "the number of terms is 0; give 1 to 5");
+    assert_eq!(message(&forces, 6), "the number of terms is 6; give 1 to 5");
     assert!(message(&forces[1..], 1).contains("give one for each"));
     let mut holes = forces.clone();
     holes[7] = f64::NAN;

@@ -259,16 +259,16 @@ fn bad_histories_and_moduli_are_refused_in_words() {
     assert!(PowerLaw::new(CONE, 0.7).is_err());
 }
 
-/// The recursion is the integral over the whole past, at each sample anew.
+/// The recursion is the integral over the whole past, taken again at each sample.
 #[test]
 fn any_modulus_is_integrated_as_the_recursion_does() {
     let path = history(&[(0.0, 0.0), (1.0, 0.3), (1.5, 0.3), (2.0, 0.1)], 60);
     let past = DepthHistory::new(&path.0, &path.1).unwrap();
     for shape in [PUNCH, SPHERE, CONE] {
         let forces = forces_of(lee_radok_force, shape, &three_terms(), &path);
-        let anew = lee_radok_force_of(law(shape), |t| three_terms().modulus(t), &past);
-        for (force, anew) in forces.iter().zip(&anew) {
-            assert!((force - anew).abs() < 1e-12, "{shape:?}: {force} {anew}");
+        let direct = lee_radok_force_of(law(shape), |t| three_terms().modulus(t), &past);
+        for (force, direct) in forces.iter().zip(&direct) {
+            assert!((force - direct).abs() < 1e-12, "{shape:?}: {force} {direct}");
         }
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn group_lines(found: &Parameters, groups: &[SessionGroup]) -> Vec<Ta
             let share =
                 |(difference, first): (&Option<MeanDifference>, &Option<GroupStatistics>)| {
                     let (difference, first) = (difference.as_ref()?, first.as_ref()?);
-                    // Of a mean that is not told from zero, a share says nothing.
+                    // A share of a mean that may be zero says nothing.
                     let is_far = first.mean.abs() > FAR * first.std_dev?;
                     is_far.then(|| format!("{:+.1}", 100.0 * difference.value / first.mean))
                 };

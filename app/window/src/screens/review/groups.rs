@@ -27,7 +27,7 @@ palpate_model::named! {
     }
 }
 
-/// So many sessions are told apart by colours of their own; of more, groups have one each where nothing was chosen.
+/// So many sessions have colours of their own; of more, groups have one each where nothing was chosen.
 const OWN_COLORS: usize = 4;
 
 /// Sessions of one group, by their places among those shown, in the order in which they were added.

@@ -43,7 +43,9 @@ impl ReviewScreen {
             View::OverTime | View::OverDepth => {
                 self.remarks_ui(ui, view);
                 let column = match view {
-                    View::OverTime => self.thinned.max(1),
+                    View::OverTime => {
+                        self.front().map_or(1, |front| front.column(&self.quantities))
+                    }
                     _ => self.front().map_or(1, |front| front.loop_means.column),
                 };
                 self.readout_ui(ui, column);

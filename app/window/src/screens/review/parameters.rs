@@ -28,7 +28,7 @@ use std::sync::Arc;
 /// A tint is full at so many robust standard deviations.
 const FULL: f64 = 5.0;
 /// What tint, triangle and ring mean.
-const MEANING: &str = "A dot stands in its statistical 95 % interval: errors of a calibration move all sessions that it reads alike. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation: together with the value's own standard uncertainty. A tint is full at 5. A triangle in the cell and a ring around the dot mark an outlier: so far from the others is a value in one of twenty groups by chance (8.0 in a group of five, 4.6 in one of ten). Groups of fewer than four sessions have no tint.";
+const MEANING: &str = "A dot stands in its statistical 95 % interval: errors of a calibration move all sessions that it reads alike. The distance from the median of the group is in robust standard deviations, 1.4826 times the median absolute deviation together with the value's own standard uncertainty. A tint is full at 5. A triangle in the cell and a ring around the dot mark an outlier: so far from the others is a value in one of twenty groups by chance (8.0 in a group of five, 4.6 in one of ten). Groups of fewer than four sessions have no tint.";
 /// Least width of the strip of a parameter, and most of the names of groups, in points.
 const STRIP_MIN: f32 = 130.0;
 const LANE_NAME_MAX: f32 = 120.0;

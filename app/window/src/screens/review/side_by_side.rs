@@ -68,9 +68,7 @@ struct CursorValue {
 fn value_at(subject: &ReviewSubject, cursor: SharedCursor, shift: f64) -> Option<CursorValue> {
     // What is read is what the line shows: the mean of a column.
     let column = match cursor {
-        SharedCursor::Time(_) => {
-            subject.lines[Quantity::Force as usize].drawn().samples_per_column.max(1)
-        }
+        SharedCursor::Time(_) => subject.column(&[Quantity::Force]),
         SharedCursor::Depth(_) => subject.loop_means.column,
     };
     let track = &subject.recording.track;

@@ -201,6 +201,12 @@ impl ReviewSubject {
         self.lines[place].update(&self.recording.track, place, window);
     }
 
+    /// Samples of whose mean a point of the lines over time is, of the coarsest of these quantities.
+    pub fn column(&self, quantities: &[Quantity]) -> usize {
+        let drawn = quantities.iter().map(|one| self.lines[*one as usize].drawn());
+        drawn.map(|one| one.samples_per_column).fold(1, usize::max)
+    }
+
     /// The same of its fit.
     pub fn update_fit(&mut self, window: LineWindow) {
         let Some(Ok(fit)) = &self.fit else { return };
