@@ -89,8 +89,8 @@ fn a_mesh_is_planned_from_what_is_measured() {
         "[mesh]\nauto = true\n[tolerances]\nshape_mm = 5\nforce_percent = 100\ntick_us = 100000\n";
     std::fs::write(at.path().join("coarse.toml"), coarse).unwrap();
     let run = json(&typed(at.path(), "scene run coarse.toml --json"));
-    assert_eq!(run["nodes"], 51, "{run}");
-    assert_eq!(run["plan"]["mesh"]["nodes"], 51, "{run}");
+    assert_eq!(run["nodes"], run["plan"]["mesh"]["nodes"], "{run}");
+    assert!(run["plan"]["shape_error_mm"].as_f64() <= Some(5.0), "{run}");
     assert_eq!(run["plan"]["inert"][0][0], "MinDist", "{run}");
     // Nothing measured is as exact as this.
     std::fs::write(
@@ -102,8 +102,14 @@ fn a_mesh_is_planned_from_what_is_measured() {
     assert_refused(&none, 1, "no measured scene keeps");
     let bench = json(&typed(at.path(), "scene bench coarse.toml --json"));
     assert_eq!(bench["command"], "scene-bench");
-    assert_eq!(bench["curves"]["meshes"][0]["nodes"], 51);
-    assert_eq!(bench["plan"]["mesh"]["nodes"], 51, "{bench}");
+    let meshes = bench["curves"]["meshes"].as_array().unwrap();
+    let counts: Vec<u64> = meshes.iter().filter_map(|mesh| mesh["nodes"].as_u64()).collect();
+    assert_eq!(counts, [51, 101, 201], "{bench}");
+    // On a busy machine a fine mesh can take less than a coarse one, so the cheapest is looked up. Every error is
+    // within 5 mm together with any cut.
+    let cost = |mesh: &&serde_json::Value| mesh["cost_us"].as_f64().unwrap();
+    let cheapest = meshes.iter().min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap();
+    assert_eq!(bench["plan"]["mesh"]["nodes"], cheapest["nodes"], "{bench}");
     // How much faster the closed form is, `scripts/measure surface` tells.
     let methods = bench["methods"].as_array().unwrap();
     let names: Vec<&str> = methods.iter().filter_map(|one| one["method"].as_str()).collect();

@@ -201,7 +201,9 @@ mod tests {
             budget_us: 1e6,
         };
         let chosen = plan(&needs, &curves, 1.0).unwrap();
-        assert_eq!(chosen.mesh.nodes, 51);
+        // Everything is within 10 mm, and on a busy machine a fine mesh can take less than a coarse one.
+        let cheapest = curves.meshes.iter().min_by(|a, b| a.cost_us.total_cmp(&b.cost_us));
+        assert_eq!(Some(&chosen.mesh), cheapest);
         let ended =
             measure_scene(
                 TradeExtent::Quick,
