@@ -1,145 +1,90 @@
-//! Lowest, highest and mean samples of a recording at several coarsenesses, so that a plot of millions of samples
-//! finds the few it needs without looking at the rest. What is saved, fitted or exported is never thinned.
+//! Lowest, highest and mean of a recording at several coarsenesses, so that a plot of millions of samples finds the few
+//! points it needs without looking at the rest. What is saved, fitted or exported is never thinned.
 //!
-//! A bucket of a level keeps its mean, the places of its lowest and its highest sample in order of time, and whether
-//! samples that are no numbers stand before, between or behind them. The smallest bucket has 16 samples, as
-//! many as are looked through about as fast as a bucket is; each level is coarser by a factor of four.
+//! The smallest bucket has 16 samples, as many as are looked through about as fast as a bucket is; each level is coarser
+//! by a factor of four.
 //!
-//! Memory: 4 bytes a sample for its value, and 12 bytes a bucket, 1 byte a sample over all levels.
+//! Memory: 4 bytes a sample for its value, and 16 bytes a bucket, 1.3 bytes a sample over all levels.
 
 /// Samples in a bucket of the finest level.
 pub const BUCKET: usize = 16;
 /// Buckets of a level in one of the next.
 const FACTOR: usize = 4;
 
-/// Marks that stand in the places of a bucket. Places are below 2^30.
-const BEFORE: u32 = 1 << 31;
-const AFTER: u32 = 1 << 30;
-const BETWEEN: u32 = 1 << 31;
-const PLACE: u32 = AFTER - 1;
-/// No sample at this place.
-const NONE: u32 = PLACE;
-
 /// Most samples in one pyramid.
-pub const SAMPLES_MAX: usize = NONE as usize;
+pub const SAMPLES_MAX: usize = 1 << 30;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PyramidMark {
-    /// A sample: its place and its value.
-    Point(usize, f32),
-    /// Samples that are no numbers: the line breaks.
-    Gap,
-}
-
-/// What a column of samples has between its first and its last number.
+/// What a column of samples has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColumnStatistics {
     pub low: f32,
     pub high: f32,
-    /// Of its numbers. Beside a gap, parts of 16 samples and more count alike, whatever numbers they have.
+    /// Of its numbers.
     pub mean: f32,
     /// It has samples that are no numbers.
     pub has_gap: bool,
 }
 
-/// A bucket: its mean, and its lowest and its highest sample in order of time, the marks of gaps in the highest bits.
+/// Of samples whose count is a power of two: without a number, low is above high and the mean no number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bucket {
-    first: u32,
-    second: u32,
-    /// Not a number where it has none.
+    low: f32,
+    high: f32,
     mean: f32,
-}
-
-/// A sample within a fold, and how many gaps came before it.
-#[derive(Clone, Copy)]
-struct FoldSample {
-    index: u32,
-    value: f32,
+    /// Samples that are no numbers.
     gaps: u32,
 }
 
-/// Finds the mean, the lowest and the highest of what passes by, the first of equal ones.
-#[derive(Default)]
+/// Takes samples and buckets together.
 struct Fold {
-    low: Option<FoldSample>,
-    high: Option<FoldSample>,
-    gaps: u32,
+    low: f32,
+    high: f32,
     sum: f64,
-    weight: f64,
+    numbers: u32,
+    gaps: u32,
 }
 
 impl Fold {
-    fn gap(&mut self) {
-        self.gaps += 1;
-    }
+    const EMPTY: Self =
+        Self { low: f32::INFINITY, high: f32::NEG_INFINITY, sum: 0.0, numbers: 0, gaps: 0 };
 
-    fn take(&mut self, index: u32, value: f32) {
-        let place = FoldSample { index, value, gaps: self.gaps };
-        if self.low.is_none_or(|low| value < low.value) {
-            self.low = Some(place);
-        }
-        if self.high.is_none_or(|high| value > high.value) {
-            self.high = Some(place);
-        }
-    }
-
-    fn weigh(&mut self, mean: f32, samples: usize) {
-        if mean.is_finite() {
-            self.sum += f64::from(mean) * samples as f64;
-            self.weight += samples as f64;
+    fn add_sample(&mut self, value: f32) {
+        if value.is_finite() {
+            self.low = self.low.min(value);
+            self.high = self.high.max(value);
+            self.sum += f64::from(value);
+            self.numbers += 1;
+        } else {
+            self.gaps += 1;
         }
     }
 
-    /// Not a number without any.
+    fn add_bucket(&mut self, bucket: Bucket, samples: usize) {
+        let numbers = samples as u32 - bucket.gaps;
+        if numbers > 0 {
+            self.low = self.low.min(bucket.low);
+            self.high = self.high.max(bucket.high);
+            self.sum += f64::from(bucket.mean) * f64::from(numbers);
+        }
+        self.numbers += numbers;
+        self.gaps += bucket.gaps;
+    }
+
     fn mean(&self) -> f32 {
-        (self.sum / self.weight) as f32
-    }
-
-    /// The two in order of time, the second none where both are one.
-    fn pair(&self) -> Option<(FoldSample, Option<FoldSample>)> {
-        let (low, high) = (self.low?, self.high?);
-        Some(match low.index.cmp(&high.index) {
-            std::cmp::Ordering::Less => (low, Some(high)),
-            std::cmp::Ordering::Equal => (low, None),
-            std::cmp::Ordering::Greater => (high, Some(low)),
-        })
+        (self.sum / f64::from(self.numbers)) as f32
     }
 
     fn bucket(&self) -> Bucket {
-        let mark = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
-        let Some((first, second)) = self.pair() else {
-            let first = NONE | mark(self.gaps > 0, BEFORE);
-            return Bucket { first, second: NONE, mean: f32::NAN };
-        };
-        let last = second.unwrap_or(first);
-        let marks = mark(first.gaps > 0, BEFORE) | mark(self.gaps > last.gaps, AFTER);
-        Bucket {
-            first: first.index | marks,
-            second: second
-                .map_or(NONE, |second| second.index | mark(second.gaps > first.gaps, BETWEEN)),
-            mean: self.mean(),
-        }
+        Bucket { low: self.low, high: self.high, mean: self.mean(), gaps: self.gaps }
     }
 
-    fn draw(&self, draw: &mut impl FnMut(PyramidMark)) {
-        let Some((first, second)) = self.pair() else {
-            if self.gaps > 0 {
-                draw(PyramidMark::Gap);
-            }
-            return;
-        };
-        let mut gaps = 0;
-        for place in [Some(first), second].into_iter().flatten() {
-            if place.gaps > gaps {
-                draw(PyramidMark::Gap);
-            }
-            gaps = place.gaps;
-            draw(PyramidMark::Point(place.index as usize, place.value));
-        }
-        if self.gaps > gaps {
-            draw(PyramidMark::Gap);
-        }
+    fn statistics(&self) -> Option<ColumnStatistics> {
+        (self.numbers > 0).then(|| ColumnStatistics {
+            low: self.low,
+            high: self.high,
+            mean: self.mean(),
+            has_gap: self.gaps > 0,
+        })
     }
 }
 
@@ -180,112 +125,57 @@ impl Pyramid {
     pub fn extend(&mut self, values: impl IntoIterator<Item = f32>) {
         let room = SAMPLES_MAX - self.values.len().min(SAMPLES_MAX);
         self.values.extend(values.into_iter().take(room));
-        let mut below = self.values.len() / BUCKET;
-        let mut level = 0;
-        while below > 0 {
+        let mut size = BUCKET;
+        for level in 0.. {
+            let whole = self.values.len() / size;
+            if whole == 0 {
+                return;
+            }
             if self.levels.len() == level {
                 self.levels.push(Vec::new());
             }
-            for index in self.levels[level].len()..below {
-                let mut fold = Fold::default();
+            for index in self.levels[level].len()..whole {
+                let mut fold = Fold::EMPTY;
                 match level.checked_sub(1) {
-                    None => self.fold_values(index * BUCKET, (index + 1) * BUCKET, &mut fold),
-                    Some(finer) => (index * FACTOR..(index + 1) * FACTOR)
-                        .for_each(|child| self.fold_bucket(finer, child, &mut fold)),
+                    None => self.fold_values(index * size, size, &mut fold),
+                    Some(finer) => {
+                        let own = &self.levels[finer][index * FACTOR..(index + 1) * FACTOR];
+                        own.iter().for_each(|bucket| fold.add_bucket(*bucket, size / FACTOR));
+                    }
                 }
                 self.levels[level].push(fold.bucket());
             }
-            below /= FACTOR;
-            level += 1;
+            size *= FACTOR;
         }
     }
 
-    fn fold_values(&self, from: usize, to: usize, fold: &mut Fold) {
-        let to = to.min(self.values.len());
-        let from = from.min(to);
-        for (value, index) in self.values[from..to].iter().zip(from as u32..) {
-            if value.is_finite() {
-                fold.take(index, *value);
-                fold.weigh(*value, 1);
-            } else {
-                fold.gap();
-            }
-        }
-    }
-
-    fn fold_bucket(&self, level: usize, index: usize, fold: &mut Fold) {
-        let Some(bucket) = self.levels.get(level).and_then(|own| own.get(index)) else {
-            // Not whole yet: what there is of it stands in the finer ones.
-            match level.checked_sub(1) {
-                None => self.fold_values(index * BUCKET, (index + 1) * BUCKET, fold),
-                Some(finer) => (index * FACTOR..(index + 1) * FACTOR)
-                    .for_each(|child| self.fold_bucket(finer, child, fold)),
-            }
-            return;
-        };
-        fold.weigh(bucket.mean, BUCKET * FACTOR.pow(level as u32));
-        if bucket.first & BEFORE != 0 {
-            fold.gap();
-        }
-        for (place, gap) in [(bucket.first, 0), (bucket.second, BETWEEN)] {
-            if place & PLACE == NONE {
-                continue;
-            }
-            if place & gap != 0 {
-                fold.gap();
-            }
-            let index = place & PLACE;
-            fold.take(index, self.values[index as usize]);
-        }
-        if bucket.first & AFTER != 0 {
-            fold.gap();
-        }
+    fn fold_values(&self, from: usize, count: usize, fold: &mut Fold) {
+        let to = (from + count).min(self.values.len());
+        self.values[from.min(to)..to].iter().for_each(|value| fold.add_sample(*value));
     }
 
     /// Folds a stretch whose ends are multiples of `column`, a power of two.
     fn fold_column(&self, from: usize, column: usize, fold: &mut Fold) {
-        if column < BUCKET {
-            return self.fold_values(from, from + column, fold);
-        }
-        let (mut level, mut size) = (0, BUCKET);
-        while size * FACTOR <= column {
-            (level, size) = (level + 1, size * FACTOR);
-        }
-        for index in from / size..(from + column) / size {
-            if index * size < self.values.len() {
-                self.fold_bucket(level, index, fold);
+        let Some(level) = (column / BUCKET).checked_ilog2().map(|twos| twos / FACTOR.ilog2())
+        else {
+            return self.fold_values(from, column, fold);
+        };
+        let size = BUCKET * FACTOR.pow(level);
+        for at in (from..(from + column).min(self.values.len())).step_by(size) {
+            match self.levels.get(level as usize).and_then(|own| own.get(at / size)) {
+                Some(bucket) => fold.add_bucket(*bucket, size),
+                // Not whole yet: what there is of it stands in the finer ones.
+                None if level == 0 => self.fold_values(at, size, fold),
+                None => (0..FACTOR).for_each(|part| {
+                    self.fold_column(at + part * size / FACTOR, size / FACTOR, fold);
+                }),
             }
         }
     }
 
-    /// Draws the samples of a range: of every `column` samples, a power of two, the lowest and the highest in
-    /// order of time. Columns begin at multiples of `column`, whatever the range, so that a picture that is
-    /// moved does not flicker; those that the range touches are drawn whole. A column of one draws every sample.
-    pub fn draw(&self, from: usize, to: usize, column: usize, mut draw: impl FnMut(PyramidMark)) {
-        let column = column.max(1).next_power_of_two();
-        let to = to.min(self.values.len());
-        if from >= to {
-            return;
-        }
-        if column == 1 {
-            for (value, index) in self.values[from..to].iter().zip(from..) {
-                draw(if value.is_finite() {
-                    PyramidMark::Point(index, *value)
-                } else {
-                    PyramidMark::Gap
-                });
-            }
-            return;
-        }
-        for index in from / column..to.div_ceil(column) {
-            let mut fold = Fold::default();
-            self.fold_column(index * column, column, &mut fold);
-            fold.draw(&mut draw);
-        }
-    }
-
-    /// Hands out the columns that [`Self::draw`] draws of a range, each by the place where it begins; `None` for one
-    /// without a number.
+    /// Hands out the columns of a range, of `column` samples each, a power of two, by the place where each begins; `None`
+    /// for one without a number. Columns begin at multiples of `column`, whatever the range, so that a picture that is
+    /// moved does not flicker; those that the range touches are whole. A column of one is a sample.
     pub fn columns(
         &self,
         from: usize,
@@ -296,35 +186,25 @@ impl Pyramid {
         let column = column.max(1).next_power_of_two();
         let to = to.min(self.values.len());
         for index in from / column..to.div_ceil(column) {
-            let mut fold = Fold::default();
+            let mut fold = Fold::EMPTY;
             self.fold_column(index * column, column, &mut fold);
-            let found = fold.low.zip(fold.high).map(|(low, high)| ColumnStatistics {
-                low: low.value,
-                high: high.value,
-                mean: fold.mean(),
-                has_gap: fold.gaps > 0,
-            });
-            take(index * column, found);
+            take(index * column, fold.statistics());
         }
     }
 
-    /// Places and values of the lowest and the highest sample of a range; `None` without a number in it.
-    pub fn extremes(&self, from: usize, to: usize) -> Option<[(usize, f32); 2]> {
+    /// The lowest and the highest value of a range; `None` without a number in it.
+    pub fn extremes(&self, from: usize, to: usize) -> Option<[f32; 2]> {
         let to = to.min(self.values.len());
-        let mut fold = Fold::default();
+        let mut fold = Fold::EMPTY;
         let mut at = from;
         while at < to {
             // The largest column that begins here and does not reach beyond.
             let room = to - at;
             let column = 1 << at.trailing_zeros().min(room.ilog2());
-            match column {
-                1 => self.fold_values(at, at + 1, &mut fold),
-                _ => self.fold_column(at, column, &mut fold),
-            }
+            self.fold_column(at, column, &mut fold);
             at += column;
         }
-        let found = |place: FoldSample| (place.index as usize, place.value);
-        Some([found(fold.low?), found(fold.high?)])
+        fold.statistics().map(|found| [found.low, found.high])
     }
 }
 

@@ -2,9 +2,9 @@
 //! between the thread that reads and the one that draws.
 //!
 //! Memory: 8 bytes a sample for its time, and for each quantity 4 bytes for its value as an f32, which has the
-//! digits of a 24-bit converter, and 1 byte for its [`Pyramid`].
+//! digits of a 24-bit converter, and 1.3 bytes for its [`Pyramid`].
 
-use super::pyramid::{ColumnStatistics, Pyramid, PyramidMark, column_for};
+use super::pyramid::{ColumnStatistics, Pyramid, column_for};
 use std::sync::Arc;
 
 /// Samples in a segment: as many as the log has in its largest block.
@@ -49,13 +49,6 @@ impl TrackSegment {
         let columns = self.columns.iter().map(Pyramid::bytes).sum::<usize>();
         size_of_val(self.times.as_slice()) + columns
     }
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct DrawStatistics {
-    pub points: usize,
-    /// The most samples that share a lowest and a highest one; 1 where every sample is drawn.
-    pub samples_per_column: usize,
 }
 
 /// A place on a track.
@@ -151,71 +144,52 @@ impl SignalTrack {
         mean
     }
 
-    /// The lowest and the highest value of a quantity between two samples, the second excluded, each with its
-    /// time; `None` without a number there.
-    pub fn extremes(&self, quantity: usize, from: usize, to: usize) -> Option<[(f64, f64); 2]> {
-        let mut found: Option<[(f64, f64); 2]> = None;
-        for (segment, before) in self.segments.iter().zip(&self.before) {
+    /// The lowest and the highest value of a quantity between two samples, the second excluded; `None` without a number
+    /// there.
+    pub fn extremes(&self, quantity: usize, from: usize, to: usize) -> Option<[f64; 2]> {
+        let own = self.segments.iter().zip(&self.before).filter_map(|(segment, before)| {
             let (from, to) = (from.saturating_sub(*before), to.saturating_sub(*before));
-            let Some(column) = segment.columns.get(quantity) else {
-                continue;
-            };
-            if from >= segment.times.len() || to == 0 {
-                continue;
-            }
-            let Some(ends) = column.extremes(from, to) else {
-                continue;
-            };
-            let [low, high] = ends.map(|(index, value)| (segment.times[index], f64::from(value)));
-            found = Some(match found {
-                None => [low, high],
-                Some([lowest, highest]) => [
-                    if low.1 < lowest.1 { low } else { lowest },
-                    if high.1 > highest.1 { high } else { highest },
-                ],
-            });
-        }
-        found
+            segment.columns.get(quantity)?.extremes(from, to)
+        });
+        let joined = own.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        joined.map(|ends| ends.map(f64::from))
     }
 
-    /// Draws a quantity between two times on so many pixels, one sample before and one behind included, so that
-    /// the line reaches the edges: at most two points a pixel, the lowest and the highest of every column in
-    /// order of time, and the first and the last sample of the track. `None` breaks the line.
+    /// The first sample between two, the second excluded, at which a quantity has a value exactly.
+    pub fn first_with(
+        &self,
+        quantity: usize,
+        value: f64,
+        [from, to]: [usize; 2],
+    ) -> Option<TrackPosition> {
+        let mut segments = self.segments.iter().zip(&self.before).enumerate();
+        segments.find_map(|(number, (segment, before))| {
+            let values = segment.values(quantity);
+            let [from, to] = [from, to].map(|at| at.saturating_sub(*before).min(values.len()));
+            let found =
+                values[from..to.max(from)].iter().position(|one| f64::from(*one) == value)?;
+            let within = from + found;
+            Some(TrackPosition {
+                index: before + within,
+                t: segment.times[within],
+                segment: number,
+                within,
+            })
+        })
+    }
+
+    /// The most samples in one of the [columns](Self::columns); 1 where every sample is one.
+    pub fn samples_per_column(&self, quantity: usize, window: [f64; 2], pixels: f64) -> usize {
+        let parts = self.parts(quantity, window, pixels);
+        parts.map(|part| part.size.min(part.column.len())).fold(1, usize::max)
+    }
+
+    /// Hands out a quantity between two times in at most two columns a pixel, each with the times of its first and its
+    /// last sample; `None` for one without a number. One sample before and one behind are included, so that a line
+    /// reaches the edges.
     ///
     /// How wide a column is follows from each segment's own share of the pixels, so that a slow part of a
     /// recording is not thinned for the sake of a fast one.
-    pub fn draw(
-        &self,
-        quantity: usize,
-        window: [f64; 2],
-        pixels: f64,
-        mut draw: impl FnMut(Option<[f64; 2]>),
-    ) -> DrawStatistics {
-        let mut pen = Pen { draw: &mut draw, newest: None, drawn: DrawStatistics::default() };
-        for part in self.parts(quantity, window, pixels) {
-            let SegmentPart { number, column, samples: [start, end], size } = part;
-            let (times, before) = (&self.segments[number].times, self.before[number]);
-            let count = times.len();
-            pen.drawn.samples_per_column = pen.drawn.samples_per_column.max(size.min(count));
-            let values = column.values();
-            // The ends of the recording stay where they are.
-            if number == 0 && start == 0 && values[0].is_finite() {
-                pen.point(0, times[0], values[0]);
-            }
-            column.draw(start, end, size, |mark| match mark {
-                PyramidMark::Point(index, value) => pen.point(before + index, times[index], value),
-                PyramidMark::Gap => pen.gap(),
-            });
-            let is_last = number + 1 == self.segments.len() && end == count;
-            if is_last && values[count - 1].is_finite() {
-                pen.point(before + count - 1, times[count - 1], values[count - 1]);
-            }
-        }
-        pen.drawn
-    }
-
-    /// Hands out the columns that [`Self::draw`] draws, each with the times of its first and its last sample; `None`
-    /// for one without a number.
     pub fn columns(
         &self,
         quantity: usize,
@@ -280,27 +254,6 @@ struct SegmentPart<'a> {
     size: usize,
 }
 
-/// Hands out points, each once.
-struct Pen<'a, F> {
-    draw: &'a mut F,
-    newest: Option<usize>,
-    drawn: DrawStatistics,
-}
-
-impl<F: FnMut(Option<[f64; 2]>)> Pen<'_, F> {
-    fn point(&mut self, index: usize, t: f64, value: f32) {
-        if self.newest.is_none_or(|newest| newest < index) {
-            self.newest = Some(index);
-            self.drawn.points += 1;
-            (self.draw)(Some([t, f64::from(value)]));
-        }
-    }
-
-    fn gap(&mut self) {
-        (self.draw)(None);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -329,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_shows_the_extremes_of_what_is_in_it_and_keeps_the_ends() {
+    fn a_window_shows_the_extremes_of_what_is_in_it() {
         let mut random = SplitMix::seeded(21);
         for _ in 0..60 {
             let count = 1 + random.below(8);
@@ -339,29 +292,27 @@ mod tests {
             let share = |random: &mut SplitMix| random.below(1000) as f64 / 999.0;
             let (a, b) = (share(&mut random), share(&mut random));
             let window = [a.min(b), a.max(b) + 0.01].map(|one| start + one * (end - start + 1e-3));
-            let mut points = Vec::new();
-            let drawn = track.draw(0, window, 500.0, |point| points.extend(point));
-            assert_eq!(drawn.points, points.len());
-            assert!(points.windows(2).all(|pair| pair[0][0] <= pair[1][0]));
-            // Segments that are narrower than a pixel have two points each.
-            assert!(drawn.points <= 2 * (500 + 3 * count), "{}", drawn.points);
+            let most = track.samples_per_column(0, window, 500.0);
+            let mut ends: Option<[f32; 2]> = None;
+            let (mut last, mut columns) = (f64::NEG_INFINITY, 0);
+            track.columns(0, window, 500.0, |times, found| {
+                assert!(last <= times[0] && times[0] <= times[1]);
+                (last, columns) = (times[1], columns + 1);
+                let Some(found) = found else { return };
+                let samples = raw.iter().filter(|one| (times[0]..=times[1]).contains(&one.0));
+                assert!(samples.count() <= most);
+                let [low, high] = ends.unwrap_or([found.low, found.high]);
+                ends = Some([low.min(found.low), high.max(found.high)]);
+            });
+            // Segments that are narrower than a pixel have a column each.
+            assert!(columns <= 2 * 500 + 3 * count, "{columns}");
             let is_in = |t: f64| (window[0]..=window[1]).contains(&t);
             let inside = raw.iter().filter(|one| is_in(one.0) && one.1.is_finite());
-            let high = inside.clone().map(|one| f64::from(one.1)).reduce(f64::max);
-            let low = inside.clone().map(|one| f64::from(one.1)).reduce(f64::min);
+            let inside = inside.map(|one| [one.1; 2]);
             // Columns at the edges may reach beyond: what is shown is at least what is there.
-            let shown = points.iter().map(|point| point[1]);
-            assert!(shown.clone().reduce(f64::max) >= high);
-            assert!(shown.reduce(f64::min) <= low || low.is_none());
-            let whole = [start, end.max(start + 1e-3)];
-            let mut all = Vec::new();
-            track.draw(0, whole, 500.0, |point| all.extend(point));
-            let finite = |one: &&(f64, f32)| one.1.is_finite();
-            for (place, edge) in [(0, raw.first()), (all.len().saturating_sub(1), raw.last())] {
-                let Some((t, value)) = edge.filter(finite) else {
-                    continue;
-                };
-                assert_eq!(all[place], [*t, f64::from(*value)]);
+            if let Some([low, high]) = inside.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) {
+                let shown = ends.unwrap();
+                assert!(shown[0] <= low && shown[1] >= high);
             }
         }
     }
@@ -385,37 +336,18 @@ mod tests {
             let (from, to) = (a.min(b), a.max(b));
             let own = raw[from..to].iter().filter(|one| one.1.is_finite());
             let high = own.map(|one| f64::from(one.1)).reduce(f64::max);
-            assert_eq!(track.extremes(0, from, to).map(|ends| ends[1].1), high);
+            assert_eq!(track.extremes(0, from, to).map(|ends| ends[1]), high);
+            if let Some(high) = high {
+                let first =
+                    from + raw[from..to].iter().position(|one| f64::from(one.1) == high).unwrap();
+                let found = track.first_with(0, high, [from, to]).unwrap();
+                assert_eq!((found.index, found.t), (first, raw[first].0));
+                assert_eq!(track.value(0, found), Some(high));
+            }
         }
         assert_eq!(SignalTrack::default().place(1.0), None);
         assert_eq!(track.time_of(usize::MAX), Some(end));
         assert_eq!(track.extremes(3, 0, 10), None);
-    }
-
-    #[test]
-    fn columns_are_those_that_are_drawn() {
-        let mut random = SplitMix::seeded(23);
-        for _ in 0..60 {
-            let count = 1 + random.below(8);
-            let (track, _) = track(&mut random, count);
-            let [start, end] = track.span().unwrap();
-            let window = [start + 0.2 * (end - start), end + 1e-3];
-            let mut points = Vec::new();
-            track.draw(0, window, 100.0, |point| points.extend(point));
-            let mut ends = Vec::new();
-            track.columns(0, window, 100.0, |times, found| {
-                assert!(times[0] <= times[1]);
-                ends.extend(found.into_iter().flat_map(|one| [one.low, one.high]));
-            });
-            let by = |values: &[f64]| {
-                let low = values.iter().copied().reduce(f64::min);
-                (low, values.iter().copied().reduce(f64::max))
-            };
-            let ends: Vec<f64> = ends.into_iter().map(f64::from).collect();
-            // The last sample of the track stands in a column already.
-            let points: Vec<f64> = points.into_iter().map(|[_, value]| value).collect();
-            assert_eq!(by(&ends), by(&points));
-        }
     }
 
     #[test]
@@ -426,6 +358,6 @@ mod tests {
         let values = vec![1.0f32; count as usize];
         track.push(Arc::new(TrackSegment::new(times, &vec![values; 4])));
         let per_sample = track.bytes() as f64 / f64::from(count);
-        assert!((27.9..28.1).contains(&per_sample), "{per_sample}");
+        assert!((29.2..29.4).contains(&per_sample), "{per_sample}");
     }
 }

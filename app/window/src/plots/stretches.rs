@@ -3,8 +3,7 @@
 
 use eframe::egui::Color32;
 use egui_plot::{FilledArea, Line, PlotPoint, PlotPoints, PlotUi};
-use palpate_model::signal::track::{DrawStatistics, SignalTrack};
-use std::ops::Range;
+use palpate_model::signal::track::SignalTrack;
 
 /// What the points of a line depend on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,16 +34,13 @@ pub struct ColumnBand {
     pub mean: Vec<PlotPoint>,
 }
 
-/// Points of one line without gaps in between them, and which belong together.
+/// The points of one line, parted at gaps.
 #[derive(Debug, Default)]
 pub struct Stretches {
     key: Option<LineWindow>,
-    points: Vec<PlotPoint>,
-    ranges: Vec<Range<usize>>,
-    /// Where not every sample is drawn.
     bands: Vec<ColumnBand>,
     y: Option<[f64; 2]>,
-    drawn: DrawStatistics,
+    samples_per_column: usize,
     found: u64,
 }
 
@@ -55,38 +51,13 @@ impl Stretches {
             return;
         }
         self.found += 1;
-        self.points.clear();
-        self.ranges.clear();
-        let (points, ranges) = (&mut self.points, &mut self.ranges);
-        let mut start = 0;
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let own = window.window.map(|end| end + window.shift);
-        self.drawn = track.draw(column, own, window.pixels, |point| match point {
-            Some([t, value]) => {
-                (low, high) = (low.min(value), high.max(value));
-                points.push(PlotPoint::new(t - window.shift, value));
-            }
-            None => {
-                if points.len() > start {
-                    ranges.push(start..points.len());
-                }
-                start = points.len();
-            }
-        });
-        if points.len() > start {
-            ranges.push(start..points.len());
-        }
-        self.y = (low <= high).then_some([low, high]);
         self.bands.clear();
-        if self.drawn.samples_per_column > 1 {
-            self.find_bands(track, column, own, window);
-        }
-    }
-
-    fn find_bands(&mut self, track: &SignalTrack, column: usize, own: [f64; 2], of: LineWindow) {
+        let own = window.window.map(|end| end + window.shift);
+        self.samples_per_column = track.samples_per_column(column, own, window.pixels);
         let bands = &mut self.bands;
+        let [mut lowest, mut highest] = [f64::INFINITY, f64::NEG_INFINITY];
         let mut is_broken = true;
-        track.columns(column, own, of.pixels, |[from, to], found| {
+        track.columns(column, own, window.pixels, |[from, to], found| {
             let Some(found) = found else {
                 is_broken = true;
                 return;
@@ -95,25 +66,25 @@ impl Stretches {
                 bands.push(ColumnBand::default());
             }
             let Some(band) = bands.last_mut() else { return };
-            let t = 0.5 * (from + to) - of.shift;
+            let t = 0.5 * (from + to) - window.shift;
+            let [low, high] = [found.low, found.high].map(f64::from);
+            (lowest, highest) = (lowest.min(low), highest.max(high));
             band.times.push(t);
-            band.low.push(f64::from(found.low));
-            band.high.push(f64::from(found.high));
+            band.low.push(low);
+            band.high.push(high);
             band.mean.push(PlotPoint::new(t, f64::from(found.mean)));
         });
+        self.y = (lowest <= highest).then_some([lowest, highest]);
     }
 
     /// The areas between the lowest and the highest samples; none where every sample is drawn.
     pub fn bands(&self) -> &[ColumnBand] {
-        &self.bands
+        if self.samples_per_column > 1 { &self.bands } else { &[] }
     }
 
     /// The line of each stretch: every sample, or the means of columns.
     pub fn parts(&self) -> impl Iterator<Item = &[PlotPoint]> {
-        let samples = self.ranges.iter().map(|range| &self.points[range.clone()]);
-        let has_all = self.bands.is_empty();
-        let means = self.bands.iter().map(|band| band.mean.as_slice());
-        samples.filter(move |_| has_all).chain(means)
+        self.bands.iter().map(|band| band.mean.as_slice())
     }
 
     /// Draws the line, and the area of the samples behind it where it is the one of their means.
@@ -124,7 +95,7 @@ impl Stretches {
         id: usize,
         (color, width): (Color32, f32),
     ) {
-        for (number, band) in self.bands.iter().enumerate() {
+        for (number, band) in self.bands().iter().enumerate() {
             let area = FilledArea::new(name, &band.times, &band.low, &band.high);
             let area = area.fill_color(color.gamma_multiply(AREA)).id((id, "area", number));
             plot_ui.add(area.allow_hover(false));
@@ -140,9 +111,9 @@ impl Stretches {
         self.y
     }
 
-    /// How much was drawn, and how far it is thinned.
-    pub fn drawn(&self) -> DrawStatistics {
-        self.drawn
+    /// Samples of whose mean a point is; 1 where every sample is drawn.
+    pub fn samples_per_column(&self) -> usize {
+        self.samples_per_column
     }
 }
 
@@ -168,17 +139,16 @@ mod tests {
             stretches.update(&track, 0, window);
         }
         assert_eq!((stretches.found, stretches.y()), (1, Some([1.0, 9.0])));
-        assert!(stretches.drawn().points <= 202 && stretches.drawn().samples_per_column == 64);
+        assert_eq!(stretches.samples_per_column(), 64);
         let ends: Vec<[f64; 2]> = stretches
-            .ranges
+            .bands()
             .iter()
-            .map(|one| [one.start, one.end - 1])
-            .map(|ends| ends.map(|at| stretches.points[at].x))
+            .map(|one| [one.times[0], *one.times.last().unwrap()])
             .collect();
-        assert_eq!(ends.len(), 2);
-        // The first and the last sample, on the axis that begins where it was asked to.
-        assert_eq!((ends[0][0], ends[1][1]), (-1.0, 4999.0 * 1e-3 - 1.0));
-        assert!(ends[0][1] < 1.0 && ends[1][0] >= 1.6);
+        // Behind every column with a gap a stretch ends, so one that begins within the gap is alone.
+        assert_eq!(ends.len(), 3);
+        assert!(ends[0][0] < -1.0 + 0.064 && ends[2][1] > 4.0 - 0.064);
+        assert!(ends[0][1] < 1.064 && ends[1][0] == ends[1][1] && ends[2][0] >= 1.6);
         // What is drawn is the mean with the area around it, whose highest is the one sample that stands out.
         let highest = |one: &ColumnBand| one.high.iter().copied().fold(0.0, f64::max);
         assert!(stretches.bands().iter().any(|one| highest(one) == 9.0));
@@ -187,8 +157,11 @@ mod tests {
         assert!(drawn.len() < 100, "one point of a column");
         window.version = 2;
         stretches.update(&track, 0, window);
-        window.window = [2.0, 2.5];
+        // So few that every sample is drawn, without an area around it.
+        window.window = [1.9995, 2.0995];
         stretches.update(&track, 0, window);
-        assert_eq!(stretches.found, 3);
+        assert_eq!((stretches.found, stretches.bands().len()), (3, 0));
+        let times: Vec<f64> = stretches.parts().flatten().map(|point| point.x).collect();
+        assert_eq!((times.len(), times[1]), (102, 2.0));
     }
 }

@@ -35,12 +35,11 @@ pub(super) fn cycles(subject: &ReviewSubject) -> Vec<Cycle> {
         if stretch.what == 0 {
             continue;
         }
-        let Some([_, (peak_t, peak_n)]) =
-            track.extremes(Quantity::Force as usize, stretch.first, end)
-        else {
+        let force = Quantity::Force as usize;
+        let Some([_, peak_n]) = track.extremes(force, stretch.first, end) else {
             continue;
         };
-        let place = track.place(peak_t);
+        let place = track.first_with(force, peak_n, [stretch.first, end]);
         found.push(Cycle {
             number: stretch.what,
             peak_n,

@@ -188,8 +188,8 @@ impl ReviewScreen {
             let line_window = subject.line_window(window, pixels, self.time_origin);
             for quantity in &self.quantities {
                 subject.update(*quantity, line_window);
-                let drawn = subject.lines[*quantity as usize].drawn();
-                self.thinned = self.thinned.max(drawn.samples_per_column);
+                let line = &subject.lines[*quantity as usize];
+                self.thinned = self.thinned.max(line.samples_per_column());
             }
             subject.update_fit(line_window);
         }

@@ -91,7 +91,7 @@ fn first_reaching(subject: &ReviewSubject, depth: f64) -> Option<usize> {
     let track = &subject.recording.track;
     let reaches = |count: usize| {
         let found = track.extremes(Quantity::Depth as usize, 0, count);
-        found.is_some_and(|[_, (_, deepest)]| deepest >= depth)
+        found.is_some_and(|[_, deepest]| deepest >= depth)
     };
     // The deepest of the first so many samples never gets less, so halving finds the first one.
     let (mut low, mut high) = (0, track.len());

@@ -112,10 +112,7 @@ impl ReviewSubject {
             self.name = format!("{} as {analysis}", self.name);
         }
         let track = &self.recording.track;
-        let ends = Quantity::ALL.map(|quantity| {
-            let found = track.extremes(quantity as usize, 0, track.len())?;
-            Some([found[0].1, found[1].1])
-        });
+        let ends = Quantity::ALL.map(|quantity| track.extremes(quantity as usize, 0, track.len()));
         self.ends = (self.recording.version, ends);
         self.loop_means = LoopMeans::of(track);
     }
@@ -203,8 +200,8 @@ impl ReviewSubject {
 
     /// Samples of whose mean a point of the lines over time is, of the coarsest of these quantities.
     pub fn column(&self, quantities: &[Quantity]) -> usize {
-        let drawn = quantities.iter().map(|one| self.lines[*one as usize].drawn());
-        drawn.map(|one| one.samples_per_column).fold(1, usize::max)
+        let of = |quantity: &Quantity| self.lines[*quantity as usize].samples_per_column();
+        quantities.iter().map(of).fold(1, usize::max)
     }
 
     /// The same of its fit.
