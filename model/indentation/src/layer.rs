@@ -15,6 +15,7 @@
 //! radius is free, `phi(a) = 0` finds it: the pressure ends without a step.
 
 use crate::invalid_value::{InvalidValue, check_poisson, positive};
+use crate::load_curve::LoadKnot;
 use crate::quadrature::gauss_legendre;
 use crate::shape::{Contact, IndenterShape};
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,30 @@ impl Layer {
         match radius_mm <= RADIUS_OVER_THICKNESS_MAX * self.thickness_mm {
             true => Ok(()),
             false => Err(LayerError::TooThin),
+        }
+    }
+
+    /// Depth, force and its slope where the contact of a sphere, as a parabola, or a cone has a radius. The slope is the
+    /// stiffness of a flat punch of that radius, because a contact that grows adds no force at its edge.
+    pub(crate) fn load_knot(&self, shape: IndenterShape, radius_mm: f64) -> LoadKnot {
+        let (a, ratio) = (radius_mm, radius_mm / self.thickness_mm);
+        let (solved, unit) = match shape {
+            IndenterShape::Cone { half_angle_rad } => {
+                (self.solve(ratio, |x| FRAC_PI_2 * x), a / half_angle_rad.tan())
+            }
+            IndenterShape::Parabola { radius_mm }
+            | IndenterShape::Sphere { radius_mm }
+            | IndenterShape::FlatPunch { radius_mm } => {
+                (self.solve(ratio, |x| x * x), a * a / radius_mm)
+            }
+        };
+        // The edge without pressure fixes the depth.
+        let depth = solved.shape[1] / solved.depth[1];
+        let scale = 2.0 * PI * a / ((1.0 - self.poisson) * 2.0 * (1.0 + self.poisson));
+        LoadKnot {
+            depth: unit * depth,
+            force: scale * unit * (depth * solved.depth[0] - solved.shape[0]),
+            slope: scale * solved.depth[0],
         }
     }
 

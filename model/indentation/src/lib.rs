@@ -9,6 +9,7 @@ mod half_space;
 mod hayes;
 mod invalid_value;
 mod layer;
+mod load_curve;
 mod quadrature;
 mod shape;
 mod triangle;
@@ -16,7 +17,10 @@ mod validity;
 mod viscoelastic;
 
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
-pub use fit::{RelaxationFit, RelaxationFitError, fit_relaxation};
+pub use fit::{
+    LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, RelaxationFit,
+    RelaxationFitError, fit_loading, fit_relaxation,
+};
 pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;
 pub use layer::{Base, Layer, LayerError};

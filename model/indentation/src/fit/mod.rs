@@ -4,10 +4,17 @@
 //! the depth as it was. The times are found by variable projection (Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413-432,
 //! with the step of Ruhe and Wedin, SIAM Rev. 22 (1980) 318-337), from the best set of a grid.
 
+mod loading;
 mod search;
 
 #[cfg(test)]
+mod loading_tests;
+#[cfg(test)]
 mod tests;
+
+pub use loading::{
+    LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, fit_loading,
+};
 
 use crate::viscoelastic::{DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm};
 use search::{Fitted, Record};
