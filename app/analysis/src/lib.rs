@@ -33,6 +33,7 @@ pub mod imports;
 pub mod kept_files;
 #[cfg(feature = "haptics")]
 pub mod margin;
+pub mod material;
 pub mod plan;
 pub mod pool;
 pub mod progress;

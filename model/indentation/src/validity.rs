@@ -4,11 +4,13 @@ use crate::document::{Indenter, Specimen};
 use crate::invalid_value::{InvalidValue, positive};
 use crate::layer::{LayerError, RADIUS_OVER_THICKNESS_MAX};
 use crate::shape::{Contact, IndenterShape};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_2_PI;
 use thiserror::Error;
 
 /// A law for the force of an indenter at a depth.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ContactLaw {
     /// A sphere as a parabola on a half-space (Hertz 1882).
     Hertz,

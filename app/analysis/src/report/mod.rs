@@ -14,6 +14,7 @@ pub mod fit_json;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 pub mod live;
+pub mod material;
 pub mod panels;
 pub mod picture;
 pub mod plan_picture;

@@ -44,6 +44,8 @@ pub struct FitSource {
     pub raw: Option<RawDepths>,
     /// The touches that found the contact position; empty where they are not known.
     pub touches: Vec<TouchPoint>,
+    /// Thickness of the specimen in mm, where the session found its base, with its standard error.
+    pub thickness_mm: Option<[f64; 2]>,
 }
 
 /// Part of an indentation that is read.
@@ -164,6 +166,7 @@ pub fn of_session(
     let offset = since_first(&session, stretch);
     leave_out(left_out_s, offset, &mut samples);
     let start = start_of(&session);
+    let thickness_mm = thickness_of(&session)?;
     let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
@@ -184,7 +187,19 @@ pub fn of_session(
         signal,
         raw: None,
         touches: touches.unwrap_or_default(),
+        thickness_mm,
     })
+}
+
+/// What was found last.
+fn thickness_of(session: &Session) -> Result<Option<[f64; 2]>, SourceError> {
+    let decisions = decisions(session)?;
+    Ok(records(&decisions).rev().find_map(|(_, record)| match record {
+        Record::BaseFound { thickness_mm, thickness_std_error_mm, .. } => {
+            Some([(*thickness_mm)?, (*thickness_std_error_mm)?])
+        }
+        _ => None,
+    }))
 }
 
 /// The samples of an imported session, its time from the first one.

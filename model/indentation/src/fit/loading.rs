@@ -73,6 +73,8 @@ pub struct LoadingFit {
 pub enum LoadingFitError {
     #[error(transparent)]
     Contact(#[from] ContactError),
+    #[error("the loading reaches {depth_mm:.4} mm behind the contact, and {reason}")]
+    TooDeep { depth_mm: f64, contact_shift_mm: f64, reason: ContactError },
     #[error(
         "the loading has {count} samples behind the contact; give at least {SAMPLES_MIN}, so a deeper part or a slower ramp"
     )]
@@ -221,9 +223,6 @@ pub fn fit_loading(
         return Err(LoadingFitError::Samples { count });
     }
     let lowest = samples.iter().map(|one| one.depth_mm).fold(f64::INFINITY, f64::min);
-    let curve_of = |indenter: &Indenter, specimen: &Specimen, deepest: f64| {
-        LoadCurve::new(law, indenter, specimen, deepest).map_err(LoadingFitError::from)
-    };
     // A contact that the curve alone tells may be anywhere along it.
     let starts: Vec<f64> = match knowledge.contact_error_mm {
         Some(_) => vec![0.0],
@@ -255,7 +254,15 @@ pub fn fit_loading(
             return Err(LoadingFitError::NoContact);
         }
     }
-    let (problem, found) = solve(curve_of(indenter, specimen, deepest)?, variance, &starts)?;
+    let curve =
+        LoadCurve::new(law, indenter, specimen, deepest).map_err(|reason| match reason {
+            ContactError::Outside { .. } => {
+                let contact_shift_mm = depth_max - deepest;
+                LoadingFitError::TooDeep { depth_mm: deepest, contact_shift_mm, reason }
+            }
+            reason => reason.into(),
+        })?;
+    let (problem, found) = solve(curve, variance, &starts)?;
     if let Some(error) = knowledge.contact_error_mm.filter(|error| *error > 0.0) {
         let errors = found.shift.abs() / error;
         if errors > CONTACT_ERRORS_MAX {

@@ -1,0 +1,340 @@
+//! Young's modulus of a recorded press by a contact law, with what makes it uncertain.
+
+use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
+use crate::source::{self, FitSource, SourceError, SourceSelection};
+use palpate_indentation::{
+    Base, Bounded, ContactLaw, Indenter, LoadingFit, LoadingFitError, LoadingKnowledge,
+    LoadingSample, PoissonBasis, Quantity, Specimen, Validity, fit_loading,
+};
+use palpate_model::calibration::ForceUncertainty;
+use palpate_model::units::Newtons;
+use palpate_tables::import::ColumnNames;
+use serde::Serialize;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// What is asked of a press.
+#[derive(Debug)]
+pub struct MaterialRequest {
+    pub source: PathBuf,
+    /// Names of the columns of a table without a header.
+    pub columns: Option<ColumnNames>,
+    /// The analysis that a session is read by.
+    pub analysis: Option<String>,
+    pub is_rejected_included: bool,
+    pub corrections: ComplianceCorrections,
+    pub law: ContactLaw,
+    pub indenter: Indenter,
+    /// `None` takes the thickness that the session measured by touching the base.
+    pub thickness_mm: Option<Quantity>,
+    pub base: Base,
+    pub poisson_ratio: Quantity,
+    pub poisson_basis: PoissonBasis,
+    /// The loading is taken up to this depth in mm; `None` takes all of it.
+    pub depth_max_mm: Option<f64>,
+    /// Whether the loading alone tells where the contact is.
+    pub is_contact_free: bool,
+}
+
+/// A modulus and all it rests on.
+#[derive(Clone, Debug, Serialize)]
+pub struct MaterialReport {
+    pub source: PathBuf,
+    pub law: ContactLaw,
+    pub indenter: Indenter,
+    pub specimen: Specimen,
+    /// Young's modulus in MPa, which is N/mm².
+    pub modulus_mpa: f64,
+    pub standard_uncertainty_mpa: f64,
+    pub total95_mpa: [f64; 2],
+    /// The largest first.
+    pub budget: Vec<MaterialBudgetRow>,
+    /// What the budget does not have, in words.
+    pub not_included: Vec<&'static str>,
+    /// By how much deeper than found the contact is, in mm.
+    pub contact_shift_mm: f64,
+    /// Standard uncertainty of the contact as found, in mm; `None` where the loading alone tells it.
+    pub contact_error_mm: Option<f64>,
+    pub samples: usize,
+    /// Of the deepest sample from the contact as fitted, in mm.
+    pub depth_mm: f64,
+    /// From the contact to the deepest sample, in s.
+    pub loading_s: f64,
+    pub residual_n: f64,
+    /// Standard deviation of a force in N, where it is known.
+    pub noise_n: Option<f64>,
+    pub validity: Vec<ValidityRow>,
+    /// Where residuals are larger than the noise: the moduli of the shallow and the deep half.
+    pub lack_of_fit: Option<LoadingLackOfFit>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compliance: Option<ComplianceCorrection>,
+    #[serde(skip)]
+    pub notes: Vec<String>,
+}
+
+/// A source of uncertainty of a modulus.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaterialBudgetRow {
+    pub source: &'static str,
+    pub mpa: f64,
+    /// Share of the variance.
+    pub percent: f64,
+}
+
+/// A ratio and up to where the law holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ValidityRow {
+    pub ratio: &'static str,
+    pub value: f64,
+    pub max: f64,
+}
+
+/// How a law misses a loading.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LoadingLackOfFit {
+    /// Root mean square of the residuals over the noise.
+    pub residual_over_noise: f64,
+    /// Moduli in MPa of the shallow and of the deep half alone, with the contact of the whole.
+    pub halves_mpa: [f64; 2],
+}
+
+#[derive(Debug, Error)]
+pub enum MaterialError {
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    #[error(transparent)]
+    Fit(#[from] LoadingFitError),
+    #[error("{reason}; for this indenter and specimen give --depth-max {depth_max_mm:.4} or less")]
+    TooDeep { reason: LoadingFitError, depth_max_mm: f64 },
+    #[error(
+        "the thickness of the specimen is not known; give --thickness, or measure it in the session with the protocol thickness"
+    )]
+    NoThickness,
+    #[error("a greatest depth of {depth_mm} mm is not possible; give a depth above 0 mm")]
+    DepthMax { depth_mm: f64 },
+}
+
+/// A mean square of residuals is no chance where it is above the noise's by so many of its standard deviations, `sqrt(2 / n)`
+/// of it for `n` samples, and by more than a fifth, as the noise is known to a tenth.
+const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
+const LACK_OF_FIT_SHARE: f64 = 0.2;
+/// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
+const END_SHARE: f64 = 0.998;
+/// Halves of the interval of a normal number that holds 95 %.
+const COVERAGE: f64 = 1.96;
+
+/// The modulus of the loading of a session or a table.
+pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialError> {
+    if let Some(depth_mm) = request.depth_max_mm
+        && !(depth_mm > 0.0 && depth_mm.is_finite())
+    {
+        return Err(MaterialError::DepthMax { depth_mm });
+    }
+    let wanted = SourceSelection {
+        is_rejected_included: request.is_rejected_included,
+        ..SourceSelection::default()
+    };
+    let (path, analysis) = (request.source.as_path(), request.analysis.as_deref());
+    let mut read = source::read_analysed(path, request.columns.as_ref(), wanted, analysis)?;
+    let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
+    let measured = read.thickness_mm;
+    let measured =
+        measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty });
+    let thickness_mm = request.thickness_mm.or(measured).ok_or(MaterialError::NoThickness)?;
+    let specimen = Specimen {
+        thickness_mm,
+        base: request.base,
+        poisson_ratio: request.poisson_ratio,
+        poisson_basis: request.poisson_basis,
+    };
+    let loading = Loading::of(&read, request.depth_max_mm);
+    let contact_error_mm = read
+        .signal
+        .as_ref()
+        .filter(|_| !request.is_contact_free)
+        .map(|signal| signal.contact_error_mm);
+    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm };
+    let (law, indenter) = (request.law, &request.indenter);
+    let fit = fit_loading(law, indenter, &specimen, &loading.samples, knowledge)
+        .map_err(|reason| too_deep(reason, request, &specimen))?;
+    let lack_of_fit = lack_of_fit(&fit, law, (indenter, &specimen), &loading);
+    let mut terms: Vec<(&'static str, f64)> =
+        fit.terms.iter().map(|(term, mpa)| (term.name(), *mpa)).collect();
+    let mut not_included = Vec::new();
+    match calibration_mpa(&read, &fit, &loading) {
+        Some(mpa) => terms.push(("calibration", mpa)),
+        None => not_included.push("calibration"),
+    }
+    match &compliance {
+        Some(applied) if applied.is_applied => {
+            let mpa = compliance_mpa(applied, &fit, law, (indenter, &specimen), &loading);
+            terms.push(("machine compliance", mpa));
+        }
+        _ => not_included.push("machine compliance"),
+    }
+    let variance: f64 = terms.iter().map(|(_, mpa)| mpa * mpa).sum();
+    let standard_uncertainty_mpa = variance.sqrt();
+    let half = COVERAGE * standard_uncertainty_mpa;
+    Ok(MaterialReport {
+        source: request.source.clone(),
+        law,
+        indenter: *indenter,
+        specimen,
+        modulus_mpa: fit.modulus_mpa,
+        standard_uncertainty_mpa,
+        total95_mpa: [fit.modulus_mpa - half, fit.modulus_mpa + half],
+        budget: budget_rows(terms, variance),
+        not_included,
+        contact_shift_mm: fit.contact_shift_mm,
+        contact_error_mm,
+        samples: loading.samples.len(),
+        depth_mm: loading.deepest() - fit.contact_shift_mm,
+        loading_s: loading.secs,
+        residual_n: fit.residual_newtons,
+        noise_n: loading.noise,
+        validity: validity_rows(&fit.validity),
+        lack_of_fit,
+        compliance,
+        notes: read.notes,
+    })
+}
+
+/// The largest first.
+fn budget_rows(terms: Vec<(&'static str, f64)>, variance: f64) -> Vec<MaterialBudgetRow> {
+    let row = |(source, mpa): (&'static str, f64)| MaterialBudgetRow {
+        source,
+        mpa,
+        percent: 100.0 * mpa * mpa / variance,
+    };
+    let mut rows: Vec<MaterialBudgetRow> = terms.into_iter().map(row).collect();
+    rows.sort_by(|a, b| b.mpa.total_cmp(&a.mpa));
+    rows
+}
+
+/// The samples of a press down to its deepest place.
+struct Loading {
+    samples: Vec<LoadingSample>,
+    /// Standard deviation of a force in N, where it is known.
+    noise: Option<f64>,
+    secs: f64,
+}
+
+impl Loading {
+    fn of(read: &FitSource, depth_max_mm: Option<f64>) -> Self {
+        let shift = read.signal.as_ref().map_or(0.0, |signal| signal.contact_shift_mm);
+        let deepest = read.samples.iter().map(|one| one.depth.0).fold(f64::NEG_INFINITY, f64::max);
+        let end = depth_max_mm.map_or(END_SHARE * deepest, |max| max.min(END_SHARE * deepest));
+        let count = read.samples.iter().position(|one| one.depth.0 - shift > end);
+        let taken = &read.samples[..count.unwrap_or(read.samples.len())];
+        let known = || taken.iter().filter(|one| one.is_measured());
+        let sample = |one: &palpate_rheology::fit::FitSample| LoadingSample {
+            depth_mm: one.depth.0 - shift,
+            force_newtons: one.force.0,
+        };
+        let squares: f64 = known().map(|one| one.sigma.0 * one.sigma.0).sum();
+        let noise = (squares / known().count().max(1) as f64).sqrt();
+        let first = taken.iter().find(|one| one.depth.0 > shift);
+        let secs = first.zip(taken.last()).map_or(0.0, |(first, last)| last.t.0 - first.t.0);
+        // Only a session's forces have an uncertainty of their own.
+        let noise = read.signal.as_ref().map(|_| noise);
+        Self { samples: known().map(sample).collect(), noise, secs }
+    }
+
+    fn deepest(&self) -> f64 {
+        self.samples.iter().map(|one| one.depth_mm).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// A refusal of a loading that reaches beyond the law says how far the law holds.
+fn too_deep(
+    reason: LoadingFitError,
+    request: &MaterialRequest,
+    specimen: &Specimen,
+) -> MaterialError {
+    let LoadingFitError::TooDeep { depth_mm, contact_shift_mm, .. } = reason else {
+        return reason.into();
+    };
+    let is_valid = |depth: f64| request.law.contact(&request.indenter, specimen, depth).is_ok();
+    let (mut low, mut high) = (0.0, depth_mm);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if is_valid(middle) { low = middle } else { high = middle }
+    }
+    // In four decimals, so that the depth given is within.
+    let depth_max_mm = ((low + contact_shift_mm) * 1e4).floor() * 1e-4;
+    match low > 0.0 && depth_max_mm > 0.0 {
+        true => MaterialError::TooDeep { reason, depth_max_mm },
+        false => reason.into(),
+    }
+}
+
+fn lack_of_fit(
+    fit: &LoadingFit,
+    law: ContactLaw,
+    (indenter, specimen): (&Indenter, &Specimen),
+    loading: &Loading,
+) -> Option<LoadingLackOfFit> {
+    let residual_over_noise = fit.residual_newtons / loading.noise?;
+    let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / loading.samples.len() as f64).sqrt();
+    if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
+        return None;
+    }
+    let from_contact = |one: &LoadingSample| LoadingSample {
+        depth_mm: one.depth_mm - fit.contact_shift_mm,
+        ..*one
+    };
+    let samples: Vec<LoadingSample> = loading.samples.iter().map(from_contact).collect();
+    let middle = 0.5 * (loading.deepest() - fit.contact_shift_mm);
+    let (deep, shallow): (Vec<_>, Vec<_>) =
+        samples.into_iter().partition(|one| one.depth_mm > middle);
+    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm: Some(0.0) };
+    let half = |samples: &[LoadingSample]| {
+        fit_loading(law, indenter, specimen, samples, knowledge).ok().map(|fit| fit.modulus_mpa)
+    };
+    Some(LoadingLackOfFit { residual_over_noise, halves_mpa: [half(&shallow)?, half(&deep)?] })
+}
+
+/// What errors of the calibration do to the modulus; `None` where nothing is stated of them.
+fn calibration_mpa(read: &FitSource, fit: &LoadingFit, loading: &Loading) -> Option<f64> {
+    let known = ForceUncertainty::of(read.calibration.as_ref()?).ok()?;
+    let shift = |error: usize| {
+        let forces = loading.samples.iter();
+        fit.shift_by(forces.map(|one| known.shift(error, Newtons(one.force_newtons)).0))
+    };
+    let squares: f64 = (0..known.errors().count()).map(|error| shift(error).powi(2)).sum();
+    known.is_stated().then(|| squares.sqrt())
+}
+
+/// What the standard uncertainty of the machine compliance does: it takes a depth from every sample in proportion to its force,
+/// which the law turns into a force.
+fn compliance_mpa(
+    applied: &ComplianceCorrection,
+    fit: &LoadingFit,
+    law: ContactLaw,
+    (indenter, specimen): (&Indenter, &Specimen),
+    loading: &Loading,
+) -> f64 {
+    let moved: Vec<LoadingSample> = loading
+        .samples
+        .iter()
+        .map(|one| LoadingSample {
+            depth_mm: one.depth_mm
+                - fit.contact_shift_mm
+                - applied.std_error_mm_per_n * one.force_newtons,
+            ..*one
+        })
+        .collect();
+    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm: Some(0.0) };
+    fit_loading(law, indenter, specimen, &moved, knowledge)
+        .map_or(f64::NAN, |other| (other.modulus_mpa - fit.modulus_mpa).abs())
+}
+
+fn validity_rows(validity: &Validity) -> Vec<ValidityRow> {
+    let row = |ratio, Bounded { value, max }: Bounded| ValidityRow { ratio, value, max };
+    let rows = [
+        validity.depth_over_radius.map(|one| row("depth over tip radius", one)),
+        Some(row("contact radius over thickness", validity.radius_over_thickness)),
+        Some(row("strain", validity.strain)),
+    ];
+    rows.into_iter().flatten().collect()
+}

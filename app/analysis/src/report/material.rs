@@ -1,0 +1,138 @@
+//! A modulus as people read it: the number first, and every assumption under it.
+
+use crate::material::{LoadingLackOfFit, MaterialReport};
+use palpate_figures::uncertain::{error_alone, significant, with_error};
+use palpate_indentation::{Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity};
+
+const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
+
+#[must_use]
+pub fn material_text(report: &MaterialReport) -> String {
+    let mut lines = vec![format!(
+        "Young's modulus  {} kPa, 95 % interval {} to {} kPa",
+        with_error(kpa(report.modulus_mpa), kpa(report.standard_uncertainty_mpa)),
+        significant(kpa(report.total95_mpa[0]), 4),
+        significant(kpa(report.total95_mpa[1]), 4),
+    )];
+    lines.extend(report.lack_of_fit.map(lack_words));
+    lines.push(format!("law              {}", law_words(report.law)));
+    lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
+    lines.push(format!("specimen         {}", specimen_words(report)));
+    lines.push(format!("loading          {}", loading_words(report)));
+    lines.push(format!("contact          {}", contact_words(report)));
+    for row in &report.validity {
+        let value = significant(row.value, 3);
+        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
+    }
+    for row in &report.budget {
+        lines.push(format!(
+            "uncertainty      {:<18} {:>8} kPa  {:>3.0} %",
+            row.source,
+            error_alone(kpa(row.mpa)),
+            row.percent
+        ));
+    }
+    if !report.not_included.is_empty() {
+        lines.push(format!("not included     {}", report.not_included.join(", ")));
+    }
+    lines.push(RELAXES.into());
+    lines.join("\n")
+}
+
+fn kpa(mpa: f64) -> f64 {
+    1e3 * mpa
+}
+
+fn lack_words(lack: LoadingLackOfFit) -> String {
+    let LoadingLackOfFit { residual_over_noise, halves_mpa: [shallow, deep] } = lack;
+    format!(
+        "lack of fit      residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa, and the interval does not include this",
+        significant(residual_over_noise, 3),
+        significant(kpa(shallow), 4),
+        significant(kpa(deep), 4),
+    )
+}
+
+fn law_words(law: ContactLaw) -> &'static str {
+    match law {
+        ContactLaw::Hertz => "Hertz (1882): a shallow sphere on a half-space",
+        ContactLaw::Sneddon => "Sneddon (1965): on a half-space",
+        ContactLaw::Layer => "Hayes et al. (1972): on a layer on a rigid base",
+    }
+}
+
+fn quantity_words(quantity: Quantity) -> String {
+    match quantity.standard_uncertainty > 0.0 {
+        true => with_error(quantity.value, quantity.standard_uncertainty),
+        false => format!("{}, taken as exact", quantity.value),
+    }
+}
+
+fn indenter_words(indenter: &Indenter) -> String {
+    match indenter {
+        Indenter::FlatPunch { radius_mm } => {
+            format!("flat punch, radius in mm {}", quantity_words(*radius_mm))
+        }
+        Indenter::Sphere { radius_mm } => {
+            format!("sphere, radius in mm {}", quantity_words(*radius_mm))
+        }
+        Indenter::Cone { half_angle_degrees } => {
+            format!("cone, half angle in degrees {}", quantity_words(*half_angle_degrees))
+        }
+        Indenter::Pyramid { faces, half_angle_degrees } => {
+            let count = match faces {
+                PyramidFaces::Three => "three",
+                PyramidFaces::Four => "four",
+            };
+            let angle = quantity_words(*half_angle_degrees);
+            format!(
+                "pyramid of {count} faces as the cone of its area, half angle in degrees {angle}"
+            )
+        }
+    }
+}
+
+fn specimen_words(report: &MaterialReport) -> String {
+    let specimen = &report.specimen;
+    let basis = match specimen.poisson_basis {
+        PoissonBasis::Assumed => "assumed",
+        PoissonBasis::Measured => "measured",
+    };
+    let base = match specimen.base {
+        Base::Bonded => "bonded to its base",
+        Base::Frictionless => "slips on its base",
+    };
+    format!(
+        "thickness in mm {}; {base}; Poisson's ratio {basis}: {}",
+        quantity_words(specimen.thickness_mm),
+        quantity_words(specimen.poisson_ratio),
+    )
+}
+
+fn loading_words(report: &MaterialReport) -> String {
+    let noise = report.noise_n.map(|noise| format!(", noise {} mN", significant(1e3 * noise, 3)));
+    format!(
+        "to {} mm in {} s, {} samples; residuals {} mN{}",
+        significant(report.depth_mm, 4),
+        significant(report.loading_s, 3),
+        report.samples,
+        significant(1e3 * report.residual_n, 3),
+        noise.unwrap_or_default(),
+    )
+}
+
+fn contact_words(report: &MaterialReport) -> String {
+    let shift = report.contact_shift_mm;
+    let side = if shift < 0.0 { "above" } else { "below" };
+    match report.contact_error_mm {
+        Some(error) => format!(
+            "{} um {side} where it was found, {} of its standard uncertainties of {} um",
+            significant(1e3 * shift.abs(), 3),
+            significant(shift.abs() / error, 2),
+            error_alone(1e3 * error),
+        ),
+        None => {
+            format!("{} mm {side} depth zero, from the loading alone", significant(shift.abs(), 4))
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! `palpate material`: the modulus of a press by a contact law.
+
+use super::arguments::{Choice, choice, parse_columns, parse_number};
+use super::output::Output;
+use super::{Failure, compliance, source_failure};
+use clap::Args;
+use palpate_analysis::material::{MaterialError, MaterialRequest, material};
+use palpate_analysis::report::material::material_text;
+use palpate_indentation::{
+    Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
+};
+use std::path::PathBuf;
+
+/// Young's modulus of a press by a contact law, with the probe's shape and the thickness taken out
+#[derive(Debug, Args)]
+pub struct MaterialArgs {
+    /// Session folder, or a delimited table with columns for time, depth and force
+    source: PathBuf,
+    /// Shape of the indenter
+    #[arg(long, value_parser = choice(INDENTERS))]
+    indenter: IndenterWord,
+    /// Radius of a sphere or a flat punch in mm with its standard uncertainty, as in 3.00±0.02 or 3.00+-0.02
+    #[arg(long, value_name = "MM", value_parser = quantity, allow_hyphen_values = true)]
+    radius: Option<Quantity>,
+    /// Angle between axis and flank of a cone, or axis and face of a pyramid, in degrees
+    #[arg(long, value_name = "DEGREES", value_parser = quantity, allow_hyphen_values = true)]
+    half_angle: Option<Quantity>,
+    /// Thickness of the specimen in mm; without it the one that the session measured
+    #[arg(long, value_name = "MM", value_parser = quantity, allow_hyphen_values = true)]
+    thickness: Option<Quantity>,
+    /// Poisson's ratio of the specimen, 0 to 0.5
+    #[arg(long, value_name = "RATIO", value_parser = quantity, allow_hyphen_values = true)]
+    poisson: Quantity,
+    /// Poisson's ratio was measured on this tissue; without it, it is stated as assumed
+    #[arg(long)]
+    poisson_measured: bool,
+    /// How the specimen lies on its base
+    #[arg(long, value_parser = choice(BASES), default_value = "bonded")]
+    base: Base,
+    /// Law of the contact
+    #[arg(long, value_parser = choice(LAWS), default_value = "layer")]
+    law: ContactLaw,
+    /// Take the loading up to this depth in mm; without it all of it
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    depth_max: Option<f64>,
+    /// Find the contact from the loading alone, also where the session knows it
+    #[arg(long)]
+    free_contact: bool,
+    /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<String>,
+    /// Apply this analysis of the session: its calibration and its excluded stretches
+    #[arg(long, value_name = "NAME")]
+    analysis: Option<String>,
+    /// Take a rejected session too
+    #[arg(long)]
+    include_rejected: bool,
+    /// Correct depths for machine compliance: last for the compliance in force for the session's rig, a file, or an id of
+    /// the library
+    #[arg(long, value_name = "FILE|last")]
+    compliance: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum IndenterWord {
+    FlatPunch,
+    Sphere,
+    Cone,
+    Pyramid(PyramidFaces),
+}
+
+const INDENTERS: &[Choice<IndenterWord>] = &[
+    ("flat-punch", IndenterWord::FlatPunch, "the flat end of a cylinder"),
+    ("sphere", IndenterWord::Sphere, "a sphere"),
+    ("cone", IndenterWord::Cone, "a cone"),
+    ("pyramid-3", IndenterWord::Pyramid(PyramidFaces::Three), "three faces, as Berkovich's"),
+    ("pyramid-4", IndenterWord::Pyramid(PyramidFaces::Four), "four faces, as Vickers'"),
+];
+
+const BASES: &[Choice<Base>] =
+    &[("bonded", Base::Bonded, "it sticks"), ("frictionless", Base::Frictionless, "it slips")];
+
+const LAWS: &[Choice<ContactLaw>] = &[
+    ("hertz", ContactLaw::Hertz, "a shallow sphere on a thick specimen"),
+    ("sneddon", ContactLaw::Sneddon, "any shape on a thick specimen"),
+    ("layer", ContactLaw::Layer, "any shape on a specimen on a rigid base"),
+];
+
+pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
+    let request = MaterialRequest {
+        source: args.source.clone(),
+        columns: parse_columns(args.columns.as_deref())?,
+        analysis: args.analysis.clone(),
+        is_rejected_included: args.include_rejected,
+        corrections: compliance::corrections(args.compliance.as_deref())?,
+        law: args.law,
+        indenter: indenter(args)?,
+        thickness_mm: args.thickness,
+        base: args.base,
+        poisson_ratio: args.poisson,
+        poisson_basis: match args.poisson_measured {
+            true => PoissonBasis::Measured,
+            false => PoissonBasis::Assumed,
+        },
+        depth_max_mm: args.depth_max,
+        is_contact_free: args.free_contact,
+    };
+    let report = material(&request).map_err(failure)?;
+    report.notes.iter().for_each(|note| output.note(note));
+    output.answer("material", &report, || material_text(&report));
+    Ok(())
+}
+
+fn failure(err: MaterialError) -> Failure {
+    match err {
+        MaterialError::Source(err) => source_failure(err),
+        // The record has no answer, whatever is given.
+        MaterialError::Fit(
+            LoadingFitError::NoContact
+            | LoadingFitError::ContactMoved { .. }
+            | LoadingFitError::Samples { .. },
+        ) => Failure::failed(err),
+        err => Failure::usage(err),
+    }
+}
+
+fn indenter(args: &MaterialArgs) -> Result<Indenter, Failure> {
+    let needs = |flag: &str, given: Option<Quantity>, other: Option<Quantity>, unused: &str| {
+        if other.is_some() {
+            return Err(Failure::usage(format!("this indenter has no --{unused}; leave it out")));
+        }
+        given.ok_or_else(|| {
+            Failure::usage(format!(
+                "this indenter needs --{flag}; give it, with its standard uncertainty"
+            ))
+        })
+    };
+    let radius = || needs("radius", args.radius, args.half_angle, "half-angle");
+    let half_angle = || needs("half-angle", args.half_angle, args.radius, "radius");
+    Ok(match args.indenter {
+        IndenterWord::FlatPunch => Indenter::FlatPunch { radius_mm: radius()? },
+        IndenterWord::Sphere => Indenter::Sphere { radius_mm: radius()? },
+        IndenterWord::Cone => Indenter::Cone { half_angle_degrees: half_angle()? },
+        IndenterWord::Pyramid(faces) => {
+            Indenter::Pyramid { faces, half_angle_degrees: half_angle()? }
+        }
+    })
+}
+
+/// `3.00±0.02`, or a number that is taken as exact.
+fn quantity(text: &str) -> Result<Quantity, String> {
+    let (value, error) =
+        text.split_once('±').or_else(|| text.split_once("+-")).unwrap_or((text, "0"));
+    let number = |part: &str| parse_number(part.trim());
+    Ok(Quantity { value: number(value)?, standard_uncertainty: number(error)? })
+}

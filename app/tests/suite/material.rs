@@ -1,0 +1,127 @@
+//! `palpate material` as a user meets it.
+
+use crate::support::{assert_refused, json, stdout, typed};
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::Path;
+
+const SESSION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/ramp-hold-lab");
+
+/// Hertz's law, `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`, written out here: a second implementation, with the contact at a depth.
+fn hertz_table(at: &Path, name: &str, [modulus_mpa, radius_mm, poisson, contact_mm]: [f64; 4]) {
+    let mut text = String::from("t_s,depth_mm,force_N\n");
+    for index in 0..=200 {
+        let t = 0.005 * f64::from(index);
+        let depth: f64 = 0.3 * t;
+        let pressed = (depth - contact_mm).max(0.0);
+        let plane = modulus_mpa / (1.0 - poisson * poisson);
+        let force = 4.0 / 3.0 * plane * radius_mm.sqrt() * pressed.powf(1.5);
+        // Noise of 1e-5 N that is the same on every machine.
+        let noise = 1e-5 * (f64::from(index) * 12.9898).sin();
+        let _ = writeln!(text, "{t},{depth},{}", force + noise);
+    }
+    std::fs::write(at.join(name), text).unwrap();
+}
+
+fn number(object: &Value, path: &str) -> f64 {
+    object.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {object}"))
+}
+
+#[test]
+fn the_modulus_of_a_table_is_the_one_that_made_it() {
+    let at = tempfile::tempdir().unwrap();
+    hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.05]);
+    let line = "material press.csv --indenter sphere --radius 8.00±0.04 --thickness 500 --poisson 0.45±0.01 --law hertz";
+    let found = json(&typed(at.path(), &format!("{line} --json")));
+    assert_eq!(found["command"], "material");
+    let (modulus, error) =
+        (number(&found, "/modulus_mpa"), number(&found, "/standard_uncertainty_mpa"));
+    // Noise of 1e-5 N against a force of 2 mN.
+    assert!((modulus / 0.0125 - 1.0).abs() < 0.005, "{found}");
+    assert!((number(&found, "/contact_shift_mm") - 0.05).abs() < 5e-4, "{found}");
+    // The modulus falls with the root of the radius and with 1 / (1 - nu^2).
+    let row = |source: &str| {
+        let rows = found["budget"].as_array().unwrap();
+        let own = rows.iter().find(|row| row["source"] == source);
+        own.unwrap_or_else(|| panic!("{source}: {found}"))["mpa"].as_f64().unwrap() / modulus
+    };
+    assert!((row("radius") - 0.5 * 0.005).abs() < 1e-5, "{found}");
+    let of_poisson = 2.0 * 0.45 * 0.01 / (1.0 - 0.45 * 0.45);
+    assert!((row("Poisson's ratio") / of_poisson - 1.0).abs() < 1e-3, "{found}");
+    let all = found["budget"].as_array().unwrap().iter().map(|row| row["mpa"].as_f64().unwrap());
+    assert!((all.map(|one| one * one).sum::<f64>().sqrt() / error - 1.0).abs() < 1e-12);
+    assert_eq!(found["not_included"], serde_json::json!(["calibration", "machine compliance"]));
+    let text = stdout(&typed(at.path(), line));
+    for words in ["Young's modulus  12.", "Poisson's ratio assumed: 0.450 ± 0.010", "Hertz (1882)"]
+    {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn a_session_states_contact_calibration_and_lack_of_fit() {
+    let at = tempfile::tempdir().unwrap();
+    let line = format!(
+        "material {SESSION} --indenter flat-punch --radius 6.00±0.02 --thickness 60.0±0.5 --poisson 0.49±0.01 --depth-max 0.9 --json"
+    );
+    let found = json(&typed(at.path(), &line));
+    let sources: Vec<&str> = found["budget"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["source"].as_str().unwrap())
+        .collect();
+    for source in ["noise", "contact", "calibration", "radius", "thickness", "Poisson's ratio"] {
+        assert!(sources.contains(&source), "{source}: {found}");
+    }
+    // A body that relaxes bends the loading otherwise than an elastic one.
+    assert!(number(&found, "/lack_of_fit/residual_over_noise") > 1.1, "{found}");
+    assert!(number(&found, "/contact_error_mm") > 0.0);
+    assert_eq!(found["validity"][1]["ratio"], "strain");
+}
+
+#[test]
+fn what_no_law_describes_is_refused_in_one_sentence() {
+    let at = tempfile::tempdir().unwrap();
+    hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.0]);
+    let sphere = "--indenter sphere --radius 8 --poisson 0.45";
+    for (line, reason) in [
+        (format!("press.csv {sphere}"), "give --thickness"),
+        (
+            format!("press.csv {sphere} --thickness 50 --law hertz"),
+            "contact radius over the thickness",
+        ),
+        (
+            "press.csv --indenter sphere --radius 2 --poisson 0.45 --thickness 50".into(),
+            "give --depth-max 0.",
+        ),
+        (format!("press.csv {sphere} --thickness=-3"), "the thickness of the specimen is -3"),
+        (
+            "press.csv --indenter sphere --radius 8 --poisson 0.6 --thickness 50".into(),
+            "from 0 to 0.5",
+        ),
+        ("press.csv --indenter cone --poisson 0.45 --thickness 50".into(), "needs --half-angle"),
+        (format!("press.csv {sphere} --thickness 50 --half-angle 60"), "has no --half-angle"),
+        (
+            "press.csv --indenter cone --half-angle 70 --poisson 0.45 --thickness 500 --law hertz"
+                .into(),
+            "a sphere only",
+        ),
+        (
+            "press.csv --indenter sphere --radius 8±9 --poisson 0.45 --thickness 50".into(),
+            "standard uncertainty of the radius",
+        ),
+        (format!("press.csv {sphere} --thickness 50 --depth-max 0"), "give a depth above 0 mm"),
+        (format!("nowhere.csv {sphere} --thickness 50"), "nowhere.csv"),
+    ] {
+        assert_refused(&typed(at.path(), &format!("material {line}")), 2, reason);
+    }
+
+    std::fs::write(
+        at.path().join("pull.csv"),
+        "t_s,depth_mm,force_N\n0,0,0\n1,0.01,-1\n2,0.02,-2\n3,0.03,-3\n4,0.04,-4\n5,0.05,-5\n",
+    )
+    .unwrap();
+    let pull = typed(at.path(), &format!("material pull.csv {sphere} --thickness 50"));
+    assert_refused(&pull, 1, "check the signs of force and depth");
+}
