@@ -32,8 +32,18 @@ pub struct MaterialRequest {
     pub poisson_basis: PoissonBasis,
     /// The loading is taken up to this depth in mm; `None` takes all of it.
     pub depth_max_mm: Option<f64>,
-    /// Whether the loading alone tells where the contact is.
-    pub is_contact_free: bool,
+    pub contact: ContactKnowledge,
+}
+
+/// How well the contact at depth zero is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ContactKnowledge {
+    /// As the touches of the session found it; of a table the loading alone tells.
+    Recorded,
+    /// Its standard uncertainty in mm.
+    Stated(f64),
+    /// The loading alone tells where it is.
+    Free,
 }
 
 /// A modulus and all it rests on.
@@ -148,11 +158,11 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
         poisson_basis: request.poisson_basis,
     };
     let loading = Loading::of(&read, request.depth_max_mm);
-    let contact_error_mm = read
-        .signal
-        .as_ref()
-        .filter(|_| !request.is_contact_free)
-        .map(|signal| signal.contact_error_mm);
+    let contact_error_mm = match request.contact {
+        ContactKnowledge::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
+        ContactKnowledge::Stated(error_mm) => Some(error_mm),
+        ContactKnowledge::Free => None,
+    };
     let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm };
     let (law, indenter) = (request.law, &request.indenter);
     let fit = fit_loading(law, indenter, &specimen, &loading.samples, knowledge)
@@ -226,6 +236,11 @@ impl Loading {
         let end = depth_max_mm.map_or(END_SHARE * deepest, |max| max.min(END_SHARE * deepest));
         let count = read.samples.iter().position(|one| one.depth.0 - shift > end);
         let taken = &read.samples[..count.unwrap_or(read.samples.len())];
+        // Where a soft cantilever holds the probe, the tissue relaxes and the depth still grows: the ramp ended at the peak.
+        let peak = (0..taken.len())
+            .filter(|&at| taken[at].is_measured())
+            .max_by(|&a, &b| taken[a].force.0.total_cmp(&taken[b].force.0));
+        let taken = &taken[..peak.map_or(0, |peak| peak + 1)];
         let known = || taken.iter().filter(|one| one.is_measured());
         let sample = |one: &palpate_rheology::fit::FitSample| LoadingSample {
             depth_mm: one.depth.0 - shift,
@@ -238,6 +253,17 @@ impl Loading {
         // Only a session's forces have an uncertainty of their own.
         let noise = read.signal.as_ref().map(|_| noise);
         Self { samples: known().map(sample).collect(), noise, secs }
+    }
+
+    /// Standard deviation in N of what changes from sample to sample, from second differences: a curve has nearly none.
+    fn white_noise(&self) -> f64 {
+        let forces = self.samples.windows(3);
+        let squares = forces.map(|three| {
+            let [a, b, c] = [three[0], three[1], three[2]].map(|one| one.force_newtons);
+            (a - 2.0 * b + c).powi(2)
+        });
+        // The variance of a - 2 b + c is 6 times that of each.
+        (squares.sum::<f64>() / (6.0 * self.samples.len() as f64)).sqrt()
     }
 
     fn deepest(&self) -> f64 {
@@ -274,7 +300,8 @@ fn lack_of_fit(
     (indenter, specimen): (&Indenter, &Specimen),
     loading: &Loading,
 ) -> Option<LoadingLackOfFit> {
-    let residual_over_noise = fit.residual_newtons / loading.noise?;
+    let noise = loading.noise.unwrap_or_else(|| loading.white_noise());
+    let residual_over_noise = fit.residual_newtons / noise;
     let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / loading.samples.len() as f64).sqrt();
     if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
         return None;

@@ -4,7 +4,7 @@ use super::arguments::{Choice, choice, parse_columns, parse_number};
 use super::output::Output;
 use super::{Failure, compliance, source_failure};
 use clap::Args;
-use palpate_analysis::material::{MaterialError, MaterialRequest, material};
+use palpate_analysis::material::{ContactKnowledge, MaterialError, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
@@ -43,9 +43,10 @@ pub struct MaterialArgs {
     /// Take the loading up to this depth in mm; without it all of it
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     depth_max: Option<f64>,
-    /// Find the contact from the loading alone, also where the session knows it
-    #[arg(long)]
-    free_contact: bool,
+    /// Standard uncertainty in mm of the contact at depth zero, 0 for exact, or free to find it from the loading alone;
+    /// without it that of the session, and free for a table
+    #[arg(long, value_name = "MM|free", value_parser = contact, allow_hyphen_values = true)]
+    contact_error: Option<ContactKnowledge>,
     /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
@@ -103,7 +104,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
             false => PoissonBasis::Assumed,
         },
         depth_max_mm: args.depth_max,
-        is_contact_free: args.free_contact,
+        contact: args.contact_error.unwrap_or(ContactKnowledge::Recorded),
     };
     let report = material(&request).map_err(failure)?;
     report.notes.iter().for_each(|note| output.note(note));
@@ -153,4 +154,11 @@ fn quantity(text: &str) -> Result<Quantity, String> {
         text.split_once('±').or_else(|| text.split_once("+-")).unwrap_or((text, "0"));
     let number = |part: &str| parse_number(part.trim());
     Ok(Quantity { value: number(value)?, standard_uncertainty: number(error)? })
+}
+
+fn contact(text: &str) -> Result<ContactKnowledge, String> {
+    match text.trim() {
+        "free" => Ok(ContactKnowledge::Free),
+        text => parse_number(text).map(ContactKnowledge::Stated),
+    }
 }

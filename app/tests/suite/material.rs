@@ -112,6 +112,10 @@ fn what_no_law_describes_is_refused_in_one_sentence() {
             "standard uncertainty of the radius",
         ),
         (format!("press.csv {sphere} --thickness 50 --depth-max 0"), "give a depth above 0 mm"),
+        (
+            format!("press.csv {sphere} --thickness 500 --contact-error=-1"),
+            "the standard uncertainty of the contact is -1",
+        ),
         (format!("nowhere.csv {sphere} --thickness 50"), "nowhere.csv"),
     ] {
         assert_refused(&typed(at.path(), &format!("material {line}")), 2, reason);

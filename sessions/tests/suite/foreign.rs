@@ -243,6 +243,29 @@ fn mach1_blocks_become_parts_in_newtons() {
     assert_eq!(numbers(&by_number.parts[0]), last);
 }
 
+/// An Optics11 indenter's file: micronewtons and nanometres, and beside them columns that are not read.
+#[test]
+fn optics11_curves_have_their_facts() {
+    let mut text = "Date\t01/02/2020\tTime\t11:03\tStatus\tOK\ngel 3\nk (N/m)\t0.510\n\nTip radius (um)\t10.000\n\
+        E[v=0.50] (Pa)\t35156.063\n\nTime (s)\tLoad (uN)\tIndentation (nm)\tCantilever (nm)\tPiezo (nm)\tAuxiliary\n"
+        .to_owned();
+    for i in 0..4 {
+        let i = f64::from(i);
+        writeln!(text, "{:.3}\t{:.3}\t{:.1}\t1\t2\t3", 0.001 * i, 0.125 * i, 50.0 * i).unwrap();
+    }
+    let read = read(&text, &detect_all());
+    assert_eq!(reading(&read.parts[0], "layout"), "optics11 (detected)");
+    let last = *numbers(&read.parts[0]).last().unwrap();
+    let expected = [0.003, 1.5e-4, 3.75e-7];
+    for (found, expected) in last.iter().zip(expected) {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{last:?}");
+    }
+    let facts = &read.parts[0].imported.facts;
+    for (name, value) in [("Tip radius (um)", "10.000"), ("Specimen", "gel 3"), ("Time", "11:03")] {
+        assert!(facts.contains(&(name.into(), value.into())), "{name}: {facts:?}");
+    }
+}
+
 /// A rheometer's export: intervals, blank rows, a row of units, decimal commas.
 fn rheometer() -> String {
     let mut text =

@@ -17,6 +17,8 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         \t[s]\t[mm]\t[N]\n\t0,0\t1,5\t2\n\t0,1\t1,6\t3\n[step]\nS\nTime\tPosition\tForce\ns\tmm\tN\n0\t1\t2\n1\t2\t3\n";
     let bluehill = "Test : Rate 1,\"1.0\",mm/s\nResults Table 1\n,Load\n,(N)\n1,3\n\nTime,Extension,Load\n(s),(mm),(N)\n\
         \"0.0\",\"1\",\"2\"\n\"0.1\",\"2\",\"3\"\nSpecimen label,b\nTime,Extension,Load\n(s),(mm),(N)\n0,1,2\n1,2,3\n";
+    let optics11 = "Date\t1\tTime\t2\ngel\nTip radius (um)\t10\nTime (s)\tLoad (uN)\tIndentation (nm)\n\
+        0.0\t1\t2\n0.1\t2\t3\n";
     let wide: Vec<u8> =
         "\u{feff}".encode_utf16().chain(table.encode_utf16()).flat_map(u16::to_le_bytes).collect();
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
@@ -25,6 +27,7 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("mach-1", mach1.into()),
         ("rheometer", rheometer.into()),
         ("bluehill", bluehill.into()),
+        ("optics11", optics11.into()),
         ("utf-16", wide),
         ("xlsx", fs::read(data.join("zwick.xlsx")).unwrap()),
         ("xls", fs::read(data.join("zwick.xls")).unwrap()),

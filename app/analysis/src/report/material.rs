@@ -109,14 +109,31 @@ fn specimen_words(report: &MaterialReport) -> String {
     )
 }
 
+/// A length in mm, or in um where it is small.
+fn length(mm: f64) -> String {
+    match mm.abs() < 0.1 {
+        true => format!("{} um", significant(1e3 * mm, 4)),
+        false => format!("{} mm", significant(mm, 4)),
+    }
+}
+
+/// A force in N, in mN or uN where it is small.
+fn force(newtons: f64) -> String {
+    match newtons.abs() {
+        n if n < 1e-4 => format!("{} uN", significant(1e6 * newtons, 3)),
+        n if n < 0.1 => format!("{} mN", significant(1e3 * newtons, 3)),
+        _ => format!("{} N", significant(newtons, 3)),
+    }
+}
+
 fn loading_words(report: &MaterialReport) -> String {
-    let noise = report.noise_n.map(|noise| format!(", noise {} mN", significant(1e3 * noise, 3)));
+    let noise = report.noise_n.map(|noise| format!(", noise {}", force(noise)));
     format!(
-        "to {} mm in {} s, {} samples; residuals {} mN{}",
-        significant(report.depth_mm, 4),
+        "to {} in {} s, {} samples; residuals {}{}",
+        length(report.depth_mm),
         significant(report.loading_s, 3),
         report.samples,
-        significant(1e3 * report.residual_n, 3),
+        force(report.residual_n),
         noise.unwrap_or_default(),
     )
 }
@@ -124,15 +141,14 @@ fn loading_words(report: &MaterialReport) -> String {
 fn contact_words(report: &MaterialReport) -> String {
     let shift = report.contact_shift_mm;
     let side = if shift < 0.0 { "above" } else { "below" };
+    let moved = format!("{} {side} depth zero", length(shift.abs()));
     match report.contact_error_mm {
+        Some(0.0) => "at depth zero, taken as exact".into(),
         Some(error) => format!(
-            "{} um {side} where it was found, {} of its standard uncertainties of {} um",
-            significant(1e3 * shift.abs(), 3),
+            "{moved}, which is {} times the standard uncertainty of {} um",
             significant(shift.abs() / error, 2),
             error_alone(1e3 * error),
         ),
-        None => {
-            format!("{} mm {side} depth zero, from the loading alone", significant(shift.abs(), 4))
-        }
+        None => format!("{moved}, from the loading alone"),
     }
 }

@@ -4,6 +4,7 @@
 mod bluehill;
 mod legacy;
 mod mach1;
+mod optics11;
 mod rheometer;
 mod unzipped;
 mod workbook;
@@ -16,6 +17,7 @@ const ALL: &[Layout] = &[
     // For text that no other layout claims.
     TABLE,
     mach1::LAYOUT,
+    optics11::LAYOUT,
     rheometer::LAYOUT,
     workbook::LAYOUT,
     bluehill::LAYOUT,
