@@ -162,6 +162,7 @@ fn source(session: &Session) -> FitSource {
         calibration: None,
         raw: None,
         touches: Vec::new(),
+        thickness_mm: None,
     }
 }
 
