@@ -1,6 +1,8 @@
 //! Contact laws: the force of a rigid, frictionless indenter in an elastic or viscoelastic specimen, how far each law holds, and
 //! the relaxation modulus of a record.
 //!
+//! `scripts/contact-oracle` compares the forces with finite elements.
+//!
 //! This crate never reads a file or a clock and starts no thread. Start reading at [`IndenterShape`] and [`ContactLaw`].
 
 mod document;
