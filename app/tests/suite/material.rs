@@ -92,7 +92,7 @@ fn what_no_law_describes_is_refused_in_one_sentence() {
             "contact radius over the thickness",
         ),
         (
-            "press.csv --indenter sphere --radius 2 --poisson 0.45 --thickness 50".into(),
+            "press.csv --indenter sphere --radius 1 --poisson 0.45 --thickness 50".into(),
             "give --depth-max 0.",
         ),
         (format!("press.csv {sphere} --thickness=-3"), "the thickness of the specimen is -3"),

@@ -47,6 +47,8 @@ pub enum LayerError {
         "the contact radius would be more than {RADIUS_OVER_THICKNESS_MAX} times the thickness of the layer; use a smaller depth or a thicker specimen"
     )]
     TooThin,
+    #[error("the sphere would touch beyond its equator; use a smaller depth")]
+    BeyondEquator,
 }
 
 /// Contact radii over thicknesses that are solved to 1e-8: beyond, the linear theory of a layer says little of tissue.
@@ -91,26 +93,17 @@ impl Layer {
         Ok(check_poisson(self.poisson)?)
     }
 
-    /// The contact at a depth in mm. A sphere is taken as a parabola.
+    /// The contact at a depth in mm, less than that at which a sphere touches beyond its equator.
     pub fn contact(&self, shape: IndenterShape, depth_mm: f64) -> Result<Contact, LayerError> {
         self.check()?;
         positive("the depth", depth_mm, "a length above 0 mm")?;
-        // Force over modulus is force over shear modulus over 2 (1 + nu).
-        let scale = 1.0 / ((1.0 - self.poisson) * 2.0 * (1.0 + self.poisson));
         match shape {
             IndenterShape::FlatPunch { radius_mm } => {
                 self.check_radius(radius_mm)?;
-                let solved = self.solve(radius_mm / self.thickness_mm, |_| 0.0);
-                let force = 2.0 * PI * solved.depth[0] * radius_mm * depth_mm;
-                Ok(Contact { radius_mm, force_over_modulus: scale * force })
+                let force_over_modulus = self.load_knot(shape, radius_mm).slope * depth_mm;
+                Ok(Contact { radius_mm, force_over_modulus })
             }
-            IndenterShape::Parabola { radius_mm: r } | IndenterShape::Sphere { radius_mm: r } => {
-                self.free_contact(depth_mm, scale, |x| x * x, |a| a * a / r)
-            }
-            IndenterShape::Cone { half_angle_rad } => {
-                let tangent = half_angle_rad.tan();
-                self.free_contact(depth_mm, scale, |x| FRAC_PI_2 * x, |a| a / tangent)
-            }
+            _ => self.free_contact(shape, depth_mm),
         }
     }
 
@@ -122,57 +115,56 @@ impl Layer {
         }
     }
 
-    /// Depth, force and its slope where the contact of a sphere, as a parabola, or a cone has a radius. The slope is the
+    /// Depth, force and its slope where the contact of a sphere, a parabola or a cone has a radius. The slope is the
     /// stiffness of a flat punch of that radius, because a contact that grows adds no force at its edge.
     pub(crate) fn load_knot(&self, shape: IndenterShape, radius_mm: f64) -> LoadKnot {
-        let (a, ratio) = (radius_mm, radius_mm / self.thickness_mm);
-        let (solved, unit) = match shape {
-            IndenterShape::Cone { half_angle_rad } => {
-                (self.solve(ratio, |x| FRAC_PI_2 * x), a / half_angle_rad.tan())
-            }
-            IndenterShape::Parabola { radius_mm }
-            | IndenterShape::Sphere { radius_mm }
-            | IndenterShape::FlatPunch { radius_mm } => {
-                (self.solve(ratio, |x| x * x), a * a / radius_mm)
-            }
+        let a = radius_mm;
+        // What Abel's transform makes of the shape: x^2 / R of a parabola, pi / 2 * x / tan(angle) of a cone, and
+        // x artanh(x / R) of a sphere (Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57).
+        let taken = |x: f64| match shape {
+            IndenterShape::FlatPunch { .. } => 0.0,
+            IndenterShape::Parabola { radius_mm } => (a * x).powi(2) / radius_mm,
+            IndenterShape::Sphere { radius_mm } => a * x * (a * x / radius_mm).atanh(),
+            IndenterShape::Cone { half_angle_rad } => FRAC_PI_2 * a * x / half_angle_rad.tan(),
         };
-        // The edge without pressure fixes the depth.
+        let solved = self.solve(a / self.thickness_mm, taken);
+        // The edge without pressure fixes the depth of this radius.
         let depth = solved.shape[1] / solved.depth[1];
+        // Force over modulus is force over shear modulus over 2 (1 + nu).
         let scale = 2.0 * PI * a / ((1.0 - self.poisson) * 2.0 * (1.0 + self.poisson));
         LoadKnot {
-            depth: unit * depth,
-            force: scale * unit * (depth * solved.depth[0] - solved.shape[0]),
+            depth,
+            force: scale * (depth * solved.depth[0] - solved.shape[0]),
             slope: scale * solved.depth[0],
         }
     }
 
-    /// A contact whose radius `a` is free: the shape takes `taken(x)` of the depth at `x` times the radius, in units of
-    /// `unit(a)`.
-    fn free_contact(
-        &self,
-        depth_mm: f64,
-        scale: f64,
-        taken: impl Fn(f64) -> f64 + Copy,
-        unit: impl Fn(f64) -> f64,
-    ) -> Result<Contact, LayerError> {
-        let at = |a: f64| {
-            let solved = self.solve(a / self.thickness_mm, taken);
-            // The edge without pressure fixes the depth of this radius.
-            let depth = solved.shape[1] / solved.depth[1];
-            let sum = depth * solved.depth[0] - solved.shape[0];
-            (unit(a) * depth, 2.0 * PI * a * unit(a) * sum)
+    /// A contact whose radius is free.
+    fn free_contact(&self, shape: IndenterShape, depth_mm: f64) -> Result<Contact, LayerError> {
+        let widest = RADIUS_OVER_THICKNESS_MAX * self.thickness_mm;
+        let equator = match shape {
+            IndenterShape::Sphere { radius_mm } => radius_mm * (1.0 - 1e-9),
+            _ => f64::INFINITY,
         };
-        let (mut low, mut high) = (0.0, RADIUS_OVER_THICKNESS_MAX * self.thickness_mm);
-        if at(high).0 < depth_mm {
-            return Err(LayerError::TooThin);
+        let (mut low, mut high) = (0.0, widest.min(equator));
+        if self.load_knot(shape, high).depth < depth_mm {
+            return Err(match equator < widest {
+                true => LayerError::BeyondEquator,
+                false => LayerError::TooThin,
+            });
         }
         // The depth grows with the radius.
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if at(middle).0 < depth_mm { low = middle } else { high = middle }
+            if self.load_knot(shape, middle).depth < depth_mm {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         let radius_mm = 0.5 * (low + high);
-        Ok(Contact { radius_mm, force_over_modulus: scale * at(radius_mm).1 })
+        let force_over_modulus = self.load_knot(shape, radius_mm).force;
+        Ok(Contact { radius_mm, force_over_modulus })
     }
 
     /// Solves the equation for a radius of one, `ratio` times the thickness.

@@ -16,7 +16,7 @@ pub enum ContactLaw {
     Hertz,
     /// Any shape on a half-space (Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57).
     Sneddon,
-    /// Any shape on a layer on a rigid base, a sphere as a parabola (Hayes et al., J. Biomech. 5 (1972) 541-551).
+    /// Any shape on a layer on a rigid base (Hayes et al., J. Biomech. 5 (1972) 541-551).
     Layer,
 }
 
@@ -104,7 +104,7 @@ impl ContactLaw {
             IndenterShape::Parabola { radius_mm } | IndenterShape::Sphere { radius_mm } => {
                 let bounded = Bounded { value: depth_mm / radius_mm, max: DEPTH_OVER_RADIUS_MAX };
                 let strain = 0.2 * contact.radius_mm / radius_mm;
-                ((self != Self::Sneddon).then_some(bounded), strain)
+                ((self == Self::Hertz).then_some(bounded), strain)
             }
             IndenterShape::Cone { half_angle_rad } => (None, 0.2 / half_angle_rad.tan()),
         };
@@ -143,7 +143,7 @@ impl Validity {
             }),
         };
         if let Some(bounded) = self.depth_over_radius {
-            let way_out = "take a smaller depth, or Sneddon's law on a thick specimen";
+            let way_out = "take a smaller depth, or another law";
             within("the depth over the tip radius", bounded, way_out)?;
         }
         let way_out = "take the law of a layer or a smaller contact";
@@ -220,7 +220,7 @@ mod tests {
     fn contact_outside_of_the_range_is_refused_in_one_sentence() {
         assert_eq!(
             refusal(ContactLaw::Hertz, &sphere(1.0), 100.0, 0.08),
-            "the depth over the tip radius is 0.0800, above 0.05, up to which the law holds; take a smaller depth, or Sneddon's law on a thick specimen"
+            "the depth over the tip radius is 0.0800, above 0.05, up to which the law holds; take a smaller depth, or another law"
         );
         let deep = refusal(ContactLaw::Sneddon, &sphere(1.0), 100.0, 0.4);
         assert!(deep.starts_with("the strain is 0.1"), "{deep}");
