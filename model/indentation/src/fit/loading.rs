@@ -76,7 +76,7 @@ pub enum LoadingFitError {
     #[error("the loading reaches {depth_mm:.4} mm behind the contact, and {reason}")]
     TooDeep { depth_mm: f64, contact_shift_mm: f64, reason: ContactError },
     #[error(
-        "the loading has {count} samples behind the contact; give at least {SAMPLES_MIN}, so a deeper part or a slower ramp"
+        "the loading has {count} samples from the contact to its greatest force; give at least {SAMPLES_MIN}: press deeper or slower, and check the signs of force and depth"
     )]
     Samples { count: usize },
     #[error(
