@@ -13,7 +13,7 @@ use serde::Serialize;
 use std::path::PathBuf;
 use thiserror::Error;
 
-/// What is asked of a press.
+/// A press and what is known of it.
 #[derive(Debug)]
 pub struct MaterialRequest {
     pub source: PathBuf,
@@ -38,11 +38,11 @@ pub struct MaterialRequest {
 /// How well the contact at depth zero is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactKnowledge {
-    /// As the touches of the session found it; of a table the loading alone tells.
+    /// As the touches of the session found it; of a table as the loading alone shows.
     Recorded,
     /// Its standard uncertainty in mm.
     Stated(f64),
-    /// The loading alone tells where it is.
+    /// The loading alone shows where it is.
     Free,
 }
 
@@ -63,7 +63,7 @@ pub struct MaterialReport {
     pub not_included: Vec<&'static str>,
     /// By how much deeper than found the contact is, in mm.
     pub contact_shift_mm: f64,
-    /// Standard uncertainty of the contact as found, in mm; `None` where the loading alone tells it.
+    /// Standard uncertainty of the contact as found, in mm; `None` where the loading alone shows it.
     pub contact_error_mm: Option<f64>,
     pub samples: usize,
     /// Of the deepest sample from the contact as fitted, in mm.
@@ -117,7 +117,7 @@ pub enum MaterialError {
     #[error("{reason}; for this indenter and specimen give --depth-max {depth_max_mm:.4} or less")]
     TooDeep { reason: LoadingFitError, depth_max_mm: f64 },
     #[error(
-        "the thickness of the specimen is not known; give --thickness, or measure it in the session with the protocol thickness"
+        "the thickness of the specimen is not known; give --thickness, or find the base in the session with the step find-base"
     )]
     NoThickness,
     #[error("a greatest depth of {depth_mm} mm is not possible; give a depth above 0 mm")]

@@ -23,7 +23,7 @@ pub struct LoadingKnowledge {
     /// Standard deviation of a force in N; `None` takes that of the residuals.
     pub noise_newtons: Option<f64>,
     /// Standard uncertainty of the contact in mm: zero for a contact that is certain, `None` for one that the curve alone
-    /// tells.
+    /// shows.
     pub contact_error_mm: Option<f64>,
 }
 
@@ -223,7 +223,7 @@ pub fn fit_loading(
         return Err(LoadingFitError::Samples { count });
     }
     let lowest = samples.iter().map(|one| one.depth_mm).fold(f64::INFINITY, f64::min);
-    // A contact that the curve alone tells may be anywhere along it.
+    // A contact that the curve alone shows may be anywhere along it.
     let starts: Vec<f64> = match knowledge.contact_error_mm {
         Some(_) => vec![0.0],
         None => (0..24).map(|i| lowest + (depth_max - lowest) * f64::from(i) / 25.0).collect(),
