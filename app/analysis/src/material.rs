@@ -130,7 +130,7 @@ const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
 const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
 const END_SHARE: f64 = 0.998;
-/// Halves of the interval of a normal number that holds 95 %.
+/// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
 const COVERAGE: f64 = 1.96;
 
 /// The modulus of the loading of a session or a table.
@@ -232,7 +232,8 @@ struct Loading {
 impl Loading {
     fn of(read: &FitSource, depth_max_mm: Option<f64>) -> Self {
         let shift = read.signal.as_ref().map_or(0.0, |signal| signal.contact_shift_mm);
-        let deepest = read.samples.iter().map(|one| one.depth.0).fold(f64::NEG_INFINITY, f64::max);
+        let depths = read.samples.iter().map(|one| one.depth.0 - shift);
+        let deepest = depths.fold(f64::NEG_INFINITY, f64::max);
         let end = depth_max_mm.map_or(END_SHARE * deepest, |max| max.min(END_SHARE * deepest));
         let count = read.samples.iter().position(|one| one.depth.0 - shift > end);
         let taken = &read.samples[..count.unwrap_or(read.samples.len())];
