@@ -10,6 +10,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 pub mod assessment;
+pub mod autocorrelation;
 pub mod calibration;
 pub mod control_chart;
 pub mod estimate;

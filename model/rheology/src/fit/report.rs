@@ -2,7 +2,6 @@
 
 use super::columns::{ColumnSource, OuterPoint, ParameterPoint};
 use super::design::Scale;
-use super::noise::Memory;
 use super::options::Layout;
 use super::sample::FitSample;
 use super::sentences;
@@ -10,6 +9,7 @@ use super::solve::FitSolution;
 use super::uncertainty::UncertaintyEstimate;
 use crate::distinct;
 use crate::families::{Model, ModelParameter, OuterRange, find_family};
+use palpate_model::autocorrelation::Memory;
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,12 @@
 //! Standard errors that allow for autocorrelated residuals.
 
-use super::noise::{self, Blocks, Memory};
+use super::inflation::{inflation, triangle};
 use super::passes::{RecordFactor, UnknownPlace};
 use super::refine::RefinedFit;
 use super::solve::FitSolution;
 use super::system::{Rows, System};
 use super::triangle::Factor;
+use palpate_model::autocorrelation::{BlockedResiduals, Memory, memory};
 
 /// A search coordinate this close to an end of the searched range is at the end.
 const EDGE: f64 = 1e-3;
@@ -23,8 +24,8 @@ pub(super) const DIFFERENCE: f64 = 1e-6;
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
-    /// Blocks, memory, and variance of the weighted residuals.
-    records: Vec<(Blocks, Option<Memory>, f64)>,
+    /// BlockedResiduals, memory, and variance of the weighted residuals.
+    records: Vec<(BlockedResiduals, Option<Memory>, f64)>,
     block_factor: Factor,
     /// The joint triangle with drift of a larger variance, and how well that variance is known; where signals are fitted.
     drift: Option<(Factor, f64)>,
@@ -76,7 +77,7 @@ impl Uncertainty {
         let spare = system.measured() - unknowns;
         let scatter = (spare > 0).then(|| (refined.sum / spare as f64).sqrt());
         let change = &refined.change;
-        let blocks: Vec<Blocks> = refined
+        let blocks: Vec<BlockedResiduals> = refined
             .pass
             .records
             .iter()
@@ -90,7 +91,7 @@ impl Uncertainty {
         let forces = system.force_square() / system.measured() as f64;
         // The residual of a record without noise is rounding, whose autocorrelation means nothing.
         let is_rounding = white <= ROUNDING * forces;
-        let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
+        let block_factor = triangle(blocks.iter(), unknowns).finish();
         let alone: Vec<bool> = (0..unknowns).map(|k| is_of_one(&blocks, k)).collect();
         let records = blocks
             .into_iter()
@@ -100,7 +101,7 @@ impl Uncertainty {
                 let own = own_variance(system, refined, record).unwrap_or(white);
                 let memory = match is_rounding {
                     true => Some(Memory::none(white)),
-                    false => noise::memory(&blocks, &alone, own),
+                    false => memory(&blocks, &alone, own),
                 };
                 (blocks, memory, own)
             })
@@ -147,7 +148,7 @@ impl Uncertainty {
         let independent = scatter * refined.pass.joint.deviation(combination);
         let white = scatter * scatter;
         let (inflation, uncertainty) =
-            noise::inflation(&self.records, &self.block_factor, combination, white);
+            inflation(&self.records, &self.block_factor, combination, white);
         let std_error = independent * inflation.sqrt();
         // The drift's share of the variance is no better known than the drift (Welch and Satterthwaite, JCGM 100:2008,
         // G.4).
@@ -172,8 +173,9 @@ impl Uncertainty {
 }
 
 /// Whether an unknown acts on no more than one record.
-fn is_of_one(blocks: &[Blocks], unknown: usize) -> bool {
-    let acts = |blocks: &&Blocks| blocks.columns[unknown].iter().any(|&value| value != 0.0);
+fn is_of_one(blocks: &[BlockedResiduals], unknown: usize) -> bool {
+    let acts =
+        |blocks: &&BlockedResiduals| blocks.columns[unknown].iter().any(|&value| value != 0.0);
     blocks.iter().filter(acts).count() < 2
 }
 
@@ -203,9 +205,13 @@ fn residual_square(system: &System<'_>, refined: &RefinedFit, record: usize) -> 
     (0..factor.width()).map(|i| residual(i).powi(2)).sum()
 }
 
-fn residual_blocks(record: &RecordFactor, map: &[UnknownPlace], solution: &[f64]) -> Blocks {
+fn residual_blocks(
+    record: &RecordFactor,
+    map: &[UnknownPlace],
+    solution: &[f64],
+) -> BlockedResiduals {
     let (sums, last) = (&record.blocks, record.factor.width() - 1);
-    let mut blocks = Blocks {
+    let mut blocks = BlockedResiduals {
         residuals: Vec::with_capacity(sums.len()),
         columns: vec![Vec::with_capacity(sums.len()); map.len()],
         places: sums.iter().map(|block| block.place).collect(),

@@ -14,13 +14,14 @@ mod residual_blocks;
 mod stencil;
 
 use super::design::linear_units;
-use super::noise;
+use super::inflation::{inflation, triangle};
 use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
 use super::report::{FittedParameter, student_t975};
 use bank::{Bank, COLUMNS, Grid, NODES};
 use blocks::Blocks;
 use identifiability::BlindParameters;
 use node::{Solution, UsedColumns};
+use palpate_model::autocorrelation::{BlockedResiduals, memory};
 use palpate_model::estimate::{Identifiability, LiveEstimate};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use path::Path;
@@ -211,7 +212,7 @@ impl LiveFit {
         let seen: Vec<usize> = (0..values.len()).filter(|&k| is_seen[k]).collect();
         let joined = means.residuals.len().div_ceil(NOISE_BLOCKS).max(1);
         let ranges = (0..means.residuals.len() / joined).map(|b| b * joined..(b + 1) * joined);
-        let mut blocks = noise::Blocks {
+        let mut blocks = BlockedResiduals {
             residuals: Vec::new(),
             columns: vec![Vec::new(); seen.len()],
             places: Vec::new(),
@@ -236,13 +237,13 @@ impl LiveFit {
         if white * self.samples as f64 <= ROUNDING * ROUNDING * self.bank.shared()[2] {
             return inflations;
         }
-        let memory = noise::memory(&blocks, &vec![true; seen.len()], white);
-        let factor = noise::triangle(std::iter::once(&blocks), seen.len()).finish();
+        let memory = memory(&blocks, &vec![true; seen.len()], white);
+        let factor = triangle(std::iter::once(&blocks), seen.len()).finish();
         let records = [(blocks, memory, white)];
         for (place, &k) in seen.iter().enumerate() {
             let mut unit = vec![0.0; seen.len()];
             unit[place] = 1.0;
-            inflations[k] = noise::inflation(&records, &factor, &unit, white);
+            inflations[k] = inflation(&records, &factor, &unit, white);
         }
         inflations
     }

@@ -9,8 +9,6 @@
 //! of the noise is white. Its parameters maximise the restricted likelihood (Harville, J. Am. Stat.
 //! Assoc. 72 (1977) 320-338), which allows for what the fit itself has taken out of the residuals.
 
-use super::triangle::{Factor, Triangle};
-
 /// Fewer blocks than this beyond the unknowns say nothing of memory.
 const SPARE_MIN: usize = 12;
 /// Twice the gain in log-likelihood that memory must bring: the 95 % point of chi-square with three
@@ -35,18 +33,20 @@ const COLUMNS_MAX: usize = 9;
 /// Residuals of one record in blocks, each over the root of its count: `residuals[b]` and, for
 /// every unknown, its column.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Blocks {
+pub struct BlockedResiduals {
     pub residuals: Vec<f64>,
+    /// For every unknown a value for every block.
     pub columns: Vec<Vec<f64>>,
     /// Position of each block in time; censored stretches leave gaps.
     pub places: Vec<usize>,
+    /// Samples of a block.
     pub length: f64,
 }
 
 /// Second-order description of blocks of noise: variance `level`, covariance
 /// `level * neighbour * forgetting^(lag - 1)` from lag one on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Memory {
+pub struct Memory {
     pub level: f64,
     /// Correlation of neighbouring blocks.
     pub neighbour: f64,
@@ -57,16 +57,19 @@ pub(super) struct Memory {
 }
 
 impl Memory {
+    #[must_use]
     pub fn none(level: f64) -> Self {
         Self { level, neighbour: 0.0, forgetting: 0.0, uncertainty: 0.0 }
     }
 
     /// Variance of a sum over many blocks, for each block.
+    #[must_use]
     pub fn long_run(&self) -> f64 {
         self.level * long_run(self.neighbour, self.forgetting)
     }
 
     /// `z' Gamma z` for a weight on each block.
+    #[must_use]
     pub fn quadratic(&self, z: &[f64], places: &[usize]) -> f64 {
         let (mut diagonal, mut lagged, mut past) = (0.0, 0.0, 0.0);
         let mut next = 0;
@@ -92,7 +95,8 @@ fn long_run(neighbour: f64, forgetting: f64) -> f64 {
 /// Only unknowns that act on this record `alone` have taken their share out of its residuals. One that several
 /// records share is a compromise between them: a specimen twice as stiff leaves residuals of the very shape of the
 /// shared column, which must count as memory and not as taken out.
-pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memory> {
+#[must_use]
+pub fn memory(blocks: &BlockedResiduals, alone: &[bool], white: f64) -> Option<Memory> {
     let whitened = WhitenedBlocks::new(blocks, alone)?;
     let spare = whitened.spare();
     if white <= 0.0 || !white.is_finite() {
@@ -236,7 +240,7 @@ struct Whitening {
 }
 
 impl WhitenedBlocks {
-    fn new(blocks: &Blocks, alone: &[bool]) -> Option<Self> {
+    fn new(blocks: &BlockedResiduals, alone: &[bool]) -> Option<Self> {
         let own = blocks.columns.iter().zip(alone);
         let own: Vec<&[f64]> =
             own.filter(|(_, alone)| **alone).map(|(column, _)| column.as_slice()).collect();
@@ -366,47 +370,4 @@ fn orthonormal(columns: &[&[f64]]) -> Vec<Vec<f64>> {
 
 fn norm(column: &[f64]) -> f64 {
     column.iter().map(|value| value * value).sum::<f64>().sqrt()
-}
-
-/// The triangle of the block columns, for the influence of blocks on a parameter.
-pub(super) fn triangle<'b>(blocks: impl Iterator<Item = &'b Blocks>, unknowns: usize) -> Triangle {
-    let mut triangle = Triangle::new(unknowns + 1);
-    let mut row = vec![0.0; unknowns + 1];
-    for blocks in blocks {
-        for b in 0..blocks.residuals.len() {
-            for (slot, column) in row.iter_mut().zip(&blocks.columns) {
-                *slot = column[b];
-            }
-            row[unknowns] = blocks.residuals[b];
-            triangle.push(&row, 1.0);
-        }
-    }
-    triangle
-}
-
-/// Variance of a combination of unknowns under the memories found over that under independent
-/// noise of variance `white`, and the variance of its logarithm; `factor` is the [`triangle`].
-pub(super) fn inflation(
-    records: &[(Blocks, Option<Memory>, f64)],
-    factor: &Factor,
-    combination: &[f64],
-    white: f64,
-) -> (f64, f64) {
-    let influence = factor.influence(combination);
-    let (mut with, mut without, mut uncertain) = (0.0, 0.0, 0.0);
-    for (blocks, memory, own) in records {
-        let weights: Vec<f64> = (0..blocks.residuals.len())
-            .map(|b| {
-                let shares = influence.iter().zip(&blocks.columns);
-                shares.map(|(share, column)| share * column[b]).sum()
-            })
-            .collect();
-        let memory = memory.unwrap_or_else(|| Memory::none(*own));
-        let part = memory.quadratic(&weights, &blocks.places);
-        with += part;
-        without += white * weights.iter().map(|z| z * z).sum::<f64>();
-        uncertain += memory.uncertainty * part * part;
-    }
-    let inflation = with / without;
-    if inflation.is_finite() { (inflation.max(1.0), uncertain / (with * with)) } else { (1.0, 0.0) }
 }
