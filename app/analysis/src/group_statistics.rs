@@ -1,6 +1,6 @@
 //! Mean and scatter of a value in groups of sessions, and by how much two groups differ.
 
-use palpate_rheology::fit::student_t975;
+use palpate_model::estimate::student_t975;
 
 /// Mean of a group, and how far its values scatter.
 #[derive(Clone, Copy, Debug, PartialEq)]

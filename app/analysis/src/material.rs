@@ -7,7 +7,8 @@ use palpate_indentation::{
     LoadingSample, PoissonBasis, Quantity, Specimen, Validity, fit_loading,
 };
 use palpate_model::calibration::ForceUncertainty;
-use palpate_model::units::Newtons;
+use palpate_model::units::{Newtons, Volts};
+use palpate_rheology::fit::UnloadedMean;
 use palpate_tables::import::ColumnNames;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -32,18 +33,29 @@ pub struct MaterialRequest {
     pub poisson_basis: PoissonBasis,
     /// The loading is taken up to this depth in mm; `None` takes all of it.
     pub depth_max_mm: Option<f64>,
-    pub contact: ContactKnowledge,
+    pub contact: ErrorSource,
+    pub force_zero: ErrorSource,
 }
 
-/// How well the contact at depth zero is known.
+/// Where the standard uncertainty of the contact at depth zero, or of the force out of contact, comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ContactKnowledge {
-    /// As the touches of the session found it; of a table as the loading alone shows.
+pub enum ErrorSource {
+    /// The session: the touches that found the contact, and the signal out of contact. Of a table the loading alone shows both.
     Recorded,
-    /// Its standard uncertainty in mm.
+    /// In mm or N.
     Stated(f64),
-    /// The loading alone shows where it is.
+    /// The loading alone shows where contact or zero is.
     Free,
+}
+
+impl ErrorSource {
+    fn or_recorded(self, recorded: Option<f64>) -> Option<f64> {
+        match self {
+            Self::Recorded => recorded,
+            Self::Stated(error) => Some(error),
+            Self::Free => None,
+        }
+    }
 }
 
 /// A modulus and all it rests on.
@@ -65,6 +77,10 @@ pub struct MaterialReport {
     pub contact_shift_mm: f64,
     /// Standard uncertainty of the contact as found, in mm; `None` where the loading alone shows it.
     pub contact_error_mm: Option<f64>,
+    /// The force out of contact as fitted, in N.
+    pub force_zero_n: f64,
+    /// Standard uncertainty of the force out of contact before the fit, in N; `None` where the loading alone shows it.
+    pub force_zero_error_n: Option<f64>,
     pub samples: usize,
     /// Of the deepest sample from the contact as fitted, in mm.
     pub depth_mm: f64,
@@ -130,8 +146,6 @@ const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
 const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
 const END_SHARE: f64 = 0.998;
-/// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
-const COVERAGE: f64 = 1.96;
 
 /// The modulus of the loading of a session or a table.
 pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialError> {
@@ -158,12 +172,15 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
         poisson_basis: request.poisson_basis,
     };
     let loading = Loading::of(&read, request.depth_max_mm);
-    let contact_error_mm = match request.contact {
-        ContactKnowledge::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
-        ContactKnowledge::Stated(error_mm) => Some(error_mm),
-        ContactKnowledge::Free => None,
+    let signal = read.signal.as_ref();
+    let contact_error_mm =
+        request.contact.or_recorded(signal.map(|signal| signal.contact_error_mm));
+    let force_zero_error_n = request.force_zero.or_recorded(zero_scatter(&read));
+    let knowledge = LoadingKnowledge {
+        noise_newtons: loading.noise,
+        contact_error_mm,
+        zero_error_newtons: force_zero_error_n,
     };
-    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm };
     let (law, indenter) = (request.law, &request.indenter);
     let fit = fit_loading(law, indenter, &specimen, &loading.samples, knowledge)
         .map_err(|reason| too_deep(reason, request, &specimen))?;
@@ -177,14 +194,14 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
     }
     match &compliance {
         Some(applied) if applied.is_applied => {
-            let mpa = compliance_mpa(applied, &fit, law, (indenter, &specimen), &loading);
+            let mpa = compliance_mpa(applied, &fit, law, (indenter, &specimen), &loading)?;
             terms.push(("machine compliance", mpa));
         }
         _ => not_included.push("machine compliance"),
     }
     let variance: f64 = terms.iter().map(|(_, mpa)| mpa * mpa).sum();
     let standard_uncertainty_mpa = variance.sqrt();
-    let half = COVERAGE * standard_uncertainty_mpa;
+    let half = fit.coverage_factor(variance) * standard_uncertainty_mpa;
     Ok(MaterialReport {
         source: request.source.clone(),
         law,
@@ -197,6 +214,8 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
         not_included,
         contact_shift_mm: fit.contact_shift_mm,
         contact_error_mm,
+        force_zero_n: fit.force_zero_newtons,
+        force_zero_error_n,
         samples: loading.samples.len(),
         depth_mm: loading.deepest() - fit.contact_shift_mm,
         loading_s: loading.secs,
@@ -267,9 +286,39 @@ impl Loading {
         (squares.sum::<f64>() / (6.0 * self.samples.len() as f64)).sqrt()
     }
 
+    /// Depths and forces from contact and zero as fitted, with so much more compliance of the machine taken out.
+    fn from_contact(&self, fit: &LoadingFit, more_mm_per_n: f64) -> Vec<LoadingSample> {
+        let moved = |one: &LoadingSample| LoadingSample {
+            depth_mm: one.depth_mm - fit.contact_shift_mm - more_mm_per_n * one.force_newtons,
+            force_newtons: one.force_newtons - fit.force_zero_newtons,
+        };
+        self.samples.iter().map(moved).collect()
+    }
+
+    /// What is known once contact and zero are taken as fitted.
+    fn all_known(&self) -> LoadingKnowledge {
+        LoadingKnowledge {
+            noise_newtons: self.noise,
+            contact_error_mm: Some(0.0),
+            zero_error_newtons: Some(0.0),
+        }
+    }
+
     fn deepest(&self) -> f64 {
         self.samples.iter().map(|one| one.depth_mm).fold(f64::NEG_INFINITY, f64::max)
     }
+}
+
+/// How far the signal out of contact has been from the zero of the tare, as a root mean square in N: noise of these means is far
+/// smaller, so this is what the zero has wandered. `None` where no signal out of contact is known.
+fn zero_scatter(read: &FitSource) -> Option<f64> {
+    let signal = read.signal.as_ref()?;
+    let (curve, first) = (&signal.curve, read.samples.first()?);
+    let offset = signal.volts.first()? - curve.volts_from_newtons(first.force).0;
+    let force = |one: &UnloadedMean| curve.newtons_from_volts(Volts(one.volts.0 - offset)).0;
+    let squares: f64 = signal.unloaded.iter().map(|one| force(one).powi(2)).sum();
+    let count = signal.unloaded.len();
+    (count > 0).then(|| (squares / count as f64).sqrt())
 }
 
 /// A refusal of a loading that reaches beyond the law says how far the law holds.
@@ -307,15 +356,11 @@ fn lack_of_fit(
     if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
         return None;
     }
-    let from_contact = |one: &LoadingSample| LoadingSample {
-        depth_mm: one.depth_mm - fit.contact_shift_mm,
-        ..*one
-    };
-    let samples: Vec<LoadingSample> = loading.samples.iter().map(from_contact).collect();
+    let samples = loading.from_contact(fit, 0.0);
     let middle = 0.5 * (loading.deepest() - fit.contact_shift_mm);
     let (deep, shallow): (Vec<_>, Vec<_>) =
         samples.into_iter().partition(|one| one.depth_mm > middle);
-    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm: Some(0.0) };
+    let knowledge = loading.all_known();
     let half = |samples: &[LoadingSample]| {
         fit_loading(law, indenter, specimen, samples, knowledge).ok().map(|fit| fit.modulus_mpa)
     };
@@ -341,20 +386,10 @@ fn compliance_mpa(
     law: ContactLaw,
     (indenter, specimen): (&Indenter, &Specimen),
     loading: &Loading,
-) -> f64 {
-    let moved: Vec<LoadingSample> = loading
-        .samples
-        .iter()
-        .map(|one| LoadingSample {
-            depth_mm: one.depth_mm
-                - fit.contact_shift_mm
-                - applied.std_error_mm_per_n * one.force_newtons,
-            ..*one
-        })
-        .collect();
-    let knowledge = LoadingKnowledge { noise_newtons: loading.noise, contact_error_mm: Some(0.0) };
-    fit_loading(law, indenter, specimen, &moved, knowledge)
-        .map_or(f64::NAN, |other| (other.modulus_mpa - fit.modulus_mpa).abs())
+) -> Result<f64, LoadingFitError> {
+    let moved = loading.from_contact(fit, applied.std_error_mm_per_n);
+    let other = fit_loading(law, indenter, specimen, &moved, loading.all_known())?;
+    Ok((other.modulus_mpa - fit.modulus_mpa).abs())
 }
 
 fn validity_rows(validity: &Validity) -> Vec<ValidityRow> {

@@ -4,7 +4,7 @@ use super::arguments::{Choice, choice, parse_columns, parse_number};
 use super::output::Output;
 use super::{Failure, compliance, source_failure};
 use clap::Args;
-use palpate_analysis::material::{ContactKnowledge, MaterialError, MaterialRequest, material};
+use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
@@ -45,8 +45,12 @@ pub struct MaterialArgs {
     depth_max: Option<f64>,
     /// Standard uncertainty in mm of the contact at depth zero, 0 for exact, or free to find it from the loading alone;
     /// without it that of the session, and free for a table
-    #[arg(long, value_name = "MM|free", value_parser = contact, allow_hyphen_values = true)]
-    contact_error: Option<ContactKnowledge>,
+    #[arg(long, value_name = "MM|free", value_parser = error_source, allow_hyphen_values = true)]
+    contact_error: Option<ErrorSource>,
+    /// Standard uncertainty in N of the force out of contact, 0 for exactly zero, or free to find it from the approach;
+    /// without it how far the session's signal out of contact wandered, and free for a table
+    #[arg(long, value_name = "N|free", value_parser = error_source, allow_hyphen_values = true)]
+    zero_error: Option<ErrorSource>,
     /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
@@ -104,7 +108,8 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
             false => PoissonBasis::Assumed,
         },
         depth_max_mm: args.depth_max,
-        contact: args.contact_error.unwrap_or(ContactKnowledge::Recorded),
+        contact: args.contact_error.unwrap_or(ErrorSource::Recorded),
+        force_zero: args.zero_error.unwrap_or(ErrorSource::Recorded),
     };
     let report = material(&request).map_err(failure)?;
     report.notes.iter().for_each(|note| output.note(note));
@@ -119,6 +124,7 @@ fn failure(err: MaterialError) -> Failure {
         MaterialError::Fit(
             LoadingFitError::NoContact
             | LoadingFitError::ContactMoved { .. }
+            | LoadingFitError::ZeroMoved { .. }
             | LoadingFitError::Samples { .. },
         ) => Failure::failed(err),
         err => Failure::usage(err),
@@ -156,9 +162,9 @@ fn quantity(text: &str) -> Result<Quantity, String> {
     Ok(Quantity { value: number(value)?, standard_uncertainty: number(error)? })
 }
 
-fn contact(text: &str) -> Result<ContactKnowledge, String> {
+fn error_source(text: &str) -> Result<ErrorSource, String> {
     match text.trim() {
-        "free" => Ok(ContactKnowledge::Free),
-        text => parse_number(text).map(ContactKnowledge::Stated),
+        "free" => Ok(ErrorSource::Free),
+        text => parse_number(text).map(ErrorSource::Stated),
     }
 }

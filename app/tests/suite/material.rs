@@ -7,6 +7,9 @@ use std::path::Path;
 
 const SESSION: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/ramp-hold-lab");
 
+/// What the force of a table is out of contact, in N.
+const ZERO_N: f64 = 3e-4;
+
 /// Hertz's law, `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`, written out here: a second implementation, with the contact at a depth.
 fn hertz_table(at: &Path, name: &str, [modulus_mpa, radius_mm, poisson, contact_mm]: [f64; 4]) {
     let mut text = String::from("t_s,depth_mm,force_N\n");
@@ -15,7 +18,7 @@ fn hertz_table(at: &Path, name: &str, [modulus_mpa, radius_mm, poisson, contact_
         let depth: f64 = 0.3 * t;
         let pressed = (depth - contact_mm).max(0.0);
         let plane = modulus_mpa / (1.0 - poisson * poisson);
-        let force = 4.0 / 3.0 * plane * radius_mm.sqrt() * pressed.powf(1.5);
+        let force = 4.0 / 3.0 * plane * radius_mm.sqrt() * pressed.powf(1.5) + ZERO_N;
         // Noise of 1e-5 N that is the same on every machine.
         let noise = 1e-5 * (f64::from(index) * 12.9898).sin();
         let _ = writeln!(text, "{t},{depth},{}", force + noise);
@@ -39,6 +42,7 @@ fn the_modulus_of_a_table_is_the_one_that_made_it() {
     // Noise of 1e-5 N against a force of 2 mN.
     assert!((modulus / 0.0125 - 1.0).abs() < 0.005, "{found}");
     assert!((number(&found, "/contact_shift_mm") - 0.05).abs() < 5e-4, "{found}");
+    assert!((number(&found, "/force_zero_n") - ZERO_N).abs() < 5e-6, "{found}");
     // The modulus falls with the root of the radius and with 1 / (1 - nu^2).
     let row = |source: &str| {
         let rows = found["budget"].as_array().unwrap();
@@ -71,9 +75,12 @@ fn a_session_states_contact_calibration_and_lack_of_fit() {
         .iter()
         .map(|row| row["source"].as_str().unwrap())
         .collect();
-    for source in ["noise", "contact", "calibration", "radius", "thickness", "Poisson's ratio"] {
+    for source in
+        ["noise", "contact", "force zero", "calibration", "radius", "thickness", "Poisson's ratio"]
+    {
         assert!(sources.contains(&source), "{source}: {found}");
     }
+    assert!(number(&found, "/force_zero_error_n") > 0.0, "{found}");
     // A body that relaxes bends the loading otherwise than an elastic one.
     assert!(number(&found, "/lack_of_fit/residual_over_noise") > 1.1, "{found}");
     assert!(number(&found, "/contact_error_mm") > 0.0);
@@ -116,6 +123,11 @@ fn what_no_law_describes_is_refused_in_one_sentence() {
             format!("press.csv {sphere} --thickness 500 --contact-error=-1"),
             "the standard uncertainty of the contact is -1",
         ),
+        (
+            format!("press.csv {sphere} --thickness 500 --zero-error=-1"),
+            "the standard uncertainty of the force zero is -1",
+        ),
+        (format!("press.csv {sphere} --thickness 50"), "begins in contact"),
         (format!("nowhere.csv {sphere} --thickness 50"), "nowhere.csv"),
     ] {
         assert_refused(&typed(at.path(), &format!("material {line}")), 2, reason);

@@ -20,6 +20,7 @@ pub fn material_text(report: &MaterialReport) -> String {
     lines.push(format!("specimen         {}", specimen_words(report)));
     lines.push(format!("loading          {}", loading_words(report)));
     lines.push(format!("contact          {}", contact_words(report)));
+    lines.push(format!("force zero       {}", zero_words(report)));
     for row in &report.validity {
         let value = significant(row.value, 3);
         lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
@@ -46,7 +47,7 @@ fn kpa(mpa: f64) -> f64 {
 fn lack_words(lack: LoadingLackOfFit) -> String {
     let LoadingLackOfFit { residual_over_noise, halves_mpa: [shallow, deep] } = lack;
     format!(
-        "lack of fit      residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa, and the interval does not include this",
+        "lack of fit      residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa; the interval counts the misfit as noise that lasts",
         significant(residual_over_noise, 3),
         significant(kpa(shallow), 4),
         significant(kpa(deep), 4),
@@ -150,5 +151,19 @@ fn contact_words(report: &MaterialReport) -> String {
             error_alone(1e3 * error),
         ),
         None => format!("{moved}, from the loading alone"),
+    }
+}
+
+fn zero_words(report: &MaterialReport) -> String {
+    let zero = report.force_zero_n;
+    match report.force_zero_error_n {
+        Some(0.0) => "0 N out of contact, taken as exact".into(),
+        Some(error) => format!(
+            "{} out of contact, which is {} times its standard uncertainty of {}",
+            force(zero),
+            significant(zero.abs() / error, 2),
+            force(error),
+        ),
+        None => format!("{} out of contact, from the approach alone", force(zero)),
     }
 }

@@ -8,8 +8,6 @@ mod loading;
 mod search;
 
 #[cfg(test)]
-mod loading_tests;
-#[cfg(test)]
 mod tests;
 
 pub use loading::{

@@ -3,7 +3,8 @@
 use super::information::{ExpectedError, ExpectedPrecision, check_resolved, intervals};
 use super::noise::{FreeOffsets, MeasurementNoise};
 use super::protocol::{PathPiece, ProtocolPath, duration_of};
-use crate::fit::{ExpectedSignal, FitSample, student_t975};
+use crate::fit::{ExpectedSignal, FitSample};
+use palpate_model::estimate::student_t975;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 

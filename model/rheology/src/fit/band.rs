@@ -1,10 +1,10 @@
 //! The force that a fitted body would give along other depths, and how well that is known.
 
-use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::FitSolution;
 use super::uncertainty::DIFFERENCE;
 use crate::families::Model;
+use palpate_model::estimate::student_t975;
 use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// A force that a fit predicts.

@@ -39,7 +39,6 @@ pub use live::{LiveFit, ResidualBlocks};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use predict::{ForcePrediction, predict};
 pub use profile::ProfileInterval;
-pub use report::student_t975;
 pub use report::{
     BudgetEntry, FitReport, FittedParameter, JointReport, NamedReport, NoiseEstimate,
 };

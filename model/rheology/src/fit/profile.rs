@@ -12,12 +12,12 @@
 
 use super::columns::{OuterPoint, ParameterPoint};
 use super::refine::{GAIN_THIN, StopRule, refine};
-use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::FitSolution;
 use super::system::Rows;
 use super::uncertainty::UncertaintyEstimate;
 use crate::families::OuterRange;
+use palpate_model::estimate::student_t975;
 use serde::{Deserialize, Serialize};
 
 /// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which

@@ -10,6 +10,7 @@ use super::uncertainty::UncertaintyEstimate;
 use crate::distinct;
 use crate::families::{Model, ModelParameter, OuterRange, find_family};
 use palpate_model::autocorrelation::Memory;
+use palpate_model::estimate::student_t975;
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::{Deserialize, Serialize};
@@ -361,50 +362,5 @@ fn estimate_noise(
         slow_share: (slow / white).min(1.0),
         correlation_time_s: Some(block * interval / r),
         effective_samples,
-    }
-}
-
-/// The 97.5 % point of Student's t: exact for 1 and 2 degrees of freedom, else the expansion of
-/// Abramowitz & Stegun 26.7.5, good to 1e-2 at 3 and to 1e-4 from 6 on.
-#[must_use]
-pub fn student_t975(degrees_of_freedom: f64) -> f64 {
-    let z: f64 = 1.959_963_984_540_054;
-    let at = |from: f64, [high, low]: [f64; 2]| {
-        let share = (1.0 / from - 1.0 / degrees_of_freedom) * from * (from + 1.0);
-        high * (low / high).powf(share)
-    };
-    match degrees_of_freedom.floor() {
-        ..1.0 => f64::NAN,
-        // Between the exact values of 1, 2 and 3, straight in their logarithm over 1/n; the series is for more.
-        ..2.0 => at(1.0, [12.706_204_736, 4.302_652_730]),
-        ..3.0 => at(2.0, [4.302_652_730, 3.182_446_305]),
-        _ => {
-            let n = degrees_of_freedom;
-            let (z3, z5) = (z.powi(3), z.powi(5));
-            let (z7, z9) = (z.powi(7), z.powi(9));
-            z + (z3 + z) / (4.0 * n)
-                + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n.powi(2))
-                + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
-                + (79.0 * z9 + 776.0 * z7 + 1482.0 * z5 - 1920.0 * z3 - 945.0 * z)
-                    / (92160.0 * n.powi(4))
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn student_quantiles_match_the_table() {
-        for (n, exact, allowed) in [
-            (3.0, 3.182_446, 1.5e-2),
-            (6.0, 2.446_912, 1e-3),
-            (10.0, 2.228_139, 1e-4),
-            (30.0, 2.042_272, 1e-6),
-            (1000.0, 1.962_339, 1e-6),
-        ] {
-            assert!((student_t975(n) - exact).abs() < allowed, "{n}");
-        }
     }
 }

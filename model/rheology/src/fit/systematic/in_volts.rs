@@ -2,7 +2,6 @@
 //! what the record itself says of the calibration counts. Zero and contact position are free as in the fit.
 
 use super::super::passes::product;
-use super::super::report::student_t975;
 use super::super::sample::FitError;
 use super::super::signal::ErrorPlace;
 use super::super::solve::FitSolution;
@@ -15,6 +14,7 @@ use super::{
 };
 use crate::distinct;
 use palpate_model::calibration::{ForceUncertainty, UncertaintyTerm};
+use palpate_model::estimate::student_t975;
 use palpate_model::units::Newtons;
 
 /// Standard uncertainty of the width of a loop, relative to its width in the calibration: over a part of the range a loop
