@@ -11,6 +11,8 @@ pub(super) const UNKNOWNS: usize = 3;
 
 /// Steps until the modulus stays to 1e-12; the sum of squares is nearly a parabola, so ten are many.
 const STEPS_MAX: usize = 60;
+/// So many samples show which of the starts is the best.
+const SAMPLES_OF_A_START: usize = 200;
 /// A column of which less than this is left beside the others is their sum to rounding.
 const DEPENDENT: f64 = 1e-12;
 
@@ -49,10 +51,10 @@ impl LoadingProblem<'_> {
         ([force, -at[MODULUS] * slope, 1.0], at[MODULUS] * force + at[ZERO])
     }
 
-    fn sums(&self, at: &Numbers) -> Sums {
+    fn sums(&self, at: &Numbers, stride: usize) -> Sums {
         let mut sums =
             Sums { normal: Matrix::default(), gradient: Numbers::default(), squares: 0.0 };
-        for sample in self.samples {
+        for sample in self.samples.iter().step_by(stride) {
             let (row, force) = self.row(at, sample.depth_mm);
             let residual = sample.force_newtons - force;
             for i in 0..UNKNOWNS {
@@ -71,10 +73,10 @@ impl LoadingProblem<'_> {
         sums
     }
 
-    /// The modulus and the force out of contact that fit best where the contact is.
-    fn beginning(&self, shift: f64) -> Numbers {
+    /// The modulus and the force out of contact that fit some of the samples best where the contact is.
+    fn beginning(&self, shift: f64, stride: usize) -> Numbers {
         let at = [0.0, shift, 0.0];
-        let sums = self.sums(&at);
+        let sums = self.sums(&at, stride);
         let is_free = [true, false, self.is_free[ZERO]];
         let step = inverse(&sums.normal, is_free).map(|inverse| times(&inverse, &sums.gradient));
         step.map_or(at, |step| [step[MODULUS], shift, step[ZERO]])
@@ -82,17 +84,18 @@ impl LoadingProblem<'_> {
 
     /// From the best of some contacts, in steps that lessen the sum of squares.
     pub fn solve(&self, starts: &[f64]) -> Result<Found, LoadingFitError> {
-        let begun = starts.iter().map(|shift| self.beginning(*shift));
-        let tried =
-            begun.map(|at| (self.sums(&at), at)).filter(|(sums, _)| sums.squares.is_finite());
-        let best = tried.min_by(|a, b| a.0.squares.total_cmp(&b.0.squares));
-        let (mut sums, mut at) = best.ok_or(LoadingFitError::NoContact)?;
+        let stride = (self.samples.len() / SAMPLES_OF_A_START).max(1);
+        let begun = starts.iter().map(|shift| self.beginning(*shift, stride));
+        let tried = begun.map(|at| (self.sums(&at, stride).squares, at));
+        let best = tried.filter(|one| one.0.is_finite()).min_by(|a, b| a.0.total_cmp(&b.0));
+        let mut at = best.ok_or(LoadingFitError::NoContact)?.1;
+        let mut sums = self.sums(&at, 1);
         for _ in 0..STEPS_MAX {
             let step = times(&self.inverse(&sums, &at)?, &sums.gradient);
             let better = (0..20).find_map(|halving| {
                 let share = 0.5f64.powi(halving);
                 let next = std::array::from_fn(|i| at[i] + share * step[i]);
-                Some((self.sums(&next), next)).filter(|(next, _)| next.squares <= sums.squares)
+                Some((self.sums(&next, 1), next)).filter(|(next, _)| next.squares <= sums.squares)
             });
             let Some((next_sums, next)) = better else { break };
             let change = (next[MODULUS] / at[MODULUS] - 1.0).abs();
