@@ -287,7 +287,7 @@ impl Loading {
     }
 
     /// Depths and forces from contact and zero as fitted, with so much more compliance of the machine taken out.
-    fn from_contact(&self, fit: &LoadingFit, more_mm_per_n: f64) -> Vec<LoadingSample> {
+    fn behind_contact(&self, fit: &LoadingFit, more_mm_per_n: f64) -> Vec<LoadingSample> {
         let moved = |one: &LoadingSample| LoadingSample {
             depth_mm: one.depth_mm - fit.contact_shift_mm - more_mm_per_n * one.force_newtons,
             force_newtons: one.force_newtons - fit.force_zero_newtons,
@@ -356,7 +356,7 @@ fn lack_of_fit(
     if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
         return None;
     }
-    let samples = loading.from_contact(fit, 0.0);
+    let samples = loading.behind_contact(fit, 0.0);
     let middle = 0.5 * (loading.deepest() - fit.contact_shift_mm);
     let (deep, shallow): (Vec<_>, Vec<_>) =
         samples.into_iter().partition(|one| one.depth_mm > middle);
@@ -387,7 +387,7 @@ fn compliance_mpa(
     (indenter, specimen): (&Indenter, &Specimen),
     loading: &Loading,
 ) -> Result<f64, LoadingFitError> {
-    let moved = loading.from_contact(fit, applied.std_error_mm_per_n);
+    let moved = loading.behind_contact(fit, applied.std_error_mm_per_n);
     let other = fit_loading(law, indenter, specimen, &moved, loading.all_known())?;
     Ok((other.modulus_mpa - fit.modulus_mpa).abs())
 }

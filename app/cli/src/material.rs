@@ -25,6 +25,12 @@ pub struct MaterialArgs {
     /// Angle between axis and flank of a cone, or axis and face of a pyramid, in degrees
     #[arg(long, value_name = "DEGREES", value_parser = quantity, allow_hyphen_values = true)]
     half_angle: Option<Quantity>,
+    /// Radius of the round tip of a cone or a pyramid in mm; without it the tip is sharp
+    #[arg(long, value_name = "MM", value_parser = quantity, allow_hyphen_values = true)]
+    tip_radius: Option<Quantity>,
+    /// Width of the chamfer of 45 degrees of a flat punch in mm; without it the edge is sharp
+    #[arg(long, value_name = "MM", value_parser = quantity, allow_hyphen_values = true)]
+    chamfer: Option<Quantity>,
     /// Thickness of the specimen in mm; without it the one that the session measured
     #[arg(long, value_name = "MM", value_parser = quantity, allow_hyphen_values = true)]
     thickness: Option<Quantity>,
@@ -132,24 +138,57 @@ fn failure(err: MaterialError) -> Failure {
 }
 
 fn indenter(args: &MaterialArgs) -> Result<Indenter, Failure> {
-    let needs = |flag: &str, given: Option<Quantity>, other: Option<Quantity>, unused: &str| {
-        if other.is_some() {
-            return Err(Failure::usage(format!("this indenter has no --{unused}; leave it out")));
-        }
-        given.ok_or_else(|| {
+    let given = [
+        ("radius", args.radius),
+        ("half-angle", args.half_angle),
+        ("tip-radius", args.tip_radius),
+        ("chamfer", args.chamfer),
+    ];
+    let only = |names: &[&str]| {
+        let unused = given.iter().find(|(name, size)| size.is_some() && !names.contains(name));
+        unused.map_or(Ok(()), |(name, _)| {
+            Err(Failure::usage(format!("this indenter has no --{name}; leave it out")))
+        })
+    };
+    let needed = |name: &str| {
+        let size = given.iter().find(|(own, _)| *own == name).and_then(|(_, size)| *size);
+        size.ok_or_else(|| {
             Failure::usage(format!(
-                "this indenter needs --{flag}; give it, with its standard uncertainty"
+                "this indenter needs --{name}; give it, with its standard uncertainty"
             ))
         })
     };
-    let radius = || needs("radius", args.radius, args.half_angle, "half-angle");
-    let half_angle = || needs("half-angle", args.half_angle, args.radius, "radius");
+    let pointed = ["half-angle", "tip-radius"];
     Ok(match args.indenter {
-        IndenterWord::FlatPunch => Indenter::FlatPunch { radius_mm: radius()? },
-        IndenterWord::Sphere => Indenter::Sphere { radius_mm: radius()? },
-        IndenterWord::Cone => Indenter::Cone { half_angle_degrees: half_angle()? },
+        IndenterWord::FlatPunch => {
+            only(&["radius", "chamfer"])?;
+            let radius_mm = needed("radius")?;
+            match args.chamfer {
+                Some(chamfer_mm) => Indenter::ChamferedPunch { radius_mm, chamfer_mm },
+                None => Indenter::FlatPunch { radius_mm },
+            }
+        }
+        IndenterWord::Sphere => {
+            only(&["radius"])?;
+            Indenter::Sphere { radius_mm: needed("radius")? }
+        }
+        IndenterWord::Cone => {
+            only(&pointed)?;
+            let half_angle_degrees = needed("half-angle")?;
+            match args.tip_radius {
+                Some(tip_radius_mm) => Indenter::RoundedCone { half_angle_degrees, tip_radius_mm },
+                None => Indenter::Cone { half_angle_degrees },
+            }
+        }
         IndenterWord::Pyramid(faces) => {
-            Indenter::Pyramid { faces, half_angle_degrees: half_angle()? }
+            only(&pointed)?;
+            let half_angle_degrees = needed("half-angle")?;
+            match args.tip_radius {
+                Some(tip_radius_mm) => {
+                    Indenter::RoundedPyramid { faces, half_angle_degrees, tip_radius_mm }
+                }
+                None => Indenter::Pyramid { faces, half_angle_degrees },
+            }
         }
     })
 }

@@ -119,6 +119,12 @@ fn what_no_law_describes_is_refused_in_one_sentence() {
             "standard uncertainty of the radius",
         ),
         (format!("press.csv {sphere} --thickness 50 --depth-max 0"), "give a depth above 0 mm"),
+        (format!("press.csv {sphere} --thickness 50 --chamfer 0.5"), "has no --chamfer"),
+        (
+            "press.csv --indenter flat-punch --radius 4 --chamfer 4 --poisson 0.45 --thickness 50"
+                .into(),
+            "below the radius",
+        ),
         (
             format!("press.csv {sphere} --thickness 500 --contact-error=-1"),
             "the standard uncertainty of the contact is -1",

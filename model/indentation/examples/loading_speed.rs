@@ -2,7 +2,11 @@
 //!
 //! Usage: `loading_speed FILE SAMPLES RADIUS_MM POISSON`. The file has curves of so many samples, each of which is a depth in mm
 //! and a force in N as numbers of 8 bytes, the lowest first. Prints a line of JSON.
-#![allow(clippy::disallowed_methods, reason = "an example that measures time")]
+#![expect(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "an example that measures time"
+)]
 
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingKnowledge, LoadingSample, PoissonBasis, Quantity, Specimen,

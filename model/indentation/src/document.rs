@@ -35,6 +35,22 @@ pub enum Indenter {
         faces: PyramidFaces,
         half_angle_degrees: Quantity,
     },
+    /// The end of a cylinder of this radius, flat but for a chamfer of 45 degrees of this width.
+    ChamferedPunch {
+        radius_mm: Quantity,
+        chamfer_mm: Quantity,
+    },
+    /// A cone with a round tip.
+    RoundedCone {
+        half_angle_degrees: Quantity,
+        tip_radius_mm: Quantity,
+    },
+    /// A pyramid with a round tip.
+    RoundedPyramid {
+        faces: PyramidFaces,
+        half_angle_degrees: Quantity,
+        tip_radius_mm: Quantity,
+    },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,8 +120,22 @@ impl Indenter {
                 Ok(IndenterShape::Cone { half_angle_rad })
             }
             Self::Pyramid { faces, half_angle_degrees } => {
-                let tangent = checked_angle(half_angle_degrees)?.tan();
-                Ok(IndenterShape::Cone { half_angle_rad: (faces.cone_factor() * tangent).atan() })
+                Ok(IndenterShape::Cone { half_angle_rad: cone_angle(faces, half_angle_degrees)? })
+            }
+            Self::ChamferedPunch { radius_mm, chamfer_mm } => {
+                let radius_mm = checked_radius(radius_mm)?;
+                let flat_radius_mm = radius_mm - checked_chamfer(chamfer_mm, radius_mm)?;
+                Ok(IndenterShape::ChamferedPunch { flat_radius_mm, radius_mm })
+            }
+            Self::RoundedCone { half_angle_degrees, tip_radius_mm } => {
+                let half_angle_rad = checked_angle(half_angle_degrees)?;
+                let tip_radius_mm = checked_tip(tip_radius_mm)?;
+                Ok(IndenterShape::RoundedCone { half_angle_rad, tip_radius_mm })
+            }
+            Self::RoundedPyramid { faces, half_angle_degrees, tip_radius_mm } => {
+                let half_angle_rad = cone_angle(faces, half_angle_degrees)?;
+                let tip_radius_mm = checked_tip(tip_radius_mm)?;
+                Ok(IndenterShape::RoundedCone { half_angle_rad, tip_radius_mm })
             }
         }
     }
@@ -115,6 +145,25 @@ fn checked_radius(radius: Quantity) -> Result<f64, InvalidValue> {
     positive("the radius of the indenter", radius.value, "a length above 0 mm")?;
     radius.check("the standard uncertainty of the radius")?;
     Ok(radius.value)
+}
+
+fn checked_tip(radius: Quantity) -> Result<f64, InvalidValue> {
+    positive("the radius of the tip", radius.value, "a length above 0 mm")?;
+    radius.check("the standard uncertainty of the radius of the tip")?;
+    Ok(radius.value)
+}
+
+fn checked_chamfer(chamfer: Quantity, radius_mm: f64) -> Result<f64, InvalidValue> {
+    let is_valid = chamfer.value > 0.0 && chamfer.value < radius_mm;
+    let wanted = "a width above 0 mm and below the radius";
+    check(is_valid, "the chamfer of the indenter", chamfer.value, wanted)?;
+    chamfer.check("the standard uncertainty of the chamfer")?;
+    Ok(chamfer.value)
+}
+
+/// Of the cone of a pyramid's area, in radians.
+fn cone_angle(faces: PyramidFaces, half_angle: Quantity) -> Result<f64, InvalidValue> {
+    Ok((faces.cone_factor() * checked_angle(half_angle)?.tan()).atan())
 }
 
 /// In radians.
@@ -166,6 +215,13 @@ mod tests {
             Indenter::Sphere { radius_mm },
             Indenter::Cone { half_angle_degrees: exact(60.0) },
             Indenter::Pyramid { faces: PyramidFaces::Four, half_angle_degrees: exact(68.0) },
+            Indenter::ChamferedPunch { radius_mm, chamfer_mm: exact(0.5) },
+            Indenter::RoundedCone { half_angle_degrees: exact(60.0), tip_radius_mm: exact(0.1) },
+            Indenter::RoundedPyramid {
+                faces: PyramidFaces::Three,
+                half_angle_degrees: exact(65.0),
+                tip_radius_mm: exact(0.1),
+            },
         ] {
             let text = serde_json::to_string(&indenter).unwrap();
             assert_eq!(serde_json::from_str::<Indenter>(&text).unwrap(), indenter, "{text}");
@@ -205,6 +261,13 @@ mod tests {
             let sentence = message(Indenter::Cone { half_angle_degrees: exact(value) });
             assert!(sentence.contains("between 0 and 90 degrees"), "{sentence}");
         }
+        let radius_mm = exact(3.0);
+        let whole = message(Indenter::ChamferedPunch { radius_mm, chamfer_mm: exact(3.0) });
+        assert!(whole.contains("below the radius"), "{whole}");
+        let half_angle_degrees = exact(60.0);
+        let pointed =
+            message(Indenter::RoundedCone { half_angle_degrees, tip_radius_mm: exact(0.0) });
+        assert!(pointed.starts_with("the radius of the tip is 0;"), "{pointed}");
         let good: Specimen = serde_json::from_str(SPECIMEN).unwrap();
         let doubtful = Quantity { value: 0.4, standard_uncertainty: f64::NAN };
         for bad in [

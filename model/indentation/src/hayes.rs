@@ -31,12 +31,12 @@ impl Layer {
 
     // The equation is one for a half-space where the integral of its solution is 2 / pi.
     fn factor_of_punch(&self, finer: usize, ratio: f64) -> HayesFactor {
-        let solved = self.solve_with(finer, ratio, |_| 0.0);
+        let solved = self.solve(finer, ratio, 0.0, |_| 0.0);
         HayesFactor { kappa: 0.5 * PI * solved.depth[0], depth_ratio: None }
     }
 
     fn factor_of_sphere(&self, finer: usize, ratio: f64) -> HayesFactor {
-        let solved = self.solve_with(finer, ratio, |x| x * x);
+        let solved = self.solve(finer, ratio, 0.0, |x| x * x);
         // The edge without pressure fixes the depth of this radius.
         let depth_ratio = solved.shape[1] / solved.depth[1];
         let kappa = 0.5 * PI * (solved.depth[0] - solved.shape[0] / depth_ratio);

@@ -47,14 +47,18 @@ pub enum LayerError {
         "the contact radius would be more than {RADIUS_OVER_THICKNESS_MAX} times the thickness of the layer; use a smaller depth or a thicker specimen"
     )]
     TooThin,
-    #[error("the sphere would touch beyond its equator; use a smaller depth")]
-    BeyondEquator,
+    #[error(
+        "the indenter would touch beyond the equator of its sphere or the end of its chamfer; use a smaller depth"
+    )]
+    BeyondEnd,
 }
 
 /// Contact radii over thicknesses that are solved to 1e-8: beyond, the linear theory of a layer says little of tissue.
 pub(crate) const RADIUS_OVER_THICKNESS_MAX: f64 = 8.0;
 /// Nodes across the contact.
 const NODES: usize = 48;
+/// Nodes on each side of a corner of the shape.
+const NODES_BESIDE_CORNER: usize = 32;
 /// Nodes of the integral over `k h`, and more for each thickness in the contact radius, over which its cosines turn.
 const KERNEL_NODES: [f64; 2] = [100.0, 90.0];
 /// `1 - L` falls as `exp(-2 k h)`: here it is below 1e-19.
@@ -93,7 +97,7 @@ impl Layer {
         Ok(check_poisson(self.poisson)?)
     }
 
-    /// The contact at a depth in mm, less than that at which a sphere touches beyond its equator.
+    /// The contact at a depth in mm, less than that at which a sphere or a chamfer touches beyond its end.
     pub fn contact(&self, shape: IndenterShape, depth_mm: f64) -> Result<Contact, LayerError> {
         self.check()?;
         positive("the depth", depth_mm, "a length above 0 mm")?;
@@ -115,19 +119,12 @@ impl Layer {
         }
     }
 
-    /// Depth, force and its slope where the contact of a sphere, a parabola or a cone has a radius. The slope is the
+    /// Depth, force and its slope where the contact has a radius that grows with the depth. The slope is the
     /// stiffness of a flat punch of that radius, because a contact that grows adds no force at its edge.
     pub(crate) fn load_knot(&self, shape: IndenterShape, radius_mm: f64) -> LoadKnot {
         let a = radius_mm;
-        // What Abel's transform makes of the shape: x^2 / R of a parabola, pi / 2 * x / tan(angle) of a cone, and
-        // x artanh(x / R) of a sphere (Sneddon, Int. J. Eng. Sci. 3 (1965) 47-57).
-        let taken = |x: f64| match shape {
-            IndenterShape::FlatPunch { .. } => 0.0,
-            IndenterShape::Parabola { radius_mm } => (a * x).powi(2) / radius_mm,
-            IndenterShape::Sphere { radius_mm } => a * x * (a * x / radius_mm).atanh(),
-            IndenterShape::Cone { half_angle_rad } => FRAC_PI_2 * a * x / half_angle_rad.tan(),
-        };
-        let solved = self.solve(a / self.thickness_mm, taken);
+        let corner = shape.corner().map_or(0.0, |corner| (corner / a).min(1.0));
+        let solved = self.solve(1, a / self.thickness_mm, corner, |x| shape.taken(a * x));
         // The edge without pressure fixes the depth of this radius.
         let depth = solved.shape[1] / solved.depth[1];
         // Force over modulus is force over shear modulus over 2 (1 + nu).
@@ -142,14 +139,13 @@ impl Layer {
     /// A contact whose radius is free.
     fn free_contact(&self, shape: IndenterShape, depth_mm: f64) -> Result<Contact, LayerError> {
         let widest = RADIUS_OVER_THICKNESS_MAX * self.thickness_mm;
-        let equator = match shape {
-            IndenterShape::Sphere { radius_mm } => radius_mm * (1.0 - 1e-9),
-            _ => f64::INFINITY,
-        };
-        let (mut low, mut high) = (0.0, widest.min(equator));
+        let [begin, end] = shape.contact_radii();
+        self.check_radius(begin.max(f64::MIN_POSITIVE))?;
+        let end = end * (1.0 - 1e-9);
+        let (mut low, mut high) = (begin, widest.min(end));
         if self.load_knot(shape, high).depth < depth_mm {
-            return Err(match equator < widest {
-                true => LayerError::BeyondEquator,
+            return Err(match end < widest {
+                true => LayerError::BeyondEnd,
                 false => LayerError::TooThin,
             });
         }
@@ -167,20 +163,17 @@ impl Layer {
         Ok(Contact { radius_mm, force_over_modulus })
     }
 
-    /// Solves the equation for a radius of one, `ratio` times the thickness.
-    pub(crate) fn solve(&self, ratio: f64, taken: impl Fn(f64) -> f64) -> Solved {
-        self.solve_with(1, ratio, taken)
-    }
-
-    /// As `solve`, with `finer` times the nodes of both integrals.
-    pub(crate) fn solve_with(
+    /// Solves the equation for a radius of one, `ratio` times the thickness, and a shape with a corner at a radius, at zero
+    /// without one; with `finer` times the usual nodes of both integrals.
+    pub(crate) fn solve(
         &self,
         finer: usize,
         ratio: f64,
+        corner: f64,
         taken: impl Fn(f64) -> f64,
     ) -> Solved {
-        let node_count = finer * NODES;
-        let nodes = gauss_legendre(node_count, 1.0);
+        let nodes = nodes(finer, corner);
+        let node_count = nodes.len();
         // Wave numbers of a radius of one are those of the thickness times the ratio.
         let [fixed, turning] = KERNEL_NODES;
         let count = finer * (fixed + turning * ratio) as usize;
@@ -214,6 +207,18 @@ impl Layer {
         };
         Solved { depth: summed(0, 1.0), shape: summed(1, taken(1.0)) }
     }
+}
+
+/// Places and weights across the contact. Behind a corner the pressure function grows with the root of the distance, which the
+/// square of a variable makes smooth.
+fn nodes(finer: usize, corner: f64) -> Vec<(f64, f64)> {
+    if corner <= 0.0 || corner >= 1.0 {
+        return gauss_legendre(finer * NODES, 1.0);
+    }
+    let beyond = 1.0 - corner;
+    let behind = gauss_legendre(finer * NODES_BESIDE_CORNER, 1.0).into_iter();
+    let behind = behind.map(|(u, weight)| (corner + beyond * u * u, 2.0 * beyond * u * weight));
+    gauss_legendre(finer * NODES_BESIDE_CORNER, corner).into_iter().chain(behind).collect()
 }
 
 /// Solves a square system with two right-hand sides by elimination with pivots.

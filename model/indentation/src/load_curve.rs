@@ -39,15 +39,19 @@ impl LoadCurve {
             (ContactLaw::Hertz, _) => 1.5,
             (ContactLaw::Sneddon, IndenterShape::Cone { .. }) => 2.0,
             _ => {
+                let [begin, _] = shape.contact_radii();
                 let knot = |number: u32| {
-                    let radius = deepest.radius_mm * f64::from(number) / f64::from(KNOTS);
+                    let share = f64::from(number) / f64::from(KNOTS);
+                    // From a flat on the depth grows with the root of the radius.
+                    let share = if begin > 0.0 { share * share } else { share };
+                    let radius = begin + (deepest.radius_mm - begin) * share;
                     match law {
+                        _ if radius == 0.0 => LoadKnot::default(),
                         ContactLaw::Layer => layer.load_knot(shape, radius),
-                        _ => sneddon_knot(shape, radius, layer),
+                        _ => half_space_knot(shape, radius, layer),
                     }
                 };
-                let rest = (1..=KNOTS).map(knot);
-                return Ok(Self::Table([LoadKnot::default()].into_iter().chain(rest).collect()));
+                return Ok(Self::Table((0..=KNOTS).map(knot).collect()));
             }
         };
         let coefficient = deepest.force_over_modulus / depth_max.powf(exponent);
@@ -97,17 +101,12 @@ fn hermite(from: LoadKnot, to: LoadKnot, depth: f64) -> [f64; 2] {
     [value, slope]
 }
 
-/// A sphere of any depth on a half-space, at a contact radius.
-fn sneddon_knot(shape: IndenterShape, radius: f64, layer: Layer) -> LoadKnot {
+/// A shape whose contact grows, on a half-space, at a contact radius.
+fn half_space_knot(shape: IndenterShape, radius: f64, layer: Layer) -> LoadKnot {
     let plane = 1.0 / (1.0 - layer.poisson * layer.poisson);
-    let tip = match shape {
-        IndenterShape::Sphere { radius_mm } | IndenterShape::Parabola { radius_mm } => radius_mm,
-        IndenterShape::FlatPunch { .. } | IndenterShape::Cone { .. } => f64::NAN,
-    };
-    let log = ((tip + radius) / (tip - radius)).ln();
     LoadKnot {
-        depth: 0.5 * radius * log,
-        force: plane * (0.5 * (radius * radius + tip * tip) * log - radius * tip),
+        depth: shape.taken(radius),
+        force: plane * shape.half_space_force(radius),
         slope: 2.0 * plane * radius,
     }
 }
@@ -124,6 +123,9 @@ mod tests {
 
     #[test]
     fn a_curve_is_the_law_at_every_depth() {
+        let rounded =
+            Indenter::RoundedCone { half_angle_degrees: exact(70.0), tip_radius_mm: exact(1.0) };
+        let chamfered = Indenter::ChamferedPunch { radius_mm: exact(2.5), chamfer_mm: exact(0.5) };
         let cases = [
             (ContactLaw::Hertz, Indenter::Sphere { radius_mm: exact(4.0) }, 100.0, 0.2),
             (ContactLaw::Sneddon, Indenter::Sphere { radius_mm: exact(4.0) }, 200.0, 0.9),
@@ -131,6 +133,10 @@ mod tests {
             (ContactLaw::Layer, Indenter::FlatPunch { radius_mm: exact(2.0) }, 3.0, 0.2),
             (ContactLaw::Layer, Indenter::Sphere { radius_mm: exact(4.0) }, 2.0, 0.18),
             (ContactLaw::Layer, Indenter::Cone { half_angle_degrees: exact(70.0) }, 4.0, 0.3),
+            (ContactLaw::Sneddon, rounded, 100.0, 0.3),
+            (ContactLaw::Layer, rounded, 4.0, 0.3),
+            (ContactLaw::Sneddon, chamfered, 400.0, 0.3),
+            (ContactLaw::Layer, chamfered, 8.0, 0.3),
         ];
         for (law, indenter, thickness, depth_max) in cases {
             let specimen = Specimen {

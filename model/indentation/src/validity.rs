@@ -35,7 +35,7 @@ pub struct Validity {
     /// Contact radius over specimen thickness.
     pub radius_over_thickness: Bounded,
     /// The larger of depth over thickness and the representative strain beneath the indenter: 0.2 times contact radius over tip
-    /// radius for a sphere, 0.2 times the cotangent of the half angle for a cone (Tabor, The Hardness of Metals, 1951), and
+    /// radius for a sphere, 0.2 times the cotangent of the half angle for a cone, the smaller of both for a rounded one (Tabor, The Hardness of Metals, 1951), and
     /// for a flat punch its mean pressure over `E / (1 - nu^2)`, `2 / pi` times depth over radius.
     pub strain: Bounded,
 }
@@ -100,13 +100,20 @@ impl ContactLaw {
             (Self::Hertz, _) => return Err(ContactError::NotASphere),
         };
         let (depth_over_radius, strain) = match shape {
-            IndenterShape::FlatPunch { radius_mm } => (None, FRAC_2_PI * depth_mm / radius_mm),
+            IndenterShape::FlatPunch { radius_mm }
+            | IndenterShape::ChamferedPunch { flat_radius_mm: radius_mm, .. } => {
+                (None, FRAC_2_PI * depth_mm / radius_mm)
+            }
             IndenterShape::Parabola { radius_mm } | IndenterShape::Sphere { radius_mm } => {
                 let bounded = Bounded { value: depth_mm / radius_mm, max: DEPTH_OVER_RADIUS_MAX };
                 let strain = 0.2 * contact.radius_mm / radius_mm;
                 ((self == Self::Hertz).then_some(bounded), strain)
             }
             IndenterShape::Cone { half_angle_rad } => (None, 0.2 / half_angle_rad.tan()),
+            IndenterShape::RoundedCone { half_angle_rad, tip_radius_mm } => {
+                let slope = (contact.radius_mm / tip_radius_mm).min(1.0 / half_angle_rad.tan());
+                (None, 0.2 * slope)
+            }
         };
         let radius_over_thickness = Bounded {
             value: contact.radius_mm / layer.thickness_mm,
@@ -126,7 +133,7 @@ fn on_half_space(
     poisson: f64,
 ) -> Result<Contact, InvalidValue> {
     let contact = shape.on_half_space(depth_mm, poisson);
-    let wanted = "a depth in mm at which the sphere does not touch beyond its equator";
+    let wanted = "a depth in mm at which it does not touch beyond the equator of its sphere or the end of its chamfer";
     contact.ok_or(InvalidValue { name: "the depth", value: depth_mm, wanted })
 }
 

@@ -81,16 +81,35 @@ fn indenter_words(indenter: &Indenter) -> String {
             format!("cone, half angle in degrees {}", quantity_words(*half_angle_degrees))
         }
         Indenter::Pyramid { faces, half_angle_degrees } => {
-            let count = match faces {
-                PyramidFaces::Three => "three",
-                PyramidFaces::Four => "four",
-            };
-            let angle = quantity_words(*half_angle_degrees);
-            format!(
-                "pyramid of {count} faces as the cone of its area, half angle in degrees {angle}"
-            )
+            pyramid_words(*faces, *half_angle_degrees)
+        }
+        Indenter::ChamferedPunch { radius_mm, chamfer_mm } => format!(
+            "flat punch, radius in mm {}, chamfer of 45 degrees in mm {}",
+            quantity_words(*radius_mm),
+            quantity_words(*chamfer_mm)
+        ),
+        Indenter::RoundedCone { half_angle_degrees, tip_radius_mm } => format!(
+            "cone, half angle in degrees {}, {}",
+            quantity_words(*half_angle_degrees),
+            tip_words(*tip_radius_mm)
+        ),
+        Indenter::RoundedPyramid { faces, half_angle_degrees, tip_radius_mm } => {
+            format!("{}, {}", pyramid_words(*faces, *half_angle_degrees), tip_words(*tip_radius_mm))
         }
     }
+}
+
+fn pyramid_words(faces: PyramidFaces, half_angle_degrees: Quantity) -> String {
+    let count = match faces {
+        PyramidFaces::Three => "three",
+        PyramidFaces::Four => "four",
+    };
+    let angle = quantity_words(half_angle_degrees);
+    format!("pyramid of {count} faces as the cone of its area, half angle in degrees {angle}")
+}
+
+fn tip_words(tip_radius_mm: Quantity) -> String {
+    format!("radius of the tip in mm {}", quantity_words(tip_radius_mm))
 }
 
 fn specimen_words(report: &MaterialReport) -> String {

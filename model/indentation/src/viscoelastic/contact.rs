@@ -31,6 +31,15 @@ impl PowerLaw {
                 (1.5, IndenterShape::Parabola { radius_mm }, radius_mm)
             }
             IndenterShape::Cone { half_angle_rad } => (2.0, shape, half_angle_rad.tan()),
+            IndenterShape::RoundedCone { tip_radius_mm: value, .. } => {
+                let wanted = "0 mm: with a rounded tip the force is no power of the depth";
+                return Err(InvalidValue { name: "the tip radius", value, wanted });
+            }
+            IndenterShape::ChamferedPunch { flat_radius_mm, radius_mm } => {
+                let wanted = "0 mm: with a chamfer the force is no power of the depth";
+                let value = radius_mm - flat_radius_mm;
+                return Err(InvalidValue { name: "the chamfer", value, wanted });
+            }
         };
         positive("the radius or the tangent of the half angle", size, "a number above 0")?;
         let contact = shape.on_half_space(1.0, poisson);

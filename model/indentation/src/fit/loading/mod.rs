@@ -52,6 +52,8 @@ pub enum ModulusTerm {
     /// Of the indenter.
     Radius,
     HalfAngle,
+    TipRadius,
+    Chamfer,
     Thickness,
     Poisson,
 }
@@ -65,6 +67,8 @@ impl ModulusTerm {
             Self::ForceZero => "force zero",
             Self::Radius => "radius",
             Self::HalfAngle => "half angle",
+            Self::TipRadius => "tip radius",
+            Self::Chamfer => "chamfer",
             Self::Thickness => "thickness",
             Self::Poisson => "Poisson's ratio",
         }

@@ -65,10 +65,10 @@ impl LoadingProblem<'_> {
             }
             sums.squares += residual * residual;
         }
-        for i in 0..UNKNOWNS {
-            sums.normal[i][i] += self.prior[i];
-            sums.gradient[i] -= self.prior[i] * at[i];
-            sums.squares += self.prior[i] * at[i] * at[i];
+        for (i, (prior, at)) in self.prior.iter().zip(at).enumerate() {
+            sums.normal[i][i] += prior;
+            sums.gradient[i] -= prior * at;
+            sums.squares += prior * at * at;
         }
         sums
     }

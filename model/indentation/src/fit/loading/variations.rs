@@ -20,23 +20,11 @@ pub(super) fn varied(indenter: &Indenter, specimen: &Specimen) -> Vec<Varied> {
         [low, high].map(|value| Quantity { value, ..quantity })
     };
     let mut found: Vec<Varied> = Vec::new();
-    let (term, size) = match *indenter {
-        Indenter::FlatPunch { radius_mm } | Indenter::Sphere { radius_mm } => {
-            (ModulusTerm::Radius, radius_mm)
-        }
-        Indenter::Cone { half_angle_degrees } | Indenter::Pyramid { half_angle_degrees, .. } => {
-            (ModulusTerm::HalfAngle, half_angle_degrees)
-        }
-    };
-    let with_size = |size: Quantity| match *indenter {
-        Indenter::FlatPunch { .. } => Indenter::FlatPunch { radius_mm: size },
-        Indenter::Sphere { .. } => Indenter::Sphere { radius_mm: size },
-        Indenter::Cone { .. } => Indenter::Cone { half_angle_degrees: size },
-        Indenter::Pyramid { faces, .. } => Indenter::Pyramid { faces, half_angle_degrees: size },
-    };
     let all = [0.0, f64::INFINITY];
-    if size.standard_uncertainty > 0.0 {
-        found.push((term, ends(size, all).map(|size| (with_size(size), *specimen))));
+    for (term, size, with_size) in sizes(*indenter) {
+        if size.standard_uncertainty > 0.0 {
+            found.push((term, ends(size, all).map(|size| (with_size(size), *specimen))));
+        }
     }
     if specimen.thickness_mm.standard_uncertainty > 0.0 {
         let ends = ends(specimen.thickness_mm, all);
@@ -49,4 +37,64 @@ pub(super) fn varied(indenter: &Indenter, specimen: &Specimen) -> Vec<Varied> {
         found.push((ModulusTerm::Poisson, ends.map(with)));
     }
     found
+}
+
+type Size = (ModulusTerm, Quantity, Box<dyn Fn(Quantity) -> Indenter>);
+
+/// The numbers of an indenter, each with what makes the indenter of another one.
+fn sizes(indenter: Indenter) -> Vec<Size> {
+    fn size(
+        term: ModulusTerm,
+        quantity: Quantity,
+        with: impl Fn(Quantity) -> Indenter + 'static,
+    ) -> Size {
+        (term, quantity, Box::new(with))
+    }
+    use ModulusTerm::{Chamfer, HalfAngle, Radius, TipRadius};
+    match indenter {
+        Indenter::FlatPunch { radius_mm } => {
+            vec![size(Radius, radius_mm, |radius_mm| Indenter::FlatPunch { radius_mm })]
+        }
+        Indenter::Sphere { radius_mm } => {
+            vec![size(Radius, radius_mm, |radius_mm| Indenter::Sphere { radius_mm })]
+        }
+        Indenter::Cone { half_angle_degrees } => {
+            let with = |half_angle_degrees| Indenter::Cone { half_angle_degrees };
+            vec![size(HalfAngle, half_angle_degrees, with)]
+        }
+        Indenter::Pyramid { faces, half_angle_degrees } => {
+            let with = move |half_angle_degrees| Indenter::Pyramid { faces, half_angle_degrees };
+            vec![size(HalfAngle, half_angle_degrees, with)]
+        }
+        Indenter::ChamferedPunch { radius_mm, chamfer_mm } => vec![
+            size(Radius, radius_mm, move |radius_mm| Indenter::ChamferedPunch {
+                radius_mm,
+                chamfer_mm,
+            }),
+            size(Chamfer, chamfer_mm, move |chamfer_mm| Indenter::ChamferedPunch {
+                radius_mm,
+                chamfer_mm,
+            }),
+        ],
+        Indenter::RoundedCone { half_angle_degrees, tip_radius_mm } => vec![
+            size(HalfAngle, half_angle_degrees, move |half_angle_degrees| Indenter::RoundedCone {
+                half_angle_degrees,
+                tip_radius_mm,
+            }),
+            size(TipRadius, tip_radius_mm, move |tip_radius_mm| Indenter::RoundedCone {
+                half_angle_degrees,
+                tip_radius_mm,
+            }),
+        ],
+        Indenter::RoundedPyramid { faces, half_angle_degrees, tip_radius_mm } => vec![
+            size(HalfAngle, half_angle_degrees, move |half_angle_degrees| {
+                Indenter::RoundedPyramid { faces, half_angle_degrees, tip_radius_mm }
+            }),
+            size(TipRadius, tip_radius_mm, move |tip_radius_mm| Indenter::RoundedPyramid {
+                faces,
+                half_angle_degrees,
+                tip_radius_mm,
+            }),
+        ],
+    }
 }
