@@ -106,6 +106,18 @@ impl PyramidFaces {
 }
 
 impl Indenter {
+    /// How much stiffer the contact is than that of a circle of the same area (King, Int. J. Solids Struct. 23 (1987)
+    /// 1657-1664).
+    pub(crate) fn stiffness_factor(&self) -> f64 {
+        match self {
+            Self::Pyramid { faces, .. } | Self::RoundedPyramid { faces, .. } => match faces {
+                PyramidFaces::Three => 1.034,
+                PyramidFaces::Four => 1.012,
+            },
+            _ => 1.0,
+        }
+    }
+
     /// The shape that the laws take; a pyramid is its equivalent cone.
     pub fn shape(&self) -> Result<IndenterShape, InvalidValue> {
         match *self {

@@ -21,7 +21,8 @@ mod viscoelastic;
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
 pub use fit::{
     LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, RelaxationFit,
-    RelaxationFitError, fit_loading, fit_relaxation,
+    RelaxationFitError, UnloadingFit, UnloadingFitError, fit_loading, fit_relaxation,
+    fit_unloading,
 };
 pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;

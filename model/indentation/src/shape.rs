@@ -1,6 +1,6 @@
 //! Shapes of indenters.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// A rigid indenter with an axis of symmetry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +92,33 @@ impl IndenterShape {
                 a * a * angle + flat_radius_mm * chord
             }
         }
+    }
+
+    /// Area in mm² of the shape at a height in mm above its tip; `None` above the equator of a sphere or a chamfer.
+    pub(crate) fn area_at(&self, height: f64) -> Option<f64> {
+        if height.is_nan() || height <= 0.0 {
+            return None;
+        }
+        let radius = match *self {
+            Self::FlatPunch { radius_mm } => radius_mm,
+            Self::Parabola { radius_mm } => (2.0 * radius_mm * height).sqrt(),
+            Self::Sphere { radius_mm } if height <= radius_mm => {
+                (height * (2.0 * radius_mm - height)).sqrt()
+            }
+            Self::Sphere { .. } => return None,
+            Self::Cone { half_angle_rad } => height * half_angle_rad.tan(),
+            Self::RoundedCone { half_angle_rad, tip_radius_mm } => {
+                let corner = tip_radius_mm / half_angle_rad.tan();
+                match height < corner * corner / (2.0 * tip_radius_mm) {
+                    true => (2.0 * tip_radius_mm * height).sqrt(),
+                    false => 0.5 * corner + height * half_angle_rad.tan(),
+                }
+            }
+            Self::ChamferedPunch { flat_radius_mm, radius_mm } => {
+                Some(flat_radius_mm + height).filter(|radius| *radius <= radius_mm)?
+            }
+        };
+        Some(PI * radius * radius)
     }
 
     /// The radius in mm behind which a flank begins.

@@ -5,10 +5,16 @@
 //! with the step of Ruhe and Wedin, SIAM Rev. 22 (1980) 318-337), from the best set of a grid.
 
 mod loading;
+mod residuals;
 mod search;
+mod unloading;
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod unloading_tests;
+
+pub use unloading::{UnloadingFit, UnloadingFitError, fit_unloading};
 
 pub use loading::{
     LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, fit_loading,

@@ -5,21 +5,20 @@
 //! of propagation (JCGM 100:2008, 5.1.2).
 
 mod problem;
-mod residuals;
 mod variations;
 
 #[cfg(test)]
 mod tests;
 
+use super::residuals::FittedSamples;
 use crate::document::{Indenter, Specimen};
 use crate::load_curve::LoadCurve;
 use crate::validity::{ContactError, ContactLaw, Validity};
 use palpate_model::estimate::student_t975;
 use problem::{Found, LoadingProblem, MODULUS, SHIFT, ZERO};
-use residuals::modulus_noise;
 use std::collections::BTreeMap;
 use thiserror::Error;
-use variations::varied;
+pub(super) use variations::varied;
 
 /// A sample of a loading curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -178,7 +177,16 @@ pub fn fit_loading(
     search.check(&found)?;
     let mut terms = search.terms_of_the_known(&problem, &found);
     let freedom = knowledge.noise_newtons.map_or(search.freedom(), |_| f64::INFINITY);
-    let noise = modulus_noise(&problem, &found, (variance, freedom));
+    let (residuals, influence) = (problem.residuals(&found), problem.influence(&found));
+    let forces: Vec<f64> = samples.iter().map(|one| one.force_newtons).collect();
+    let columns = problem.columns(&found);
+    let fitted = FittedSamples {
+        forces: &forces,
+        residuals: &residuals,
+        columns: &columns,
+        influence: &influence,
+    };
+    let noise = fitted.modulus_noise((variance, freedom));
     terms.insert(ModulusTerm::Noise, noise.mpa);
     for (term, [low, high]) in varied(indenter, specimen) {
         let modulus = |(indenter, specimen): (Indenter, Specimen)| {
@@ -188,7 +196,7 @@ pub fn fit_loading(
         let half = 0.5 * (modulus(high)? - modulus(low)?);
         terms.insert(term, half.abs());
     }
-    let squares = problem.residuals(&found).iter().map(|one| one * one).sum::<f64>();
+    let squares = residuals.iter().map(|one| one * one).sum::<f64>();
     Ok(LoadingFit {
         modulus_mpa: found.at[MODULUS],
         contact_shift_mm: found.at[SHIFT],
@@ -197,7 +205,7 @@ pub fn fit_loading(
         terms,
         noise_freedom: noise.freedom,
         validity: law.validity(indenter, specimen, deepest)?,
-        influence: problem.influence(&found),
+        influence,
     })
 }
 

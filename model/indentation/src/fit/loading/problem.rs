@@ -125,6 +125,14 @@ impl LoadingProblem<'_> {
         self.samples.iter().map(one).collect()
     }
 
+    /// How the forces change with each unknown that is free.
+    pub fn columns(&self, found: &Found) -> Vec<Vec<f64>> {
+        let column = |unknown: usize| {
+            self.samples.iter().map(|one| self.row(&found.at, one.depth_mm).0[unknown]).collect()
+        };
+        (0..UNKNOWNS).filter(|unknown| self.is_free[*unknown]).map(column).collect()
+    }
+
     /// Forces less those fitted, in N.
     pub fn residuals(&self, found: &Found) -> Vec<f64> {
         let residual =

@@ -3,10 +3,10 @@
 use super::ModulusTerm;
 use crate::document::{Indenter, Quantity, Specimen};
 
-pub(super) type Varied = (ModulusTerm, [(Indenter, Specimen); 2]);
+pub(in crate::fit) type Varied = (ModulusTerm, [(Indenter, Specimen); 2]);
 
 /// Indenter and specimen with each uncertain number one standard uncertainty lower and higher.
-pub(super) fn varied(indenter: &Indenter, specimen: &Specimen) -> Vec<Varied> {
+pub(in crate::fit) fn varied(indenter: &Indenter, specimen: &Specimen) -> Vec<Varied> {
     let ends = |quantity: Quantity, range: [f64; 2]| {
         let error = quantity.standard_uncertainty;
         // A number at its physical end, as a Poisson's ratio of 0.5, is moved to the other side only, and twice as far.
