@@ -30,6 +30,7 @@ pub use layer::{Base, Layer, LayerError};
 pub use shape::{Contact, IndenterShape};
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
 pub use viscoelastic::{
-    DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm, lee_radok_force,
-    lee_radok_force_of, repeated_contact_force, ting_force,
+    CreepSeries, CreepTerm, DepthHistory, HistoryError, LoadHistoryError, PowerLaw, PronySeries,
+    PronyTerm, lee_radok_force, lee_radok_force_of, load_history, repeated_contact_force,
+    stiffness_over_modulus, ting_force,
 };

@@ -33,8 +33,13 @@ pub struct RelaxationFit {
     pub standard_errors: PronySeries,
     /// Standard deviation of the residuals in N.
     pub residual_newtons: f64,
-    /// Of the moduli, the equilibrium behind the terms, and of the logarithms of the times.
-    covariance: Vec<Vec<f64>>,
+    /// Force less fitted force of each sample, in N.
+    pub residuals_newtons: Vec<f64>,
+    /// By how much the force of each sample rises with each modulus in MPa, the equilibrium behind the terms, and with the
+    /// logarithm of each time.
+    pub tangents: Vec<Vec<f64>>,
+    /// In the order of `tangents`, for forces with a variance of one.
+    unit_covariance: Vec<Vec<f64>>,
 }
 
 /// A record that gives no relaxation modulus.
@@ -67,7 +72,7 @@ pub enum RelaxationFitError {
 }
 
 /// Records identify no more.
-const TERMS_MAX: usize = 5;
+pub const TERMS_MAX: usize = 5;
 /// At the end of a ramp a term has relaxed but for its time over that of the ramp: a tenth here, and what else bends the ramp,
 /// such as its first contact, weighs more.
 const RAMP_OVER_TIME_MAX: f64 = 10.0;
@@ -99,7 +104,7 @@ pub fn fit_relaxation(
     }
     let record = Record { law, knots: history.knots(), forces: forces_newtons };
     let fitted = record.fit(term_count).ok_or(RelaxationFitError::NoSet { count: term_count })?;
-    report(&fitted, ramp_secs(history), depths)
+    report(fitted, ramp_secs(history), depths)
 }
 
 /// The time from 1 % to 99 % of the greatest depth.
@@ -112,22 +117,19 @@ fn ramp_secs(history: &DepthHistory) -> f64 {
 }
 
 fn report(
-    fitted: &Fitted,
+    fitted: Fitted,
     ramp_secs: f64,
     samples: usize,
 ) -> Result<RelaxationFit, RelaxationFitError> {
-    let Fitted { times, moduli, left_over, covariance } = fitted;
+    let Fitted { times, moduli, left_over, residuals, tangents, covariance } = fitted;
     let count = times.len();
     if let Some(&time_secs) = times.iter().find(|time| ramp_secs > RAMP_OVER_TIME_MAX * **time) {
         return Err(RelaxationFitError::RampTooLong { time_secs, ramp_secs });
     }
     let variance = left_over / (samples - 2 * count - 1) as f64;
-    let covariance = covariance
-        .as_ref()
-        .ok_or_else(|| RelaxationFitError::NotIdentifiable { time_secs: times[0] })?;
-    let covariance: Vec<Vec<f64>> =
-        covariance.iter().map(|row| row.iter().map(|value| variance * value).collect()).collect();
-    let error = |index: usize| covariance[index][index].sqrt();
+    let unit_covariance =
+        covariance.ok_or(RelaxationFitError::NotIdentifiable { time_secs: times[0] })?;
+    let error = |index: usize| (variance * unit_covariance[index][index]).sqrt();
     let term = |index: usize| {
         let (modulus_mpa, time_secs) = (moduli[index], times[index]);
         let of_time = error(count + 1 + index);
@@ -147,11 +149,25 @@ fn report(
         modulus: PronySeries { equilibrium_mpa: moduli[count], terms },
         standard_errors: PronySeries { equilibrium_mpa: error(count), terms: errors },
         residual_newtons: variance.sqrt(),
-        covariance,
+        residuals_newtons: residuals,
+        tangents,
+        unit_covariance,
     })
 }
 
 impl RelaxationFit {
+    /// By how much errors of the forces in N, one for each sample, move the moduli, the equilibrium behind the terms, and the
+    /// logarithms of the times.
+    #[must_use]
+    pub fn shift_by(&self, errors_newtons: &[f64]) -> Vec<f64> {
+        let along = |tangent: &Vec<f64>| -> f64 {
+            tangent.iter().zip(errors_newtons).map(|(slope, error)| slope * error).sum()
+        };
+        let along: Vec<f64> = self.tangents.iter().map(along).collect();
+        let shift = |row: &Vec<f64>| row.iter().zip(&along).map(|(entry, own)| entry * own).sum();
+        self.unit_covariance.iter().map(shift).collect()
+    }
+
     /// The standard error in MPa of the modulus at a time in s after a step.
     #[must_use]
     pub fn modulus_standard_error(&self, time_secs: f64) -> f64 {
@@ -160,9 +176,15 @@ impl RelaxationFit {
         let of_moduli = terms.iter().map(|term| (-age(term)).exp());
         let of_times = terms.iter().map(|term| term.modulus_mpa * age(term) * (-age(term)).exp());
         let gradient: Vec<f64> = of_moduli.chain([1.0]).chain(of_times).collect();
-        let along = |row: &Vec<f64>| row.iter().zip(&gradient).map(|(a, b)| a * b).sum::<f64>();
+        self.standard_error_along(&gradient)
+    }
+
+    /// The standard error of what rises by this gradient with the numbers of `shift_by`.
+    #[must_use]
+    pub fn standard_error_along(&self, gradient: &[f64]) -> f64 {
+        let along = |row: &Vec<f64>| row.iter().zip(gradient).map(|(a, b)| a * b).sum::<f64>();
         let variance: f64 =
-            self.covariance.iter().map(along).zip(&gradient).map(|(a, b)| a * b).sum();
-        variance.max(0.0).sqrt()
+            self.unit_covariance.iter().map(along).zip(gradient).map(|(a, b)| a * b).sum();
+        self.residual_newtons * variance.max(0.0).sqrt()
     }
 }

@@ -15,6 +15,9 @@ pub(super) struct Fitted {
     pub moduli: Vec<f64>,
     /// The sum of squares of the residuals.
     pub left_over: f64,
+    pub residuals: Vec<f64>,
+    /// How the forces rise with the moduli and with the logarithms of the times.
+    pub tangents: Vec<Vec<f64>>,
     /// Of the moduli and of the logarithms of the times, for a variance of one; `None` where they are not independent.
     pub covariance: Option<Vec<Vec<f64>>>,
 }
@@ -30,7 +33,7 @@ impl Record<'_> {
     pub fn fit(&self, count: usize) -> Option<Fitted> {
         let mut at = self.project(&self.best_of_grid(count)?)?;
         for _ in 0..STEPS_MAX {
-            let Some(step) = self.step(&at) else { break };
+            let Some(step) = Self::step(&at) else { break };
             let largest = step.iter().fold(0.0, |largest: f64, part| largest.max(part.abs()));
             let mut share = (LOG_STEP_MAX / largest).min(1.0);
             let better = (0..12).find_map(|_| {
@@ -52,11 +55,16 @@ impl Record<'_> {
         at.times.sort_by(f64::total_cmp);
         let at = self.project(&at.times)?;
         let is_valid = at.moduli[..count].iter().all(|modulus| *modulus > 0.0);
-        let covariance = self.tangents(&at, &vec![0.0; self.forces.len()]).covariance();
+        let tangents = at.tangents();
+        let right = vec![0.0; self.forces.len()];
+        let columns = tangents.iter().cloned().chain([right]);
+        let covariance = Triangle::new(columns.collect()).covariance();
         is_valid.then_some(Fitted {
             times: at.times,
             moduli: at.moduli,
             left_over: at.left_over,
+            residuals: at.residuals,
+            tangents,
             covariance,
         })
     }
@@ -117,18 +125,10 @@ impl Record<'_> {
     }
 
     /// The step of the logarithms of the times that leaves the least in the tangent of all parameters.
-    fn step(&self, at: &Projected) -> Option<Vec<f64>> {
-        let steps = self.tangents(at, &at.residuals).solve()?;
+    fn step(at: &Projected) -> Option<Vec<f64>> {
+        let columns = at.tangents().into_iter().chain([at.residuals.clone()]);
+        let steps = Triangle::new(columns.collect()).solve()?;
         Some(steps[at.values.len()..].to_vec())
-    }
-
-    fn tangents(&self, at: &Projected, right: &[f64]) -> Triangle {
-        let of_time = |(column, modulus): (&Vec<Memory>, &f64)| {
-            column.iter().map(|memory| modulus * memory.slope).collect()
-        };
-        let of_times = at.columns.iter().zip(&at.moduli).map(of_time);
-        let columns = at.values.iter().cloned().chain(of_times).chain([right.to_vec()]);
-        Triangle::new(columns.collect())
     }
 
     /// The forces of a modulus of one that relaxes with this time, at the samples.
@@ -152,4 +152,15 @@ struct Projected {
     columns: Vec<Vec<Memory>>,
     /// The columns of the moduli, the equilibrium's last.
     values: Vec<Vec<f64>>,
+}
+
+impl Projected {
+    /// How the forces rise with the moduli, the equilibrium's last, and with the logarithms of the times.
+    fn tangents(&self) -> Vec<Vec<f64>> {
+        let of_time = |(column, modulus): (&Vec<Memory>, &f64)| {
+            column.iter().map(|memory| modulus * memory.slope).collect()
+        };
+        let of_times = self.columns.iter().zip(&self.moduli).map(of_time);
+        self.values.iter().cloned().chain(of_times).collect()
+    }
 }

@@ -156,3 +156,26 @@ fn bad_records_are_refused_in_words() {
     let few = fit_relaxation(law, &once, &[0.1; 9], 1).unwrap_err().to_string();
     assert!(few.starts_with("the record has 1 samples at different times"), "{few}");
 }
+
+/// A fit again of forces with an error says what the error does.
+#[test]
+fn small_errors_of_force_move_the_fit_by_as_much_as_a_fit_of_them() {
+    let test = Test { noise: 1e-3, ramp: 0.3, hold: 20.0, ..TEST };
+    let (law, history, forces) = test.record(&body());
+    let fit = fit_relaxation(law, &history, &forces, 3).unwrap();
+    let largest = forces.iter().copied().fold(0.0, f64::max);
+    let error = |force: &f64| 2e-3 * force * (force / largest - 0.3);
+    let errors: Vec<f64> = forces.iter().map(error).collect();
+    let moved: Vec<f64> = forces.iter().zip(&errors).map(|(force, error)| force + error).collect();
+    let again = fit_relaxation(law, &history, &moved, 3).unwrap();
+    let shifts = fit.shift_by(&errors);
+    for number in 0..3 {
+        let (before, after) = (fit.modulus.terms[number], again.modulus.terms[number]);
+        let of_modulus = after.modulus_mpa - before.modulus_mpa;
+        let of_time = (after.time_secs / before.time_secs).ln();
+        assert!((shifts[number] / of_modulus - 1.0).abs() < 0.02, "{number}: {of_modulus:e}");
+        assert!((shifts[4 + number] / of_time - 1.0).abs() < 0.02, "{number}: {of_time:e}");
+    }
+    let of_equilibrium = again.modulus.equilibrium_mpa - fit.modulus.equilibrium_mpa;
+    assert!((shifts[3] / of_equilibrium - 1.0).abs() < 0.02, "{of_equilibrium:e}");
+}

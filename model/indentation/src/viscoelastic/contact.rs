@@ -48,6 +48,10 @@ impl PowerLaw {
         Ok(Self { coefficient: 2.0 * (1.0 + poisson) * force_over_modulus, exponent })
     }
 
+    pub(super) fn of_curve(coefficient: f64, exponent: f64) -> Self {
+        Self { coefficient, exponent }
+    }
+
     /// Force over shear modulus at a depth of 1 mm, in mm².
     #[must_use]
     pub fn coefficient(&self) -> f64 {

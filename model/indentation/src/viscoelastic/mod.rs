@@ -1,7 +1,9 @@
-//! Rigid indenters on a linear viscoelastic half-space with a constant Poisson's ratio.
+//! Rigid indenters on a linear viscoelastic specimen with a constant Poisson's ratio.
 
 mod contact;
+mod creep;
 mod history;
+mod load_history;
 mod prony;
 mod repeated;
 
@@ -9,7 +11,9 @@ mod repeated;
 mod tests;
 
 pub use contact::{PowerLaw, lee_radok_force, lee_radok_force_of, ting_force};
+pub use creep::{CreepSeries, CreepTerm};
 pub use history::{DepthHistory, HistoryError};
 pub(crate) use history::{Knot, Memory, Mode};
+pub use load_history::{LoadHistoryError, load_history, stiffness_over_modulus};
 pub use prony::{PronySeries, PronyTerm};
 pub use repeated::repeated_contact_force;

@@ -4,7 +4,7 @@ use super::design::{LANES, Lane};
 use super::sample::FitSample;
 
 /// About the largest number of blocks in which autocorrelation is estimated.
-const NOISE_BLOCKS: usize = 400;
+pub(super) const NOISE_BLOCKS: usize = 400;
 
 /// Sums over one block of samples of all columns of a record's triangle, times their weights.
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@
 //! family of models is linear in everything else, so the fit is a search over a few numbers with a small least-squares
 //! problem inside. A family supplies columns ([`columns`]); all else is the same for all.
 
+mod autocorrelation;
 mod band;
 mod block_sums;
 mod bootstrap;
@@ -33,6 +34,7 @@ mod thin;
 mod triangle;
 mod uncertainty;
 
+pub use autocorrelation::ResidualAutocorrelation;
 pub use band::PredictedForce;
 pub use bootstrap::{Bootstrap, BootstrapInterval};
 pub use live::{LiveFit, ResidualBlocks};

@@ -7,9 +7,9 @@
 //!
 //! AICc: Hurvich & Tsai, Biometrika 76 (1989) 297-307. BIC: Schwarz, Ann. Statist. 6 (1978) 461-464.
 
-/// `(AICc, BIC)` for a mean square, so many independent samples and parameters, the variance of the noise
+/// `(AICc, BIC)` for a mean square of residuals, so many independent samples and parameters, the variance of the noise
 /// not counted. AICc is `None` where there are too few samples for its correction.
-pub(super) fn criteria(mean_square: f64, effective: f64, free: usize) -> (Option<f64>, f64) {
+pub fn criteria(mean_square: f64, effective: f64, free: usize) -> (Option<f64>, f64) {
     let k = (free + 1) as f64;
     let deviance = effective * mean_square.max(f64::MIN_POSITIVE).ln();
     let spare = effective - k - 1.0;

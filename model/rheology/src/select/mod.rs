@@ -14,6 +14,7 @@ mod run;
 mod verdict;
 
 pub use cost::StepCost;
+pub use criteria::criteria;
 pub use facts::RecordFacts;
 pub use hold_out::{HeldOutKind, HoldOut, HoldOutError, HoldOutPrediction, RecordPrediction};
 pub use ladder::LadderStep;
