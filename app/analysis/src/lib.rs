@@ -39,6 +39,7 @@ pub mod pool;
 pub mod progress;
 pub mod protocol_sources;
 pub mod recordings;
+pub mod relaxation;
 pub mod report;
 pub mod run_quality;
 #[cfg(feature = "haptics")]

@@ -142,10 +142,12 @@ pub enum MaterialError {
 
 /// A mean square of residuals is no chance where it is above the noise's by so many of its standard deviations, `sqrt(2 / n)`
 /// of it for `n` samples, and by more than a fifth, as the noise is known to a tenth.
-const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
-const LACK_OF_FIT_SHARE: f64 = 0.2;
+pub(crate) const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
+pub(crate) const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
 const END_SHARE: f64 = 0.998;
+/// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
+pub(crate) const COVERAGE: f64 = 1.96;
 
 /// The modulus of the loading of a session or a table.
 pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialError> {
@@ -154,23 +156,7 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
     {
         return Err(MaterialError::DepthMax { depth_mm });
     }
-    let wanted = SourceSelection {
-        is_rejected_included: request.is_rejected_included,
-        ..SourceSelection::default()
-    };
-    let (path, analysis) = (request.source.as_path(), request.analysis.as_deref());
-    let mut read = source::read_analysed(path, request.columns.as_ref(), wanted, analysis)?;
-    let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
-    let measured = read.thickness_mm;
-    let measured =
-        measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty });
-    let thickness_mm = request.thickness_mm.or(measured).ok_or(MaterialError::NoThickness)?;
-    let specimen = Specimen {
-        thickness_mm,
-        base: request.base,
-        poisson_ratio: request.poisson_ratio,
-        poisson_basis: request.poisson_basis,
-    };
+    let PressRecord { read, compliance, specimen } = read_press(request)?;
     let loading = Loading::of(&read, request.depth_max_mm);
     let signal = read.signal.as_ref();
     let contact_error_mm =
@@ -226,6 +212,34 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
         compliance,
         notes: read.notes,
     })
+}
+
+/// A record, corrected as the request wants it, and what was pressed.
+pub(crate) struct PressRecord {
+    pub read: FitSource,
+    pub compliance: Option<ComplianceCorrection>,
+    pub specimen: Specimen,
+}
+
+pub(crate) fn read_press(request: &MaterialRequest) -> Result<PressRecord, MaterialError> {
+    let wanted = SourceSelection {
+        is_rejected_included: request.is_rejected_included,
+        ..SourceSelection::default()
+    };
+    let (path, analysis) = (request.source.as_path(), request.analysis.as_deref());
+    let mut read = source::read_analysed(path, request.columns.as_ref(), wanted, analysis)?;
+    let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
+    let measured = read.thickness_mm;
+    let measured =
+        measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty });
+    let thickness_mm = request.thickness_mm.or(measured).ok_or(MaterialError::NoThickness)?;
+    let specimen = Specimen {
+        thickness_mm,
+        base: request.base,
+        poisson_ratio: request.poisson_ratio,
+        poisson_basis: request.poisson_basis,
+    };
+    Ok(PressRecord { read, compliance, specimen })
 }
 
 /// The largest first.
@@ -392,7 +406,7 @@ fn compliance_mpa(
     Ok((other.modulus_mpa - fit.modulus_mpa).abs())
 }
 
-fn validity_rows(validity: &Validity) -> Vec<ValidityRow> {
+pub(crate) fn validity_rows(validity: &Validity) -> Vec<ValidityRow> {
     let row = |ratio, Bounded { value, max }: Bounded| ValidityRow { ratio, value, max };
     let rows = [
         validity.depth_over_radius.map(|one| row("depth over tip radius", one)),

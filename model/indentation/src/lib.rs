@@ -21,8 +21,8 @@ mod viscoelastic;
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
 pub use fit::{
     LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, RelaxationFit,
-    RelaxationFitError, UnloadingFit, UnloadingFitError, fit_loading, fit_relaxation,
-    fit_unloading,
+    RelaxationFitError, TERMS_MAX, UnloadingFit, UnloadingFitError, fit_loading, fit_relaxation,
+    fit_unloading, vary_uncertain_numbers,
 };
 pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;

@@ -2,7 +2,9 @@
 
 use crate::material::{LoadingLackOfFit, MaterialReport};
 use palpate_figures::uncertain::{error_alone, significant, with_error};
-use palpate_indentation::{Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity};
+use palpate_indentation::{
+    Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
+};
 
 const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
 
@@ -17,7 +19,7 @@ pub fn material_text(report: &MaterialReport) -> String {
     lines.extend(report.lack_of_fit.map(lack_words));
     lines.push(format!("law              {}", law_words(report.law)));
     lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
-    lines.push(format!("specimen         {}", specimen_words(report)));
+    lines.push(format!("specimen         {}", specimen_words(&report.specimen)));
     lines.push(format!("loading          {}", loading_words(report)));
     lines.push(format!("contact          {}", contact_words(report)));
     lines.push(format!("force zero       {}", zero_words(report)));
@@ -40,7 +42,7 @@ pub fn material_text(report: &MaterialReport) -> String {
     lines.join("\n")
 }
 
-fn kpa(mpa: f64) -> f64 {
+pub(super) fn kpa(mpa: f64) -> f64 {
     1e3 * mpa
 }
 
@@ -54,7 +56,7 @@ fn lack_words(lack: LoadingLackOfFit) -> String {
     )
 }
 
-fn law_words(law: ContactLaw) -> &'static str {
+pub(super) fn law_words(law: ContactLaw) -> &'static str {
     match law {
         ContactLaw::Hertz => "Hertz (1882): a shallow sphere on a half-space",
         ContactLaw::Sneddon => "Sneddon (1965): on a half-space",
@@ -69,7 +71,7 @@ fn quantity_words(quantity: Quantity) -> String {
     }
 }
 
-fn indenter_words(indenter: &Indenter) -> String {
+pub(super) fn indenter_words(indenter: &Indenter) -> String {
     match indenter {
         Indenter::FlatPunch { radius_mm } => {
             format!("flat punch, radius in mm {}", quantity_words(*radius_mm))
@@ -112,8 +114,7 @@ fn tip_words(tip_radius_mm: Quantity) -> String {
     format!("radius of the tip in mm {}", quantity_words(tip_radius_mm))
 }
 
-fn specimen_words(report: &MaterialReport) -> String {
-    let specimen = &report.specimen;
+pub(super) fn specimen_words(specimen: &Specimen) -> String {
     let basis = match specimen.poisson_basis {
         PoissonBasis::Assumed => "assumed",
         PoissonBasis::Measured => "measured",
@@ -130,7 +131,7 @@ fn specimen_words(report: &MaterialReport) -> String {
 }
 
 /// A length in mm, or in um where it is small.
-fn length(mm: f64) -> String {
+pub(super) fn length(mm: f64) -> String {
     match mm.abs() < 0.1 {
         true => format!("{} um", significant(1e3 * mm, 4)),
         false => format!("{} mm", significant(mm, 4)),
@@ -138,7 +139,7 @@ fn length(mm: f64) -> String {
 }
 
 /// A force in N, in mN or uN where it is small.
-fn force(newtons: f64) -> String {
+pub(super) fn force(newtons: f64) -> String {
     match newtons.abs() {
         n if n < 1e-4 => format!("{} uN", significant(1e6 * newtons, 3)),
         n if n < 0.1 => format!("{} mN", significant(1e3 * newtons, 3)),

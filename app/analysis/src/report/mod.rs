@@ -21,6 +21,7 @@ pub mod plan_picture;
 pub mod plan_plot;
 pub mod programme;
 pub mod queue;
+pub mod relaxation;
 pub mod scatter;
 #[cfg(feature = "haptics")]
 pub mod scene;

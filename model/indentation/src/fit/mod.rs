@@ -20,6 +20,7 @@ pub use loading::{
     LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, fit_loading,
 };
 
+use crate::document::{Indenter, Specimen};
 use crate::viscoelastic::{DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm};
 use search::{Fitted, Record};
 use thiserror::Error;
@@ -78,6 +79,15 @@ pub const TERMS_MAX: usize = 5;
 const RAMP_OVER_TIME_MAX: f64 = 10.0;
 /// Standard errors of a modulus and of a time, over the value, beyond which the linear covariance no longer describes them.
 const RELATIVE_ERROR_MAX: f64 = 0.1;
+
+/// Indenter and specimen with each uncertain number one standard uncertainty lower and higher, for the law of propagation.
+#[must_use]
+pub fn vary_uncertain_numbers(
+    indenter: &Indenter,
+    specimen: &Specimen,
+) -> Vec<(ModulusTerm, [(Indenter, Specimen); 2])> {
+    loading::varied(indenter, specimen)
+}
 
 /// The relaxation modulus of so many terms that fits the forces in N at the samples of the history best. The contact must not
 /// shrink but by noise.

@@ -1,4 +1,6 @@
-//! `palpate material`: the modulus of a press by a contact law.
+//! `palpate material`: the moduli of a press by a contact law.
+
+mod relaxation;
 
 use super::arguments::{Choice, choice, parse_columns, parse_number};
 use super::output::Output;
@@ -11,11 +13,14 @@ use palpate_indentation::{
 };
 use std::path::PathBuf;
 
-/// Young's modulus of a press by a contact law, with the probe's shape and the thickness taken out
+/// Moduli of a press by a contact law, with the probe's shape and the thickness taken out
 #[derive(Debug, Args)]
 pub struct MaterialArgs {
     /// Session folder, or a delimited table with columns for time, depth and force
     source: PathBuf,
+    /// What is found of the material
+    #[arg(long, value_parser = choice(PROPERTIES), default_value = "modulus")]
+    property: Property,
     /// Shape of the indenter
     #[arg(long, value_parser = choice(INDENTERS))]
     indenter: IndenterWord,
@@ -70,7 +75,21 @@ pub struct MaterialArgs {
     /// the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
+    /// Terms of the relaxation modulus; without it as many as the record is worth
+    #[arg(long, value_name = "COUNT")]
+    terms: Option<usize>,
 }
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Property {
+    Modulus,
+    Relaxation,
+}
+
+const PROPERTIES: &[Choice<Property>] = &[
+    ("modulus", Property::Modulus, "Young's modulus of the loading"),
+    ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
+];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum IndenterWord {
@@ -98,7 +117,32 @@ const LAWS: &[Choice<ContactLaw>] = &[
 ];
 
 pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
-    let request = MaterialRequest {
+    check_flags(args)?;
+    let request = request(args)?;
+    if args.property == Property::Relaxation {
+        return relaxation::run(request, args.terms, output);
+    }
+    let report = material(&request).map_err(failure)?;
+    report.notes.iter().for_each(|note| output.note(note));
+    output.answer("material", &report, || material_text(&report));
+    Ok(())
+}
+
+/// A flag that belongs to another property.
+fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
+    let given = [
+        ("depth-max", args.depth_max.is_some(), Property::Modulus, "the modulus of a loading"),
+        ("zero-error", args.zero_error.is_some(), Property::Modulus, "the modulus of a loading"),
+        ("terms", args.terms.is_some(), Property::Relaxation, "a relaxation modulus"),
+    ];
+    let wrong = given.into_iter().find(|(_, is_given, of, _)| *is_given && *of != args.property);
+    wrong.map_or(Ok(()), |(flag, .., of)| {
+        Err(Failure::usage(format!("--{flag} belongs to {of}; leave it out")))
+    })
+}
+
+fn request(args: &MaterialArgs) -> Result<MaterialRequest, Failure> {
+    Ok(MaterialRequest {
         source: args.source.clone(),
         columns: parse_columns(args.columns.as_deref())?,
         analysis: args.analysis.clone(),
@@ -116,11 +160,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
         depth_max_mm: args.depth_max,
         contact: args.contact_error.unwrap_or(ErrorSource::Recorded),
         force_zero: args.zero_error.unwrap_or(ErrorSource::Recorded),
-    };
-    let report = material(&request).map_err(failure)?;
-    report.notes.iter().for_each(|note| output.note(note));
-    output.answer("material", &report, || material_text(&report));
-    Ok(())
+    })
 }
 
 fn failure(err: MaterialError) -> Failure {

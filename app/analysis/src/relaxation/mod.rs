@@ -1,0 +1,255 @@
+//! The shear relaxation modulus of a recorded press and hold, with what makes it uncertain, and the creep compliance of the same
+//! solid.
+//!
+//! Lee and Radok's integral takes the depth as it was, so the ramp need not be fast. Every source of uncertainty is an error of the
+//! forces, which the fit turns into one of its numbers (JCGM 100:2008, 5.1.2).
+
+mod choice;
+mod numbers;
+mod record;
+
+pub use choice::{TermCandidate, TermChoice};
+
+use crate::compliance::ComplianceCorrection;
+use crate::material::{
+    COVERAGE, ErrorSource, LACK_OF_FIT_DEVIATIONS, LACK_OF_FIT_SHARE, MaterialError,
+    MaterialRequest, PressRecord, ValidityRow, read_press, validity_rows,
+};
+use numbers::Numbers;
+use palpate_indentation::{
+    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
+};
+use palpate_rheology::fit::ResidualAutocorrelation;
+use record::{Record, Source};
+use serde::Serialize;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A press, of which the greatest depth is not asked: the hold is part of it.
+#[derive(Debug)]
+pub struct RelaxationRequest {
+    pub press: MaterialRequest,
+    /// Terms of the Prony series; `None` takes as many as the record is worth.
+    pub term_count: Option<usize>,
+}
+
+/// A relaxation modulus and all it rests on.
+#[derive(Clone, Debug, Serialize)]
+pub struct RelaxationReport {
+    pub source: PathBuf,
+    pub property: &'static str,
+    pub law: ContactLaw,
+    pub indenter: Indenter,
+    pub specimen: Specimen,
+    /// Shear modulus in MPa just after a step.
+    pub instantaneous_mpa: UncertainNumber,
+    /// Shear modulus in MPa after all has relaxed.
+    pub equilibrium_mpa: UncertainNumber,
+    /// From the shortest relaxation time to the longest.
+    pub terms: Vec<RelaxationTerm>,
+    /// At the powers of ten within the record.
+    pub modulus: Vec<ModulusAtTime>,
+    /// The creep compliance of the same solid.
+    pub creep: CreepReport,
+    /// The largest share in the equilibrium modulus first.
+    pub budget: Vec<RelaxationBudgetRow>,
+    pub not_included: Vec<&'static str>,
+    /// `None` where the number of terms was given.
+    pub term_choice: Option<TermChoice>,
+    pub samples: usize,
+    /// Number of independent samples that carry the information of the residuals.
+    pub effective_samples: f64,
+    /// Greatest depth, in mm.
+    pub depth_mm: f64,
+    /// From the contact to 99 % of the greatest depth, in s.
+    pub ramp_s: f64,
+    /// From the contact to the end, in s.
+    pub record_s: f64,
+    /// Standard uncertainty of the contact at depth zero, in mm; `None` where it is not known.
+    pub contact_error_mm: Option<f64>,
+    /// Standard deviation of the residuals in N.
+    pub residual_n: f64,
+    /// Standard deviation of a force in N, where it is known.
+    pub noise_n: Option<f64>,
+    /// Residuals over the noise, where they are larger than it.
+    pub lack_of_fit: Option<f64>,
+    pub validity: Vec<ValidityRow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compliance: Option<ComplianceCorrection>,
+    #[serde(skip)]
+    pub notes: Vec<String>,
+}
+
+/// A number with its combined standard uncertainty and 95 % interval, all in its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct UncertainNumber {
+    pub value: f64,
+    pub standard_uncertainty: f64,
+    pub total95: [f64; 2],
+}
+
+impl UncertainNumber {
+    pub(crate) fn new(value: f64, standard_uncertainty: f64) -> Self {
+        let half = COVERAGE * standard_uncertainty;
+        Self { value, standard_uncertainty, total95: [value - half, value + half] }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RelaxationTerm {
+    pub modulus_mpa: UncertainNumber,
+    pub time_s: UncertainNumber,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ModulusAtTime {
+    pub t_s: f64,
+    pub mpa: UncertainNumber,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CreepReport {
+    pub instantaneous_per_mpa: UncertainNumber,
+    /// From the shortest retardation time to the longest.
+    pub terms: Vec<RetardationTerm>,
+    /// At the times of the modulus.
+    pub compliance: Vec<ComplianceAtTime>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RetardationTerm {
+    pub compliance_per_mpa: UncertainNumber,
+    pub time_s: UncertainNumber,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ComplianceAtTime {
+    pub t_s: f64,
+    pub per_mpa: UncertainNumber,
+}
+
+/// Standard uncertainties in MPa that a source adds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RelaxationBudgetRow {
+    pub source: &'static str,
+    pub instantaneous_mpa: f64,
+    pub equilibrium_mpa: f64,
+}
+
+#[derive(Debug, Error)]
+pub enum RelaxationError {
+    #[error(transparent)]
+    Press(#[from] MaterialError),
+    #[error(transparent)]
+    History(#[from] LoadHistoryError),
+    #[error(transparent)]
+    Fit(#[from] RelaxationFitError),
+    #[error(
+        "the record has no press beyond depth zero with known forces; check the sign of the depth"
+    )]
+    NoPress,
+    #[error(
+        "a relaxation modulus cannot tell the contact from the relaxation; state the standard uncertainty of the contact, 0 for exact"
+    )]
+    ContactFree,
+    #[error("the standard uncertainty of the contact is {error_mm} mm; give mm, not below 0")]
+    ContactError { error_mm: f64 },
+    #[error(
+        "the equilibrium modulus is {mpa:.3e} MPa, below 0; hold longer, and check the zero of the force"
+    )]
+    NegativeEquilibrium { mpa: f64 },
+    #[error(
+        "the residuals of {samples} samples say nothing of the uncertainty; record more of them"
+    )]
+    NoResiduals { samples: usize },
+}
+
+/// The relaxation modulus of ramp and hold of a session or a table.
+pub fn relaxation(request: &RelaxationRequest) -> Result<RelaxationReport, RelaxationError> {
+    let press = &request.press;
+    let PressRecord { read, compliance, specimen } = read_press(press)?;
+    let contact_error_mm = match press.contact {
+        ErrorSource::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
+        ErrorSource::Stated(error_mm) if error_mm >= 0.0 => Some(error_mm),
+        ErrorSource::Stated(error_mm) => {
+            return Err(RelaxationError::ContactError { error_mm });
+        }
+        ErrorSource::Free => return Err(RelaxationError::ContactFree),
+    };
+    let record = Record::of(&read)?;
+    let law = (press.law, &press.indenter, &specimen);
+    let (fit, term_choice) = match request.term_count {
+        Some(count) => (record.fit(law, count)?, None),
+        None => {
+            let (fit, choice) = choice::choose(&record, law)?;
+            (fit, Some(choice))
+        }
+    };
+    if fit.modulus.equilibrium_mpa <= 0.0 {
+        return Err(RelaxationError::NegativeEquilibrium { mpa: fit.modulus.equilibrium_mpa });
+    }
+    let samples = record.forces.len();
+    let memory = ResidualAutocorrelation::of(&fit.residuals_newtons, &fit.tangents)
+        .ok_or(RelaxationError::NoResiduals { samples })?;
+    let times = record.decades();
+    let numbers = Numbers::of(&fit.modulus, &times);
+    let mut sources: Vec<(&'static str, Vec<f64>)> =
+        vec![("residuals", numbers.noise(&fit, &memory))];
+    let mut not_included = Vec::new();
+    let applied = compliance.as_ref().filter(|one| one.is_applied);
+    for Source { name, errors } in record.sources(law, &fit, &read, contact_error_mm, applied)? {
+        match errors.is_empty() {
+            true => not_included.push(name),
+            false => sources.push((name, numbers.shifts(&fit, &errors))),
+        }
+    }
+    let found = numbers.combined(&sources);
+    let validity = press.law.validity(&press.indenter, &specimen, record.deepest());
+    let validity = validity_rows(&validity.map_err(LoadHistoryError::from)?);
+    Ok(RelaxationReport {
+        source: press.source.clone(),
+        property: "relaxation",
+        law: press.law,
+        indenter: press.indenter,
+        specimen,
+        instantaneous_mpa: found.instantaneous,
+        equilibrium_mpa: found.equilibrium,
+        terms: found.terms,
+        modulus: found.modulus,
+        creep: found.creep,
+        budget: budget(&sources),
+        not_included,
+        term_choice,
+        samples,
+        effective_samples: memory.effective_samples(),
+        depth_mm: record.deepest(),
+        ramp_s: record.ramp_secs(),
+        record_s: record.secs(),
+        contact_error_mm,
+        residual_n: fit.residual_newtons,
+        noise_n: record.noise,
+        lack_of_fit: lack_of_fit(&fit, &record),
+        validity,
+        compliance,
+        notes: read.notes,
+    })
+}
+
+/// The first two numbers are the moduli at once and at last.
+fn budget(sources: &[(&'static str, Vec<f64>)]) -> Vec<RelaxationBudgetRow> {
+    let row = |(source, errors): &(&'static str, Vec<f64>)| RelaxationBudgetRow {
+        source,
+        instantaneous_mpa: errors[0],
+        equilibrium_mpa: errors[1],
+    };
+    let mut rows: Vec<RelaxationBudgetRow> = sources.iter().map(row).collect();
+    rows.sort_by(|a, b| b.equilibrium_mpa.total_cmp(&a.equilibrium_mpa));
+    rows
+}
+
+fn lack_of_fit(fit: &RelaxationFit, record: &Record) -> Option<f64> {
+    let residual_over_noise = fit.residual_newtons / record.noise?;
+    let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / record.forces.len() as f64).sqrt();
+    let is_chance = residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE);
+    (!is_chance).then_some(residual_over_noise)
+}

@@ -1,0 +1,180 @@
+//! The part of a record that a relaxation modulus is fitted to, and what errors of what was measured do to its forces.
+
+use super::RelaxationError;
+use crate::compliance::ComplianceCorrection;
+use crate::source::FitSource;
+use palpate_indentation::{
+    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, Specimen, fit_relaxation,
+    lee_radok_force, load_history, vary_uncertain_numbers,
+};
+use palpate_model::calibration::ForceUncertainty;
+use palpate_model::units::Newtons;
+use palpate_rheology::fit::FitSample;
+
+pub(super) type Press<'a> = (ContactLaw, &'a Indenter, &'a Specimen);
+
+/// Samples from the contact to the end of the hold.
+pub(super) struct Record {
+    /// From the first sample, in s.
+    pub times: Vec<f64>,
+    /// From the contact, in mm.
+    pub depths: Vec<f64>,
+    /// In N.
+    pub forces: Vec<f64>,
+    /// Standard deviation of a force in N, where it is known.
+    pub noise: Option<f64>,
+}
+
+/// What may be wrong with the forces by one standard uncertainty each; nothing where it is not known.
+pub(super) struct Source {
+    pub name: &'static str,
+    /// Errors in N of all samples, of each independent part.
+    pub errors: Vec<Vec<f64>>,
+}
+
+/// The press begins at the contact before this share of its greatest depth, and ends where it is less deep than before by as
+/// much: a contact that shrinks is beyond Lee and Radok. A slider at rest trembles by less.
+const DEPTH_SHARE: f64 = 0.02;
+/// A session that pauses for so many of its intervals moved in between, as in a sine.
+const PAUSE_INTERVALS: f64 = 50.0;
+
+impl Record {
+    pub fn of(read: &FitSource) -> Result<Self, RelaxationError> {
+        let shift = read.signal.as_ref().map_or(0.0, |signal| signal.contact_shift_mm);
+        let depth = |one: &FitSample| one.depth.0 - shift;
+        let all = without_pause(&read.samples, read.signal.is_some());
+        let deepest = all.iter().map(depth).fold(0.0, f64::max);
+        let pressed = all.iter().position(|one| depth(one) > DEPTH_SHARE * deepest);
+        let pressed = pressed.ok_or(RelaxationError::NoPress)?;
+        let first = all[..pressed].iter().rposition(|one| depth(one) <= 0.0).unwrap_or(0);
+        let mut reached = 0.0f64;
+        let is_held = |one: &&FitSample| {
+            reached = reached.max(depth(one));
+            depth(one) >= reached - DEPTH_SHARE * deepest
+        };
+        let taken: Vec<&FitSample> =
+            all[first..].iter().take_while(is_held).filter(|one| one.is_measured()).collect();
+        let start = taken.first().ok_or(RelaxationError::NoPress)?.t.0;
+        let squares: f64 = taken.iter().map(|one| one.sigma.0 * one.sigma.0).sum();
+        let noise = (squares / taken.len() as f64).sqrt();
+        Ok(Self {
+            times: taken.iter().map(|one| one.t.0 - start).collect(),
+            // The slider trembles about the contact too.
+            depths: taken.iter().map(|one| depth(one).max(0.0)).collect(),
+            forces: taken.iter().map(|one| one.force.0).collect(),
+            // Only a session's forces have an uncertainty of their own.
+            noise: read.signal.as_ref().map(|_| noise),
+        })
+    }
+
+    pub fn fit(
+        &self,
+        (law, indenter, specimen): Press,
+        term_count: usize,
+    ) -> Result<RelaxationFit, RelaxationError> {
+        let (power, history) = load_history(law, indenter, specimen, &self.times, &self.depths)?;
+        Ok(fit_relaxation(power, &history, &self.forces, term_count)?)
+    }
+
+    pub fn deepest(&self) -> f64 {
+        self.depths.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// From the contact to 99 % of the greatest depth.
+    pub fn ramp_secs(&self) -> f64 {
+        let end = 0.99 * self.deepest();
+        let index = self.depths.iter().position(|depth| *depth >= end);
+        index.map_or(0.0, |index| self.times[index])
+    }
+
+    pub fn secs(&self) -> f64 {
+        self.times.last().copied().unwrap_or(0.0)
+    }
+
+    /// The powers of ten in s from the mean interval of the samples to the whole record.
+    pub fn decades(&self) -> Vec<f64> {
+        let first = (self.secs() / self.times.len() as f64).log10().ceil() as i32;
+        let last = self.secs().log10().floor() as i32;
+        (first..=last).map(|power| 10f64.powi(power)).collect()
+    }
+
+    /// Everything but the noise.
+    pub fn sources(
+        &self,
+        press: Press,
+        fit: &RelaxationFit,
+        read: &FitSource,
+        contact_error_mm: Option<f64>,
+        compliance: Option<&ComplianceCorrection>,
+    ) -> Result<Vec<Source>, RelaxationError> {
+        let (law, indenter, specimen) = press;
+        let as_is = self.fitted(press, fit, &self.depths)?;
+        let moved = |by: &dyn Fn(usize) -> f64| -> Result<Vec<f64>, RelaxationError> {
+            let depth = |index: usize| (self.depths[index] + by(index)).max(0.0);
+            let depths: Vec<f64> = (0..self.depths.len()).map(depth).collect();
+            Ok(difference(&self.fitted(press, fit, &depths)?, &as_is, 1.0))
+        };
+        let mut sources = vec![Source {
+            name: "contact",
+            // Less deep, because deeper the law may not hold.
+            errors: contact_error_mm
+                .map(|error| moved(&|_| -error))
+                .transpose()?
+                .into_iter()
+                .collect(),
+        }];
+        for (term, [low, high]) in vary_uncertain_numbers(indenter, specimen) {
+            let fitted = |(indenter, specimen): &(Indenter, Specimen)| {
+                self.fitted((law, indenter, specimen), fit, &self.depths)
+            };
+            let errors = match (fitted(&low), fitted(&high)) {
+                (Ok(low), Ok(high)) => difference(&high, &low, 0.5),
+                // Beyond its range a law says nothing; the other side has the same size.
+                (Ok(one), Err(_)) | (Err(_), Ok(one)) => difference(&one, &as_is, 1.0),
+                (Err(err), Err(_)) => return Err(err),
+            };
+            sources.push(Source { name: term.name(), errors: vec![errors] });
+        }
+        sources.push(Source { name: "calibration", errors: self.calibration_errors(read) });
+        let bent =
+            compliance.map(|one| moved(&|index| -one.std_error_mm_per_n * self.forces[index]));
+        let errors = bent.transpose()?.into_iter().collect();
+        sources.push(Source { name: "machine compliance", errors });
+        Ok(sources)
+    }
+
+    fn calibration_errors(&self, read: &FitSource) -> Vec<Vec<f64>> {
+        let known = read.calibration.as_ref().and_then(|one| ForceUncertainty::of(one).ok());
+        let Some(known) = known.filter(ForceUncertainty::is_stated) else { return Vec::new() };
+        let errors = |error: usize| {
+            self.forces.iter().map(|force| known.shift(error, Newtons(*force)).0).collect()
+        };
+        (0..known.errors().count()).map(errors).collect()
+    }
+
+    /// The forces that the fitted modulus gives for these depths.
+    fn fitted(
+        &self,
+        (law, indenter, specimen): Press,
+        fit: &RelaxationFit,
+        depths: &[f64],
+    ) -> Result<Vec<f64>, RelaxationError> {
+        let (power, history) = load_history(law, indenter, specimen, &self.times, depths)?;
+        Ok(lee_radok_force(power, &fit.modulus, &history).map_err(LoadHistoryError::from)?)
+    }
+}
+
+fn difference(one: &[f64], other: &[f64], share: f64) -> Vec<f64> {
+    one.iter().zip(other).map(|(one, other)| share * (one - other)).collect()
+}
+
+/// The samples before the first pause of a session; a table may be as sparse as it likes.
+fn without_pause(samples: &[FitSample], is_session: bool) -> &[FitSample] {
+    let (Some(first), Some(last), true) = (samples.first(), samples.last(), is_session) else {
+        return samples;
+    };
+    let interval = (last.t.0 - first.t.0) / samples.len() as f64;
+    let pause =
+        samples.windows(2).position(|two| two[1].t.0 - two[0].t.0 > PAUSE_INTERVALS * interval);
+    pause.map_or(samples, |index| &samples[..=index])
+}
