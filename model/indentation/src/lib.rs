@@ -31,6 +31,6 @@ pub use shape::{Contact, IndenterShape};
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
 pub use viscoelastic::{
     CreepSeries, CreepTerm, DepthHistory, HistoryError, LoadHistoryError, PowerLaw, PronySeries,
-    PronyTerm, lee_radok_force, lee_radok_force_of, load_history, repeated_contact_force,
-    stiffness_over_modulus, ting_force,
+    PronyTerm, lee_radok_force, lee_radok_force_of, load_and_slope, load_history,
+    repeated_contact_force, ting_force,
 };

@@ -26,9 +26,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 /// A press, of which the greatest depth is not asked: the hold is part of it.
-#[derive(Debug)]
-pub struct RelaxationRequest {
-    pub press: MaterialRequest,
+#[derive(Clone, Copy, Debug)]
+pub struct RelaxationRequest<'a> {
+    pub press: &'a MaterialRequest,
     /// Terms of the Prony series; `None` takes as many as the record is worth.
     pub term_count: Option<usize>,
 }
@@ -47,7 +47,9 @@ pub struct RelaxationReport {
     pub equilibrium_mpa: UncertainNumber,
     /// From the shortest relaxation time to the longest.
     pub terms: Vec<RelaxationTerm>,
-    /// At the powers of ten within the record.
+    /// What relaxes within this time in s is in no number; `instantaneous_mpa` is the sum of the terms that were found.
+    pub seen_from_s: f64,
+    /// At the powers of ten from there to the end of the record.
     pub modulus: Vec<ModulusAtTime>,
     /// The creep compliance of the same solid.
     pub creep: CreepReport,
@@ -165,8 +167,8 @@ pub enum RelaxationError {
 }
 
 /// The relaxation modulus of ramp and hold of a session or a table.
-pub fn relaxation(request: &RelaxationRequest) -> Result<RelaxationReport, RelaxationError> {
-    let press = &request.press;
+pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, RelaxationError> {
+    let press = request.press;
     let PressRecord { read, compliance, specimen } = read_press(press)?;
     let contact_error_mm = match press.contact {
         ErrorSource::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
@@ -191,7 +193,8 @@ pub fn relaxation(request: &RelaxationRequest) -> Result<RelaxationReport, Relax
     let samples = record.forces.len();
     let memory = ResidualAutocorrelation::of(&fit.residuals_newtons, &fit.tangents)
         .ok_or(RelaxationError::NoResiduals { samples })?;
-    let times = record.decades();
+    let seen_from_s = record.seen_from_secs(law, fit.modulus.terms.len());
+    let times = record.decades(seen_from_s);
     let numbers = Numbers::of(&fit.modulus, &times);
     let mut sources: Vec<(&'static str, Vec<f64>)> =
         vec![("residuals", numbers.noise(&fit, &memory))];
@@ -215,6 +218,7 @@ pub fn relaxation(request: &RelaxationRequest) -> Result<RelaxationReport, Relax
         instantaneous_mpa: found.instantaneous,
         equilibrium_mpa: found.equilibrium,
         terms: found.terms,
+        seen_from_s,
         modulus: found.modulus,
         creep: found.creep,
         budget: budget(&sources),

@@ -4,8 +4,8 @@ use super::RelaxationError;
 use crate::compliance::ComplianceCorrection;
 use crate::source::FitSource;
 use palpate_indentation::{
-    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, Specimen, fit_relaxation,
-    lee_radok_force, load_history, vary_uncertain_numbers,
+    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
+    fit_relaxation, lee_radok_force, load_history, vary_uncertain_numbers,
 };
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::units::Newtons;
@@ -91,9 +91,19 @@ impl Record {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// The powers of ten in s from the mean interval of the samples to the whole record.
-    pub fn decades(&self) -> Vec<f64> {
-        let first = (self.secs() / self.times.len() as f64).log10().ceil() as i32;
+    /// From when on in s after a step so many terms are the modulus: behind the mean interval of the samples and a tenth of the
+    /// ramp, within which no fit finds a time, and behind all of the ramp where one more term is hidden there.
+    pub fn seen_from_secs(&self, press: Press, term_count: usize) -> f64 {
+        let hidden = self.fit(press, term_count + 1);
+        let is_hidden =
+            matches!(hidden, Err(RelaxationError::Fit(RelaxationFitError::RampTooLong { .. })));
+        let share = if is_hidden { 1.0 } else { 0.1 };
+        (self.secs() / self.times.len() as f64).max(share * self.ramp_secs())
+    }
+
+    /// The powers of ten in s from a time to the whole record.
+    pub fn decades(&self, from_secs: f64) -> Vec<f64> {
+        let first = from_secs.log10().ceil() as i32;
         let last = self.secs().log10().floor() as i32;
         (first..=last).map(|power| 10f64.powi(power)).collect()
     }

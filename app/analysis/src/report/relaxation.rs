@@ -1,7 +1,7 @@
 //! A relaxation modulus as people read it: the numbers first, and every assumption under them.
 
 use super::material::{force, indenter_words, kpa, law_words, length, specimen_words};
-use crate::relaxation::{RelaxationReport, TermChoice, UncertainNumber};
+use crate::relaxation::{RelaxationReport, TermCandidate, TermChoice, UncertainNumber};
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 
 const POISSON: &str = "assumed: Poisson's ratio is the same at all times";
@@ -22,6 +22,10 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
             with_uncertainty(term.time_s),
         ));
     }
+    lines.push(format!(
+        "seen from        {} s on: what relaxes faster is in no number, and G at once is the sum of the terms",
+        significant(report.seen_from_s, 2)
+    ));
     let both = report.modulus.iter().zip(&report.creep.compliance);
     lines.extend(both.map(|(modulus, compliance)| {
         format!(
@@ -93,13 +97,12 @@ fn lack_words(residual_over_noise: f64) -> String {
 }
 
 fn choice_words(choice: &TermChoice) -> String {
-    let candidates = choice.candidates.iter().map(|one| {
-        format!("{} terms {} above the lowest", one.terms, significant(one.bic_above, 3))
-    });
-    let candidates: Vec<String> = candidates.collect();
+    let candidate =
+        |one: &TermCandidate| format!("{} with {}", significant(one.bic_above, 3), one.terms);
+    let candidates: Vec<String> = choice.candidates.iter().map(candidate).collect();
     let refused = choice.refused.as_ref().map(|reason| format!("; one more is refused: {reason}"));
     format!(
-        "number of terms  by the Bayesian criterion: {}{}",
+        "number of terms  by the Bayesian criterion above its lowest: {}{}",
         candidates.join(", "),
         refused.unwrap_or_default()
     )

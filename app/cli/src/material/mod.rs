@@ -120,7 +120,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
     let request = request(args)?;
     if args.property == Property::Relaxation {
-        return relaxation::run(request, args.terms, output);
+        return relaxation::run(&request, args.terms, output);
     }
     let report = material(&request).map_err(failure)?;
     report.notes.iter().for_each(|note| output.note(note));

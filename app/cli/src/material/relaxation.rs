@@ -8,11 +8,11 @@ use palpate_analysis::report::relaxation::relaxation_text;
 use palpate_indentation::RelaxationFitError;
 
 pub(super) fn run(
-    press: MaterialRequest,
+    press: &MaterialRequest,
     term_count: Option<usize>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let report = relaxation(&RelaxationRequest { press, term_count }).map_err(failure)?;
+    let report = relaxation(RelaxationRequest { press, term_count }).map_err(failure)?;
     report.notes.iter().for_each(|note| output.note(note));
     output.answer("material", &report, || relaxation_text(&report));
     Ok(())

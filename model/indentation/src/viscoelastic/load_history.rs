@@ -44,14 +44,14 @@ pub fn load_history(
     }
 }
 
-/// Slope of the force over the depth at a depth in mm, over Young's modulus, in mm: what small motions about it feel.
-pub fn stiffness_over_modulus(
+/// Force over Young's modulus at a depth in mm, in mm², and its slope, in mm, which is what small motions about the depth feel.
+pub fn load_and_slope(
     law: ContactLaw,
     indenter: &Indenter,
     specimen: &Specimen,
     depth_mm: f64,
-) -> Result<f64, ContactError> {
-    Ok(LoadCurve::new(law, indenter, specimen, depth_mm)?.at(depth_mm)[1])
+) -> Result<[f64; 2], ContactError> {
+    Ok(LoadCurve::new(law, indenter, specimen, depth_mm)?.at(depth_mm))
 }
 
 #[cfg(test)]
@@ -119,7 +119,7 @@ mod tests {
         assert_eq!(law.exponent(), 1.0);
         assert!((law.coefficient() / (8.0 / 0.55) - 1.0).abs() < 1e-12);
         let cone = Indenter::Cone { half_angle_degrees: exact(70.0) };
-        let slope = stiffness_over_modulus(ContactLaw::Sneddon, &cone, &thick, 0.2).unwrap();
+        let [_, slope] = load_and_slope(ContactLaw::Sneddon, &cone, &thick, 0.2).unwrap();
         let tangent = 70f64.to_radians().tan();
         let expected = 4.0 / std::f64::consts::PI * tangent * 0.2 / (1.0 - 0.45 * 0.45);
         assert!((slope / expected - 1.0).abs() < 1e-12);

@@ -8,12 +8,14 @@ mod prony;
 mod repeated;
 
 #[cfg(test)]
+mod sine_tests;
+#[cfg(test)]
 mod tests;
 
 pub use contact::{PowerLaw, lee_radok_force, lee_radok_force_of, ting_force};
 pub use creep::{CreepSeries, CreepTerm};
 pub use history::{DepthHistory, HistoryError};
 pub(crate) use history::{Knot, Memory, Mode};
-pub use load_history::{LoadHistoryError, load_history, stiffness_over_modulus};
+pub use load_history::{LoadHistoryError, load_and_slope, load_history};
 pub use prony::{PronySeries, PronyTerm};
 pub use repeated::repeated_contact_force;
