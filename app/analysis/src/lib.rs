@@ -15,6 +15,7 @@ pub mod cycle_analysis;
 pub mod cycles;
 pub mod daily;
 pub mod demonstration_library;
+pub mod dynamic;
 pub mod edited_session;
 pub mod edits;
 pub mod exports;

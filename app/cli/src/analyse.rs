@@ -1,6 +1,6 @@
 //! `palpate analyse`: loops, shift, decay and relaxation of cycles.
 
-use super::arguments::{parse_columns, parse_number};
+use super::arguments::{parse_columns, positive};
 use super::output::Output;
 use super::{Failure, known_fit_failure, new_file, source_failure};
 use clap::Args;
@@ -35,13 +35,6 @@ pub struct AnalyseArgs {
     /// Draw loops, peaks, shift and relaxation of a single source as a new SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match parse_number(text)? {
-        value if value > 0.0 => Ok(value),
-        _ => Err("this is not a positive number; give a number such as 0.75".into()),
-    }
 }
 
 pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {

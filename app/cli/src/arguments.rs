@@ -28,6 +28,14 @@ pub(super) fn parse_number(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A finite number above 0, or one sentence.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    match parse_number(text)? {
+        value if value > 0.0 => Ok(value),
+        _ => Err("this is not a positive number; give a number such as 0.75".into()),
+    }
+}
+
 /// Refuses a number that is not above 0 and up to `max`.
 pub(super) fn above_zero(flag: &str, value: f64, max: f64, unit: &str) -> Result<f64, Failure> {
     if value > 0.0 && value <= max {

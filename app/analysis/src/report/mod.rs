@@ -7,6 +7,7 @@ pub mod calibration_plot;
 pub mod catalog;
 pub mod cycles;
 pub mod dossier;
+pub mod dynamic;
 #[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod figures;

@@ -1,11 +1,13 @@
 //! `palpate material`: the moduli of a press by a contact law.
 
+mod dynamic;
 mod relaxation;
 
-use super::arguments::{Choice, choice, parse_columns, parse_number};
+use super::arguments::{Choice, choice, parse_columns, parse_number, positive};
 use super::output::Output;
 use super::{Failure, compliance, source_failure};
 use clap::Args;
+use palpate_analysis::dynamic::DynamicRequest;
 use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
 use palpate_indentation::{
@@ -78,17 +80,25 @@ pub struct MaterialArgs {
     /// Terms of the relaxation modulus; without it as many as the record is worth
     #[arg(long, value_name = "COUNT")]
     terms: Option<usize>,
+    /// Treat a table as one sine of this frequency in Hz; a session has its own
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    frequency: Option<f64>,
+    /// Mass in g that moves between load cell and specimen, as probe and rod; without it none
+    #[arg(long, value_name = "GRAMS", value_parser = quantity, allow_hyphen_values = true)]
+    moving_mass: Option<Quantity>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Property {
     Modulus,
     Relaxation,
+    Dynamic,
 }
 
 const PROPERTIES: &[Choice<Property>] = &[
     ("modulus", Property::Modulus, "Young's modulus of the loading"),
     ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
+    ("dynamic", Property::Dynamic, "storage and loss modulus of sines"),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,13 +129,19 @@ const LAWS: &[Choice<ContactLaw>] = &[
 pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
     let request = request(args)?;
-    if args.property == Property::Relaxation {
-        return relaxation::run(&request, args.terms, output);
+    match args.property {
+        Property::Modulus => {
+            let report = material(&request).map_err(failure)?;
+            report.notes.iter().for_each(|note| output.note(note));
+            output.answer("material", &report, || material_text(&report));
+            Ok(())
+        }
+        Property::Relaxation => relaxation::run(&request, args.terms, output),
+        Property::Dynamic => {
+            let (frequency_hz, moving_mass_g) = (args.frequency, args.moving_mass);
+            dynamic::run(&DynamicRequest { press: request, frequency_hz, moving_mass_g }, output)
+        }
     }
-    let report = material(&request).map_err(failure)?;
-    report.notes.iter().for_each(|note| output.note(note));
-    output.answer("material", &report, || material_text(&report));
-    Ok(())
 }
 
 /// A flag that belongs to another property.
@@ -134,6 +150,8 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
         ("depth-max", args.depth_max.is_some(), Property::Modulus, "the modulus of a loading"),
         ("zero-error", args.zero_error.is_some(), Property::Modulus, "the modulus of a loading"),
         ("terms", args.terms.is_some(), Property::Relaxation, "a relaxation modulus"),
+        ("frequency", args.frequency.is_some(), Property::Dynamic, "dynamic moduli"),
+        ("moving-mass", args.moving_mass.is_some(), Property::Dynamic, "dynamic moduli"),
     ];
     let wrong = given.into_iter().find(|(_, is_given, of, _)| *is_given && *of != args.property);
     wrong.map_or(Ok(()), |(flag, .., of)| {
