@@ -1,12 +1,13 @@
 //! Autocorrelation of the residuals of a fit that another crate made.
 
 use super::block_sums::NOISE_BLOCKS;
-use super::noise::{Blocks, Memory, memory, triangle};
+use super::inflation::{inflation, triangle};
+use palpate_model::autocorrelation::{BlockedResiduals, Memory, memory};
 
 /// What the residuals of a least-squares fit say of its uncertainty, as [`fit()`](super::fit()) takes it.
 #[derive(Clone, Debug)]
 pub struct ResidualAutocorrelation {
-    blocks: Blocks,
+    blocks: BlockedResiduals,
     memory: Memory,
     /// Variance of the residuals.
     white: f64,
@@ -27,7 +28,7 @@ impl ResidualAutocorrelation {
             values.chunks(length).map(sum).collect::<Vec<f64>>()
         };
         let residuals = sums(residuals);
-        let blocks = Blocks {
+        let blocks = BlockedResiduals {
             places: (0..residuals.len()).collect(),
             columns: tangents.iter().map(|tangent| sums(tangent)).collect(),
             residuals,
@@ -53,7 +54,7 @@ impl ResidualAutocorrelation {
     pub fn inflation(&self, combination: &[f64]) -> f64 {
         let factor = triangle([&self.blocks].into_iter(), combination.len()).finish();
         let records = [(self.blocks.clone(), Some(self.memory), self.white)];
-        super::noise::inflation(&records, &factor, combination, self.white).0
+        inflation(&records, &factor, combination, self.white).0
     }
 }
 
