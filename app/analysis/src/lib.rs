@@ -55,4 +55,5 @@ pub mod support_bundle;
 pub mod tick_replay;
 pub mod today;
 pub mod trade;
+pub mod unloading;
 pub mod window_requests;

@@ -1,7 +1,7 @@
 //! Young's modulus of a recorded press by a contact law, with what makes it uncertain.
 
 use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
-use crate::source::{self, FitSource, SourceError, SourceSelection};
+use crate::source::{self, FitSource, RecordStretch, SourceError, SourceSelection};
 use palpate_indentation::{
     Base, Bounded, ContactLaw, Indenter, LoadingFit, LoadingFitError, LoadingKnowledge,
     LoadingSample, PoissonBasis, Quantity, Specimen, Validity, fit_loading,
@@ -49,7 +49,7 @@ pub enum ErrorSource {
 }
 
 impl ErrorSource {
-    fn or_recorded(self, recorded: Option<f64>) -> Option<f64> {
+    pub(crate) fn or_recorded(self, recorded: Option<f64>) -> Option<f64> {
         match self {
             Self::Recorded => recorded,
             Self::Stated(error) => Some(error),
@@ -145,7 +145,7 @@ pub enum MaterialError {
 pub(crate) const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
 pub(crate) const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
-const END_SHARE: f64 = 0.998;
+pub(crate) const END_SHARE: f64 = 0.998;
 /// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
 pub(crate) const COVERAGE: f64 = 1.96;
 
@@ -156,7 +156,7 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
     {
         return Err(MaterialError::DepthMax { depth_mm });
     }
-    let PressRecord { read, compliance, specimen } = read_press(request)?;
+    let PressRecord { read, compliance, specimen } = read_press(request, RecordStretch::RampHold)?;
     let loading = Loading::of(&read, request.depth_max_mm);
     let signal = read.signal.as_ref();
     let contact_error_mm =
@@ -221,11 +221,11 @@ pub(crate) struct PressRecord {
     pub specimen: Specimen,
 }
 
-pub(crate) fn read_press(request: &MaterialRequest) -> Result<PressRecord, MaterialError> {
-    let wanted = SourceSelection {
-        is_rejected_included: request.is_rejected_included,
-        ..SourceSelection::default()
-    };
+pub(crate) fn read_press(
+    request: &MaterialRequest,
+    stretch: RecordStretch,
+) -> Result<PressRecord, MaterialError> {
+    let wanted = SourceSelection { stretch, is_rejected_included: request.is_rejected_included };
     let (path, analysis) = (request.source.as_path(), request.analysis.as_deref());
     let mut read = source::read_analysed(path, request.columns.as_ref(), wanted, analysis)?;
     let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
@@ -243,7 +243,10 @@ pub(crate) fn read_press(request: &MaterialRequest) -> Result<PressRecord, Mater
 }
 
 /// The largest first.
-fn budget_rows(terms: Vec<(&'static str, f64)>, variance: f64) -> Vec<MaterialBudgetRow> {
+pub(crate) fn budget_rows(
+    terms: Vec<(&'static str, f64)>,
+    variance: f64,
+) -> Vec<MaterialBudgetRow> {
     let row = |(source, mpa): (&'static str, f64)| MaterialBudgetRow {
         source,
         mpa,
@@ -325,7 +328,7 @@ impl Loading {
 
 /// How far the signal out of contact has been from the zero of the tare, as a root mean square in N: noise of these means is far
 /// smaller, so this is what the zero has wandered. `None` where no signal out of contact is known.
-fn zero_scatter(read: &FitSource) -> Option<f64> {
+pub(crate) fn zero_scatter(read: &FitSource) -> Option<f64> {
     let signal = read.signal.as_ref()?;
     let (curve, first) = (&signal.curve, read.samples.first()?);
     let offset = signal.volts.first()? - curve.volts_from_newtons(first.force).0;

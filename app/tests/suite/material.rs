@@ -147,3 +147,29 @@ fn what_no_law_describes_is_refused_in_one_sentence() {
     let pull = typed(at.path(), &format!("material pull.csv {sphere} --thickness 50"));
     assert_refused(&pull, 1, "check the signs of force and depth");
 }
+
+/// A cone pressed in and drawn back, `F = 2 / pi E / (1 - nu^2) tan(alpha) d^2` both ways: nothing is left of an elastic press.
+#[test]
+fn the_modulus_of_an_elastic_way_back_is_the_one_that_made_it() {
+    let at = tempfile::tempdir().unwrap();
+    let mut text = String::from("t_s,depth_mm,force_N\n");
+    for index in 0..=400 {
+        let depth = 0.001 * f64::from(200 - (index - 200i32).abs());
+        let plane = 0.0125 / (1.0 - 0.45 * 0.45);
+        let force = std::f64::consts::FRAC_2_PI * plane * 75f64.to_radians().tan() * depth * depth;
+        let _ = writeln!(text, "{},{depth},{force}", 0.01 * f64::from(index));
+    }
+    std::fs::write(at.path().join("back.csv"), text).unwrap();
+    let line = "material back.csv --property unloading --indenter cone --half-angle 75 --poisson 0.45±0.01 --thickness 500";
+    let found = json(&typed(at.path(), &format!("{line} --json")));
+    assert!((number(&found, "/modulus_mpa") / 0.0125 - 1.0).abs() < 1e-5, "{found}");
+    assert!((number(&found, "/exponent") - 2.0).abs() < 1e-5, "{found}");
+    let missing = ["contact", "force zero", "calibration", "machine compliance"];
+    assert_eq!(found["not_included"], serde_json::json!(missing));
+    assert!(stdout(&typed(at.path(), line)).contains("Oliver and Pharr (1992)"));
+    let with_law = typed(at.path(), &format!("{line} --law layer"));
+    assert_refused(&with_law, 2, "--law belongs to what is no unloading");
+    hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.05]);
+    let only_in = typed(at.path(), &line.replace("back", "press"));
+    assert_refused(&only_in, 1, "record the way back");
+}

@@ -14,7 +14,7 @@ use crate::recordings::is_session;
 use crate::relaxation::{
     RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber, relaxation,
 };
-use crate::source::SourceError;
+use crate::source::{RecordStretch, SourceError};
 use palpate_indentation::{
     ContactError, ContactLaw, Indenter, PronySeries, PronyTerm, Quantity, Specimen,
 };
@@ -129,7 +129,7 @@ pub enum DynamicError {
 pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> {
     let press = &request.press;
     check(request)?;
-    let PressRecord { read, compliance, specimen } = read_press(press)?;
+    let PressRecord { read, compliance, specimen } = read_press(press, RecordStretch::RampHold)?;
     let contact_error_mm = match press.contact {
         ErrorSource::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
         ErrorSource::Stated(error_mm) => Some(error_mm),

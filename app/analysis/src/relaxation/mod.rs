@@ -15,6 +15,7 @@ use crate::material::{
     COVERAGE, ErrorSource, LACK_OF_FIT_DEVIATIONS, LACK_OF_FIT_SHARE, MaterialError,
     MaterialRequest, PressRecord, ValidityRow, read_press, validity_rows,
 };
+use crate::source::RecordStretch;
 use numbers::Numbers;
 use palpate_indentation::{
     ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
@@ -169,7 +170,7 @@ pub enum RelaxationError {
 /// The relaxation modulus of ramp and hold of a session or a table.
 pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, RelaxationError> {
     let press = request.press;
-    let PressRecord { read, compliance, specimen } = read_press(press)?;
+    let PressRecord { read, compliance, specimen } = read_press(press, RecordStretch::RampHold)?;
     let contact_error_mm = match press.contact {
         ErrorSource::Recorded => read.signal.as_ref().map(|signal| signal.contact_error_mm),
         ErrorSource::Stated(error_mm) if error_mm >= 0.0 => Some(error_mm),

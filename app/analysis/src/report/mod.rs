@@ -32,5 +32,6 @@ pub mod session;
 pub mod session_text;
 pub mod stored_analysis;
 pub mod text;
+pub mod unloading;
 
 pub use selection_plot::of_selection;

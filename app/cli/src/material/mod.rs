@@ -2,6 +2,7 @@
 
 mod dynamic;
 mod relaxation;
+mod unloading;
 
 use super::arguments::{Choice, choice, parse_columns, parse_number, positive};
 use super::output::Output;
@@ -50,9 +51,9 @@ pub struct MaterialArgs {
     /// How the specimen lies on its base
     #[arg(long, value_parser = choice(BASES), default_value = "bonded")]
     base: Base,
-    /// Law of the contact
-    #[arg(long, value_parser = choice(LAWS), default_value = "layer")]
-    law: ContactLaw,
+    /// Law of the contact; without it that of a layer
+    #[arg(long, value_parser = choice(LAWS))]
+    law: Option<ContactLaw>,
     /// Take the loading up to this depth in mm; without it all of it
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     depth_max: Option<f64>,
@@ -91,12 +92,14 @@ pub struct MaterialArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Property {
     Modulus,
+    Unloading,
     Relaxation,
     Dynamic,
 }
 
 const PROPERTIES: &[Choice<Property>] = &[
     ("modulus", Property::Modulus, "Young's modulus of the loading"),
+    ("unloading", Property::Unloading, "Young's modulus of the way back, by Oliver and Pharr"),
     ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
     ("dynamic", Property::Dynamic, "storage and loss modulus of sines"),
 ];
@@ -136,6 +139,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
             output.answer("material", &report, || material_text(&report));
             Ok(())
         }
+        Property::Unloading => unloading::run(&request, output),
         Property::Relaxation => relaxation::run(&request, args.terms, output),
         Property::Dynamic => {
             let (frequency_hz, moving_mass_g) = (args.frequency, args.moving_mass);
@@ -146,14 +150,17 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
 
 /// A flag that belongs to another property.
 fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
-    let given = [
-        ("depth-max", args.depth_max.is_some(), Property::Modulus, "the modulus of a loading"),
-        ("zero-error", args.zero_error.is_some(), Property::Modulus, "the modulus of a loading"),
-        ("terms", args.terms.is_some(), Property::Relaxation, "a relaxation modulus"),
-        ("frequency", args.frequency.is_some(), Property::Dynamic, "dynamic moduli"),
-        ("moving-mass", args.moving_mass.is_some(), Property::Dynamic, "dynamic moduli"),
+    use Property::{Dynamic, Modulus, Relaxation, Unloading};
+    let given: [(&str, bool, &[Property], &str); 6] = [
+        ("depth-max", args.depth_max.is_some(), &[Modulus], "the modulus of a loading"),
+        ("zero-error", args.zero_error.is_some(), &[Modulus, Unloading], "a Young's modulus"),
+        ("law", args.law.is_some(), &[Modulus, Relaxation, Dynamic], "what is no unloading"),
+        ("terms", args.terms.is_some(), &[Relaxation], "a relaxation modulus"),
+        ("frequency", args.frequency.is_some(), &[Dynamic], "dynamic moduli"),
+        ("moving-mass", args.moving_mass.is_some(), &[Dynamic], "dynamic moduli"),
     ];
-    let wrong = given.into_iter().find(|(_, is_given, of, _)| *is_given && *of != args.property);
+    let is_wrong = |own: &[Property]| !own.contains(&args.property);
+    let wrong = given.into_iter().find(|(_, is_given, own, _)| *is_given && is_wrong(own));
     wrong.map_or(Ok(()), |(flag, .., of)| {
         Err(Failure::usage(format!("--{flag} belongs to {of}; leave it out")))
     })
@@ -166,7 +173,7 @@ fn request(args: &MaterialArgs) -> Result<MaterialRequest, Failure> {
         analysis: args.analysis.clone(),
         is_rejected_included: args.include_rejected,
         corrections: compliance::corrections(args.compliance.as_deref())?,
-        law: args.law,
+        law: args.law.unwrap_or(ContactLaw::Layer),
         indenter: indenter(args)?,
         thickness_mm: args.thickness,
         base: args.base,

@@ -5,6 +5,7 @@
 //! those of every fit of palpate are.
 
 use palpate_model::autocorrelation::{BlockedResiduals, memory};
+use palpate_model::estimate::student_t975;
 
 /// About the largest number of blocks in which the residuals are summed.
 const BLOCKS: usize = 400;
@@ -64,4 +65,11 @@ impl FittedSamples<'_> {
             _ => white,
         }
     }
+}
+
+/// Standard uncertainties in half of a 95 % interval of a modulus of a variance in MPa², of which the noise's has its degrees of
+/// freedom and all others have infinitely many.
+pub(super) fn coverage_factor(noise_mpa: f64, freedom: f64, variance: f64) -> f64 {
+    let share = noise_mpa * noise_mpa / variance;
+    student_t975(freedom / (share * share))
 }

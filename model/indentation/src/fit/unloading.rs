@@ -7,7 +7,7 @@
 //! 2660-2671), and `beta` is one but for pyramids (King, Int. J. Solids Struct. 23 (1987) 1657-1664).
 
 use super::loading::{LoadingKnowledge, LoadingSample, ModulusTerm, varied};
-use super::residuals::{FittedSamples, ModulusNoise};
+use super::residuals::{FittedSamples, ModulusNoise, coverage_factor};
 use crate::document::{Indenter, Specimen};
 use crate::triangle::Triangle;
 use crate::validity::{ContactError, ContactLaw, Validity};
@@ -118,6 +118,14 @@ pub fn fit_unloading(
         noise_freedom: noise.freedom,
         validity,
     })
+}
+
+impl UnloadingFit {
+    /// As of a loading: [`super::LoadingFit::coverage_factor`].
+    #[must_use]
+    pub fn coverage_factor(&self, variance: f64) -> f64 {
+        coverage_factor(self.terms[&ModulusTerm::Noise], self.noise_freedom, variance)
+    }
 }
 
 /// The part of an unloading that is fitted.

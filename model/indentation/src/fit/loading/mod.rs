@@ -10,11 +10,10 @@ mod variations;
 #[cfg(test)]
 mod tests;
 
-use super::residuals::FittedSamples;
+use super::residuals::{FittedSamples, coverage_factor};
 use crate::document::{Indenter, Specimen};
 use crate::load_curve::LoadCurve;
 use crate::validity::{ContactError, ContactLaw, Validity};
-use palpate_model::estimate::student_t975;
 use problem::{Found, LoadingProblem, MODULUS, SHIFT, ZERO};
 use std::collections::BTreeMap;
 use thiserror::Error;
@@ -343,8 +342,7 @@ impl LoadingFit {
     /// degrees of freedom as Welch's and Satterthwaite's formula gives (JCGM 100:2008, G.4.1).
     #[must_use]
     pub fn coverage_factor(&self, variance: f64) -> f64 {
-        let share = self.terms[&ModulusTerm::Noise].powi(2) / variance;
-        student_t975(self.noise_freedom / (share * share))
+        coverage_factor(self.terms[&ModulusTerm::Noise], self.noise_freedom, variance)
     }
 
     /// 95 % interval in MPa of all terms.

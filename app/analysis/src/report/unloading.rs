@@ -1,0 +1,52 @@
+//! The modulus of an unloading as people read it.
+
+use super::material::{force, indenter_words, kpa, length, specimen_words};
+use crate::unloading::UnloadingReport;
+use palpate_figures::uncertain::{error_alone, significant, with_error};
+
+const HALF_SPACE: &str = "elastic: the way back must be faster than the tissue relaxes, and the specimen much thicker than the contact is wide";
+
+#[must_use]
+pub fn unloading_text(report: &UnloadingReport) -> String {
+    let mut lines = vec![
+        format!(
+            "Young's modulus  {} kPa, 95 % interval {} to {} kPa",
+            with_error(kpa(report.modulus_mpa), kpa(report.standard_uncertainty_mpa)),
+            significant(kpa(report.total95_mpa[0]), 4),
+            significant(kpa(report.total95_mpa[1]), 4),
+        ),
+        "method           Oliver and Pharr (1992) on the unloading, on a half-space".into(),
+        format!("indenter         {}", indenter_words(&report.indenter)),
+        format!("specimen         {}", specimen_words(&report.specimen)),
+        format!(
+            "unloading        from {}, {} samples; slope {} N/mm, exponent {}; residuals {}",
+            length(report.depth_mm),
+            report.samples,
+            significant(report.stiffness_n_per_mm, 4),
+            significant(report.exponent, 3),
+            force(report.residual_n),
+        ),
+        format!(
+            "contact          {} deep, area {} mm²",
+            length(report.contact_depth_mm),
+            significant(report.contact_area_mm2, 4),
+        ),
+    ];
+    for row in &report.validity {
+        let value = significant(row.value, 3);
+        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
+    }
+    for row in &report.budget {
+        lines.push(format!(
+            "uncertainty      {:<18} {:>8} kPa  {:>3.0} %",
+            row.source,
+            error_alone(kpa(row.mpa)),
+            row.percent
+        ));
+    }
+    if !report.not_included.is_empty() {
+        lines.push(format!("not included     {}", report.not_included.join(", ")));
+    }
+    lines.push(HALF_SPACE.into());
+    lines.join("\n")
+}
