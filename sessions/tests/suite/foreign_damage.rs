@@ -1,5 +1,6 @@
 //! Foreign files that are made to ask for more memory than they deserve.
 
+use crate::foreign_jpk;
 use crate::hostile::limit_memory;
 use crate::support::{put, quick_folder};
 use crate::worker::{command, reported_numbers};
@@ -28,6 +29,7 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("rheometer", rheometer.into()),
         ("bluehill", bluehill.into()),
         ("optics11", optics11.into()),
+        ("jpk", foreign_jpk::seed()),
         ("utf-16", wide),
         ("xlsx", fs::read(data.join("zwick.xlsx")).unwrap()),
         ("xls", fs::read(data.join("zwick.xls")).unwrap()),

@@ -90,12 +90,12 @@ pub fn parse_foreign(
     let format = options.format.or_else(|| ForeignFormat::of_bytes(&bytes));
     let (parts, left_out) = match format.map(|format| (format, &format.0.content)) {
         Some((format, Content::Sheets { read, .. })) => {
-            let sheets = read(&bytes)?.into_iter().map(|(name, rows)| RawPart {
-                name,
-                facts: Vec::new(),
+            let sheets = read(&bytes)?.into_iter().map(|sheet| RawPart {
+                name: sheet.name,
+                facts: sheet.facts,
                 layout: format.0,
                 head: None,
-                rows: Rows::Cells(rows),
+                rows: Rows::Cells(sheet.rows),
             });
             let mut readings = ReadingList::default();
             readings.add_layout(format, options);

@@ -2,6 +2,7 @@
 //! and numbers are detected in the same way for all layouts.
 
 mod bluehill;
+mod jpk;
 mod legacy;
 mod mach1;
 mod optics11;
@@ -19,6 +20,8 @@ const ALL: &[Layout] = &[
     mach1::LAYOUT,
     optics11::LAYOUT,
     rheometer::LAYOUT,
+    // A JPK archive is a zip archive, as an .xlsx is, and goes first.
+    jpk::LAYOUT,
     workbook::LAYOUT,
     bluehill::LAYOUT,
 ];
@@ -109,8 +112,13 @@ impl std::str::FromStr for ForeignFormat {
 /// A line with its number in the file, from 1.
 pub(super) type Line<'a> = (usize, &'a str);
 
-/// A sheet by name, its rows with their numbers.
-pub(super) type Sheet = (String, Vec<(usize, Vec<Cell>)>);
+/// A sheet by name.
+pub(super) struct Sheet {
+    pub name: String,
+    pub facts: Vec<(String, String)>,
+    /// With their numbers.
+    pub rows: Vec<(usize, Vec<Cell>)>,
+}
 
 /// One measurement, before its columns are known.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -123,7 +123,7 @@ fn read_xlsx(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
             }
         }
         total = grid.cells;
-        sheets.push((name, grid.rows));
+        sheets.push(Sheet { name, facts: Vec::new(), rows: grid.rows });
     }
     Ok(sheets)
 }
@@ -148,7 +148,7 @@ fn read_xls(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
             }
         }
         total = grid.cells;
-        sheets.push((name, grid.rows));
+        sheets.push(Sheet { name, facts: Vec::new(), rows: grid.rows });
     }
     Ok(sheets)
 }
