@@ -105,3 +105,52 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     let again = palpate(at, &["import", "good.csv", "--into", "in"]);
     assert_refused(&again, 2, "exists already");
 }
+
+/// A Mach-1's contact at 2 mm, and a press of 1 mm from there that relaxes.
+fn press() -> String {
+    let block = |name: &str, clock: &str| {
+        format!(
+            "<INFO>\nTime:\t{clock}\n<END INFO>\n<{name}>\n<DATA>\nTime, s\tPosition (z), mm\tFz, N\n"
+        )
+    };
+    let mut text = format!("<Mach-1 File>\n{}", block("Find Contact", "10:00:00.000"));
+    for i in 0..20 {
+        let t = 0.1 * f64::from(i);
+        text += &format!("{t:.3}\t{:.6}\t0.000\n", 0.1 + t);
+    }
+    text += &format!("<END DATA>\n{}", block("Stress Relaxation", "10:00:20.000"));
+    for i in 0..200 {
+        let t = 0.05 * f64::from(i);
+        let depth = t.min(1.0);
+        let relaxed = 1.0 + (-(t - 1.0).max(0.0) / 3.0).exp();
+        text += &format!("{t:.3}\t{:.6}\t{:.6}\n", 2.0 + depth, 0.2 * depth * relaxed);
+    }
+    text + "<END DATA>\n"
+}
+
+#[test]
+fn press_of_a_mach1_is_fitted_as_its_relaxation_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("gel.txt"), press()).unwrap();
+    succeeded(&typed(at, "import gel.txt --into in"));
+    assert!(!at.join("in/gel-Stress-Relaxation-1").exists());
+    succeeded(&typed(at, "import gel.txt --into in --part 2 --zero depth=2"));
+    let [press, alone] = ["in/gel-Press-1", "in/gel-Stress-Relaxation-1"]
+        .map(|session| json(&palpate(at, &["fit", session, "--json"])));
+    assert_eq!((&press["samples"], &alone["samples"]), (&200.into(), &200.into()));
+    let values = |fit: &serde_json::Value| -> Vec<f64> {
+        let all = fit["parameters"].as_array().unwrap();
+        all.iter().map(|one| one["value"].as_f64().unwrap()).collect()
+    };
+    for (press, alone) in values(&press).iter().zip(values(&alone)) {
+        assert!((press - alone).abs() <= 1e-6 * alone.abs().max(1e-3), "{press} {alone}");
+    }
+    let material = |session: &str| {
+        let options = "--indenter sphere --radius 5 --thickness 20 --poisson 0.5 --json";
+        let report = json(&typed(at, &format!("material {session} {options}")));
+        report["modulus_mpa"].as_f64().unwrap()
+    };
+    let [press, alone] = ["in/gel-Press-1", "in/gel-Stress-Relaxation-1"].map(material);
+    assert!((press / alone - 1.0).abs() < 1e-9, "{press} {alone}");
+}

@@ -19,6 +19,8 @@ pub(super) struct Column {
 pub(super) enum Zero {
     Unchanged,
     First,
+    /// The value of the row with this number.
+    Row(usize),
     /// In s, mm, N or V.
     At(f64),
 }
@@ -212,7 +214,7 @@ fn column(
     let inverted = if is_inverted { ", its sign inverted" } else { "" };
     let assumed = if is_assumed { ", assumed because the column has no unit" } else { "" };
     let from = match zero {
-        Zero::Unchanged => String::new(),
+        Zero::Unchanged | Zero::Row(_) => String::new(),
         Zero::First => ", counted from the first row".into(),
         Zero::At(value) => format!(", counted from {value}"),
     };

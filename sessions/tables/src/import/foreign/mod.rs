@@ -23,8 +23,8 @@ pub use rows::Delimiter;
 pub use samples::ForeignSample;
 
 use super::truncated;
-use columns::ColumnError;
-use formats::{Content, Head, Layout};
+use columns::{ColumnError, Columns, Zero};
+use formats::{Content, Layout, StageKind, TextPart};
 use palpate_sessions::import_origin::ImportOrigin;
 use readings::ReadingList;
 use rows::Rows;
@@ -91,11 +91,9 @@ pub fn parse_foreign(
     let (parts, left_out) = match format.map(|format| (format, &format.0.content)) {
         Some((format, Content::Sheets { read, .. })) => {
             let sheets = read(&bytes)?.into_iter().map(|sheet| RawPart {
-                name: sheet.name,
-                facts: sheet.facts,
                 layout: format.0,
-                head: None,
                 rows: Rows::Cells(sheet.rows),
+                part: TextPart { name: sheet.name, facts: sheet.facts, ..TextPart::default() },
             });
             let mut readings = ReadingList::default();
             readings.add_layout(format, options);
@@ -138,12 +136,10 @@ fn parse_text(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Parse
     readings.add("encoding", how, options.encoding.is_some(), "--encoding NAME");
     let option = "--delimiter NAME";
     readings.add("delimiter", delimiter.name(), options.delimiter.is_some(), option);
-    let parts = cut(lines, delimiter)?.into_iter().map(|part| RawPart {
-        name: part.name,
-        facts: part.facts,
+    let parts = cut(lines, delimiter)?.into_iter().map(|mut part| RawPart {
         layout: format.0,
-        head: part.head,
-        rows: Rows::Lines { lines: part.lines, delimiter },
+        rows: Rows::Lines { lines: std::mem::take(&mut part.lines), delimiter },
+        part,
     });
     let origin = origin(file, bytes, format, readings);
     let (mut parts, left_out) = parse_parts(parts.collect(), &origin, options)?;
@@ -157,11 +153,10 @@ fn parse_text(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Parse
 
 /// A part before its columns are known.
 struct RawPart<'a> {
-    name: String,
-    facts: Vec<(String, String)>,
     layout: &'static Layout,
-    head: Option<Head>,
     rows: Rows<'a>,
+    /// Without its lines, which are the rows.
+    part: TextPart<'a>,
 }
 
 /// Reads the selected parts; one without a time is left out.
@@ -170,13 +165,15 @@ fn parse_parts(
     origin: &ImportOrigin,
     options: &ImportOptions,
 ) -> Result<ParsedParts, String> {
-    let is_whole = cut.len() == 1 && cut[0].name.is_empty();
+    let is_whole = cut.len() == 1 && cut[0].part.name.is_empty();
     let is_it = |selector: &String, index: usize, part: &RawPart<'_>| {
-        selector.to_lowercase() == part.name.to_lowercase() || *selector == (index + 1).to_string()
+        selector.to_lowercase() == part.part.name.to_lowercase()
+            || *selector == (index + 1).to_string()
     };
     for selector in &options.parts {
         if !cut.iter().enumerate().any(|(index, part)| is_it(selector, index, part)) {
-            let names: Vec<String> = cut.iter().map(|part| format!("'{}'", part.name)).collect();
+            let names: Vec<String> =
+                cut.iter().map(|part| format!("'{}'", part.part.name)).collect();
             return Err(format!(
                 "the file has no part '{selector}'; its parts are {}",
                 names.join(", ")
@@ -191,8 +188,13 @@ fn parse_parts(
         }
         let named = |reason: String| match is_whole {
             true => reason,
-            false => format!("part '{}': {reason}", part.name),
+            false => format!("part '{}': {reason}", part.part.name),
         };
+        if let (Some(whole), true) = (&part.part.included_in, options.parts.is_empty()) {
+            left_out
+                .push(named(format!("it is in the part '{whole}'; select it to read it alone")));
+            continue;
+        }
         match parse_part(part, origin, options) {
             Ok(found) => parts.push(found),
             Err(ColumnError::NoMeasurement(reason)) => left_out.push(named(reason)),
@@ -215,29 +217,46 @@ fn parse_part(
     options: &ImportOptions,
 ) -> Result<ForeignPart, ColumnError> {
     let mut readings = ReadingList(origin.readings.clone());
-    let header = layout::find(&part.rows, options, part.head, &mut readings)
+    let header = layout::find(&part.rows, options, part.part.head, &mut readings)
         .map_err(ColumnError::NoMeasurement)?
         .ok_or_else(|| ColumnError::NoMeasurement("it has no rows of numbers".into()))?;
     if part.rows.len() - header.first < 2 {
         let reason = "it has fewer than two rows of numbers".into();
         return Err(ColumnError::NoMeasurement(reason));
     }
-    let columns = columns::find(&header, part.layout.words, options, &mut readings)?;
+    let mut columns = columns::find(&header, part.layout.words, options, &mut readings)?;
+    count_depth_from_contact(part, &mut columns, &mut readings);
     let mut read = vec![columns.time.index, columns.depth.index, columns.force.index];
     read.extend(columns.signal.as_ref().map(|column| column.index));
     let decimal = layout::decimal(&part.rows, &header, &read, options.decimal, &mut readings)
         .map_err(ColumnError::Other)?;
-    let (samples, remarks) = samples::read(&part.rows, &header, &columns, decimal, &options.skip)
-        .map_err(ColumnError::Other)?;
+    let (samples, remarks) =
+        samples::read(&part.rows, &header, &columns, &part.part.stages, decimal, &options.skip)
+            .map_err(ColumnError::Other)?;
     Ok(ForeignPart {
         imported: ImportOrigin {
-            part: part.name.clone(),
+            part: part.part.name.clone(),
             first_time_s: samples.first().map_or(0.0, |first| first.t),
             readings: readings.0,
-            facts: part.facts.clone(),
-            remarks,
+            facts: part.part.facts.clone(),
+            remarks: part.part.remarks.iter().cloned().chain(remarks).collect(),
             ..origin.clone()
         },
         samples,
     })
+}
+
+/// Counts the depth of a joined part from the last row of the block that found the contact, unless a zero is given.
+fn count_depth_from_contact(part: &RawPart<'_>, columns: &mut Columns, readings: &mut ReadingList) {
+    let stages = &part.part.stages;
+    let is_contact = |stage: &&formats::Stage| stage.kind == StageKind::Contact;
+    let after = stages.iter().find(|stage| !is_contact(stage));
+    let (Some(after), Zero::Unchanged) = (after, columns.depth.zero) else { return };
+    let rows = &part.rows;
+    let contact = (0..rows.len()).map(|index| rows.number(index)).rfind(|row| *row < after.first);
+    if let Some(contact) = contact {
+        columns.depth.zero = Zero::Row(contact);
+        let place = format!("{} {contact}, where the contact was found", rows.word());
+        readings.add("depth zero", place, false, "--zero depth=first or NUMBER");
+    }
 }

@@ -4,6 +4,7 @@
 use super::super::header::Quantity;
 use super::columns::{Column, Columns, Zero};
 use super::decimal::{DecimalSign, parse};
+use super::formats::{Stage, StageKind};
 use super::layout::Header;
 use super::options::RowFault;
 use super::rows::{Cell, Rows};
@@ -28,6 +29,7 @@ struct Reader<'a> {
     rows: &'a Rows<'a>,
     decimal: DecimalSign,
     skip: &'a [RowFault],
+    stages: &'a [Stage],
     /// Rows left out by fault: how many, and the number of the first.
     skipped: [(usize, usize); RowFault::ALL.len()],
 }
@@ -81,13 +83,18 @@ impl Reader<'_> {
         last: Option<f64>,
     ) -> Result<Option<ForeignSample>, String> {
         let one = |column: &Column, what| self.value(cells, column, what, number);
+        let stage = self.stages.iter().rfind(|stage| stage.first <= number);
         let t = one(&columns.time, Quantity::Time)?;
+        let t = t.map(|t| t + stage.map_or(0.0, |stage| stage.start_s));
         let depth = one(&columns.depth, Quantity::Depth)?;
         let force = one(&columns.force, Quantity::Force)?;
         let signal = columns.signal.as_ref().map(|column| one(column, Quantity::Signal));
         let signal = signal.transpose()?.flatten();
         let phase = columns.phase.and_then(|place| cells.get(place));
-        let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
+        let phase = match stage {
+            Some(stage) => stage.kind.first_phase(),
+            None => phase.map_or(Phase::Imported, |cell| phase_of(&cell.text())),
+        };
         let is_needed =
             matches!(phase, Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload);
         let missing = |what: &str| (RowFault::Missing, format!("the {what} is missing"));
@@ -131,10 +138,12 @@ pub(super) fn read(
     rows: &Rows<'_>,
     header: &Header,
     columns: &Columns,
+    stages: &[Stage],
     decimal: DecimalSign,
     skip: &[RowFault],
 ) -> Result<(Vec<ForeignSample>, Vec<String>), String> {
-    let mut reader = Reader { rows, decimal, skip, skipped: [(0, 0); RowFault::ALL.len()] };
+    let skipped = [(0, 0); RowFault::ALL.len()];
+    let mut reader = Reader { rows, decimal, skip, stages, skipped };
     let mut samples: Vec<ForeignSample> = Vec::new();
     let mut numbers: Vec<usize> = Vec::new();
     for index in header.first..rows.len() {
@@ -153,21 +162,48 @@ pub(super) fn read(
     if samples.len() < 2 {
         return Err("it has fewer than two rows of numbers".into());
     }
-    let from_zero = |column: &Column, first: Option<f64>| match column.zero {
+    let zero = |column: &Column, value: fn(&ForeignSample) -> Option<f64>| match column.zero {
         Zero::Unchanged => 0.0,
-        Zero::First => first.unwrap_or(0.0),
+        Zero::First => samples.iter().find_map(value).unwrap_or(0.0),
+        Zero::Row(row) => {
+            let count = numbers.partition_point(|number| *number <= row);
+            samples[..count].iter().rev().find_map(value).unwrap_or(0.0)
+        }
         Zero::At(value) => value,
     };
-    let depth_zero = from_zero(&columns.depth, samples.iter().find_map(|one| one.depth));
-    let force_zero = from_zero(&columns.force, samples.iter().find_map(|one| one.force));
+    let depth_zero = zero(&columns.depth, |one| one.depth);
+    let force_zero = zero(&columns.force, |one| one.force);
     for sample in &mut samples {
         sample.depth = sample.depth.map(|depth| depth - depth_zero);
         sample.force = sample.force.map(|force| force - force_zero);
+    }
+    for (index, stage) in stages.iter().enumerate().filter(|(_, one)| one.kind == StageKind::Press)
+    {
+        let end = stages.get(index + 1).map_or(usize::MAX, |next| next.first);
+        let place = |line: usize| numbers.partition_point(|number| *number < line);
+        name_hold(&mut samples[place(stage.first)..place(end)]);
     }
     let mut remarks = left_out(&reader);
     remarks.extend(gaps(rows, &samples, &numbers));
     remarks.extend(inverted_sign(&samples));
     Ok((samples, remarks))
+}
+
+/// A ramp is over where this share of its travel is left: a stage at rest trembles by a step of its encoder.
+const TRAVEL_LEFT: f64 = 0.002;
+
+/// The hold of a ramp begins where the stage has arrived.
+fn name_hold(samples: &mut [ForeignSample]) {
+    let mut depths = samples.iter().filter_map(|one| one.depth);
+    let Some(first) = depths.next() else { return };
+    let last = depths.next_back().unwrap_or(first);
+    let left = TRAVEL_LEFT * (last - first).abs();
+    let is_there =
+        |one: &ForeignSample| one.depth.is_some_and(|depth| (last - depth).abs() <= left);
+    let arrived = samples.iter().position(is_there).unwrap_or(samples.len());
+    for sample in samples.iter_mut().skip(arrived + 1) {
+        sample.phase = Phase::Hold;
+    }
 }
 
 fn phase_of(name: &str) -> Phase {
@@ -226,14 +262,17 @@ fn gaps(rows: &Rows<'_>, samples: &[ForeignSample], numbers: &[usize]) -> Option
     ))
 }
 
-/// A remark if the force decreases with depth, which suggests an inverted sign.
+/// Steps that are compared with each other, so that the noise of neighbouring rows does not count.
+const STEPS: usize = 200;
+
+/// A remark if the force decreases with depth, which suggests an inverted sign. Steps of both are compared, because at rest
+/// an inverted force rises as the specimen relaxes.
 fn inverted_sign(samples: &[ForeignSample]) -> Option<String> {
     let both: Vec<(f64, f64)> =
         samples.iter().filter_map(|one| Some((one.depth?, one.force?))).collect();
-    let count = both.len() as f64;
-    let mean = |pick: fn(&(f64, f64)) -> f64| both.iter().map(pick).sum::<f64>() / count;
-    let (depth, force) = (mean(|one| one.0), mean(|one| one.1));
-    let together: f64 = both.iter().map(|(x, f)| (x - depth) * (f - force)).sum();
+    let apart = both.len().div_ceil(STEPS);
+    let pairs = both.iter().zip(both.iter().skip(apart)).step_by(apart.max(1));
+    let together: f64 = pairs.map(|(a, b)| (b.0 - a.0) * (b.1 - a.1)).sum();
     (together < 0.0).then(|| {
         "the force decreases as the depth increases; if the file counts one of them in the opposite direction, invert its sign, as in force=-NAME or depth=-NAME".into()
     })

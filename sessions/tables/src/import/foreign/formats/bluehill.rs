@@ -87,6 +87,7 @@ fn cut<'a>(lines: Vec<Line<'a>>, delimiter: Delimiter) -> Result<Vec<TextPart<'a
                 facts: std::mem::take(&mut next.facts),
                 head: Some(columns.head),
                 lines: rest[..LINES_OF_HEAD].to_vec(),
+                ..TextPart::default()
             });
             next.line = None;
             rest = &rest[LINES_OF_HEAD..];

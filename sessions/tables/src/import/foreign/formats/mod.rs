@@ -13,6 +13,7 @@ mod workbook;
 use super::super::header::Quantity;
 use super::columns::LayoutNames;
 use super::rows::{Cell, Delimiter};
+use palpate_model::rig::Phase;
 
 const ALL: &[Layout] = &[
     // For text that no other layout claims.
@@ -130,6 +131,43 @@ pub(super) struct TextPart<'a> {
     pub head: Option<Head>,
     /// Includes the lines of names and units.
     pub lines: Vec<Line<'a>>,
+    /// One sentence each.
+    pub remarks: Vec<String>,
+    /// The blocks that it is joined of, in order; empty where the file has it as one.
+    pub stages: Vec<Stage>,
+    /// The part that has its rows, too. It is then read on request alone.
+    pub included_in: Option<String>,
+}
+
+/// A block of a joined part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stage {
+    /// Line number of its first row.
+    pub first: usize,
+    /// Its time 0 after that of the part, in s.
+    pub start_s: f64,
+    pub kind: StageKind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum StageKind {
+    /// Ends at the contact.
+    Contact,
+    /// At rest at the contact.
+    Rest,
+    /// A ramp and the hold after it.
+    Press,
+}
+
+impl StageKind {
+    /// The phase of its first rows.
+    pub fn first_phase(self) -> Phase {
+        match self {
+            Self::Contact => Phase::Contact,
+            Self::Rest => Phase::Rest,
+            Self::Press => Phase::Ramp,
+        }
+    }
 }
 
 /// Line numbers of column names and units.

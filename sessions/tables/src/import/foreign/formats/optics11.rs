@@ -39,10 +39,10 @@ fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
     };
     let facts = lines[..at].iter().flat_map(|(_, line)| pairs(line)).take(FACTS_MAX).collect();
     Ok(vec![TextPart {
-        name: String::new(),
         facts,
         head: Some(Head { names: lines[at].0, units: None }),
         lines: lines[at..].to_vec(),
+        ..TextPart::default()
     }])
 }
 
