@@ -202,6 +202,14 @@ fn skipped_rows_are_counted_and_gaps_are_reported() {
         "{:?}",
         turned.imported.remarks
     );
+    // At rest an inverted force rises, for longer than it fell.
+    let row = |i: i32| {
+        let (t, x) = (f64::from(i), f64::from(i.min(20)));
+        format!("{t},{x},{}\n", if i < 20 { -t } else { -400.0 / t })
+    };
+    let relaxing: String = (0..200).map(row).collect();
+    let relaxing = read_one(&format!("t_s,x_mm,F_N\n{relaxing}"), &detect_all());
+    assert!(relaxing.imported.remarks[0].contains("invert its sign"));
     let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &detect_all());
     assert!(uneven.imported.remarks[0].contains("1.000000 to 90.000000 s"));
 }
@@ -330,6 +338,10 @@ fn sheets_with_a_time_become_parts_in_both_formats() {
         // Both sheets hold what make_workbooks.py wrote, in units of their own.
         for part in &read.parts {
             assert_eq!(part.samples.len(), 20);
+            let facts =
+                [("Paramètres: Vitesse d'essai", "10 mm/min"), ("Paramètres: Précharge", "0.05 N")];
+            let facts = facts.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            assert_eq!(part.imported.facts, facts, "{name}");
             for (i, found) in numbers(part).iter().enumerate() {
                 let i = i as f64;
                 for (found, expected) in found.iter().zip([0.1 * i, 0.25 * i, 0.5 + 0.125 * i * i])

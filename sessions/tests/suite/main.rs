@@ -13,6 +13,7 @@ mod foreign;
 mod foreign_bluehill;
 mod foreign_damage;
 mod foreign_jpk;
+mod foreign_languages;
 mod foreign_mach1;
 mod hostile;
 mod killed;

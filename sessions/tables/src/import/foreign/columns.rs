@@ -39,16 +39,19 @@ fn names_of(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Time => {
             "t, time, test time, elapsed time, total time, step time, interval time, zeit, \
-                prüfzeit, temps, temps d'essai"
+                prüfzeit, temps, temps d'essai, tempo, tempo di prova, tiempo, tiempo de ensayo, \
+                时间, 试验时间, 测试时间"
         }
         Quantity::Depth => {
             "x, d, depth, indentation, displacement, extension, deformation, position, \
                 position (z), travel, standard travel, crosshead travel, weg, standardweg, \
-                traversenweg, verformung, déplacement, déformation, déplacement standard"
+                traversenweg, verformung, déplacement, déformation, déplacement standard, \
+                allongement, spostamento, deformazione, desplazamiento, deformación, 位移, 变形"
         }
         Quantity::Force => {
             "f, fz, force, load, standard force, normal force, axial force, kraft, \
-                standardkraft, prüfkraft, normalkraft, force standard, charge"
+                standardkraft, prüfkraft, normalkraft, force standard, charge, forza, \
+                forza standard, carico, fuerza, fuerza estándar, carga, 力, 试验力, 载荷, 负荷"
         }
         Quantity::Signal => "signal, voltage, spannung, tension",
     }
@@ -265,7 +268,10 @@ fn detect(
     let is_it = |cell: &str| {
         let is_name =
             |name: &str| quantity_of(name).or_else(|| quantity_in(name, words)) == Some(quantity);
-        is_name(cell) || is_name(split_unit(cell).0)
+        let (name, unit) = split_unit(cell);
+        // Below a row of units, the last word of `Traversenweg absolut` is none.
+        let may_have_unit = header.units.is_empty() || unit.is_some_and(is_known_unit);
+        is_name(cell) || may_have_unit && is_name(name)
     };
     let names = header.names.iter().enumerate();
     let found: Vec<usize> = names.filter(|(_, cell)| is_it(cell)).map(|(i, _)| i).collect();

@@ -1,6 +1,6 @@
 //! Text encodings.
 
-use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use encoding_rs::{Encoding, GB18030, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// An encoding by one of its names (WHATWG Encoding Standard, section 4.2).
 #[derive(Clone, Copy, Debug)]
@@ -12,7 +12,7 @@ impl std::str::FromStr for TextEncoding {
     fn from_str(text: &str) -> Result<Self, String> {
         Encoding::for_label(text.as_bytes()).map(Self).ok_or_else(|| {
             format!(
-                "no encoding is called '{text}'; give utf-8, utf-16le, utf-16be or windows-1252"
+                "no encoding is called '{text}'; give utf-8, utf-16le, utf-16be, windows-1252 or gb18030"
             )
         })
     }
@@ -31,6 +31,10 @@ pub(super) fn decode(
         (None, None) => match detect_utf16(bytes) {
             Some(encoding) => (encoding, ", from the zeros in every other byte"),
             None if std::str::from_utf8(bytes).is_ok() => (UTF_8, ""),
+            None if is_chinese(bytes) => (
+                GB18030,
+                ", assumed because the bytes above 127 are pairs of common Chinese characters",
+            ),
             None => (
                 WINDOWS_1252,
                 ", assumed because the file is not UTF-8; other 8-bit encodings cannot be told apart",
@@ -64,6 +68,27 @@ fn detect_utf16(bytes: &[u8]) -> Option<&'static Encoding> {
     }
 }
 
+/// Lead bytes of punctuation and of the 3755 common characters in GB 2312, which GBK and GB18030 contain.
+const COMMON_LEADS: [std::ops::RangeInclusive<u8>; 2] = [0xa1..=0xa9, 0xb0..=0xd7];
+
+/// Whether the bytes above 127 come in pairs of GB 2312, at least one of them next to another, and nine in ten of the common
+/// characters. Letters with accents stand alone between others, and lower-case Cyrillic letters are above the common leads.
+fn is_chinese(bytes: &[u8]) -> bool {
+    let runs = bytes.split(u8::is_ascii).filter(|run| !run.is_empty());
+    let (mut pairs, mut common, mut longest) = (0, 0, 0);
+    for run in runs {
+        let all = run.chunks(2);
+        if !all.clone().all(|pair| matches!(pair, [0xa1..=0xf7, 0xa1..=0xfe])) {
+            return false;
+        }
+        longest = longest.max(all.len());
+        pairs += all.len();
+        common +=
+            all.filter(|pair| COMMON_LEADS.iter().any(|leads| leads.contains(&pair[0]))).count();
+    }
+    longest > 1 && 10 * common >= 9 * pairs
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,6 +116,26 @@ mod tests {
             let (read, how) = decode(&bytes, None).unwrap();
             assert_eq!(read, text, "{name}");
             assert!(how.starts_with(name), "{how}");
+        }
+    }
+
+    #[test]
+    fn chinese_text_is_told_from_western_text() {
+        let encoded =
+            |encoding: &'static Encoding, text: &str| encoding.encode(text).0.into_owned();
+        for text in ["时间,位移,载荷\ns,mm,N\n", "试验力(N)\t时间(s)\n", "试样：凝胶，第３块\n"]
+        {
+            let (read, how) = decode(&encoded(GB18030, text), None).unwrap();
+            assert_eq!((read.as_str(), &how[..7]), (text, "gb18030"), "{how}");
+        }
+        for (encoding, text) in [
+            (WINDOWS_1252, "Prüfzeit;größe;Déformation;µm;°C\n"),
+            (WINDOWS_1252, "ÄÖ;Öl\n"),
+            (encoding_rs::WINDOWS_1251, "Время;Сила;Перемещение\n"),
+            (encoding_rs::WINDOWS_1250, "Obciążenie;część;źródło\n"),
+        ] {
+            let (_, how) = decode(&encoded(encoding, text), None).unwrap();
+            assert!(how.starts_with("windows-1252"), "{text}: {how}");
         }
     }
 

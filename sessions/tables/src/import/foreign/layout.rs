@@ -16,6 +16,8 @@ pub(super) struct Header {
     pub width: usize,
     /// Source of the names, in words.
     pub place: String,
+    /// Index of the row of names, or else of the first row of numbers.
+    pub top: usize,
     /// Index of the first row of numbers.
     pub first: usize,
 }
@@ -136,6 +138,7 @@ pub(super) fn find(
         units: units.map_or_else(Vec::new, |index| texts(&rows.words(index))),
         width,
         place,
+        top: header.unwrap_or(first),
         first,
     }))
 }

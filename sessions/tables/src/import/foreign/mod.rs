@@ -6,6 +6,7 @@
 mod columns;
 pub(super) mod decimal;
 mod encoding;
+mod facts;
 mod formats;
 mod keep;
 mod layout;
@@ -24,7 +25,7 @@ pub use samples::ForeignSample;
 
 use super::truncated;
 use columns::{ColumnError, Columns, Zero};
-use formats::{Content, Layout, StageKind, TextPart};
+use formats::{Content, FACTS_MAX, Layout, StageKind, TextPart};
 use palpate_sessions::import_origin::ImportOrigin;
 use readings::ReadingList;
 use rows::Rows;
@@ -181,6 +182,7 @@ fn parse_parts(
         }
     }
     let (mut parts, mut left_out) = (Vec::new(), Vec::new());
+    let mut facts_of_sheets = Vec::new();
     for (index, part) in cut.iter().enumerate() {
         let is_selected = |selector: &String| is_it(selector, index, part);
         if !options.parts.is_empty() && !options.parts.iter().any(is_selected) {
@@ -197,7 +199,10 @@ fn parse_parts(
         }
         match parse_part(part, origin, options) {
             Ok(found) => parts.push(found),
-            Err(ColumnError::NoMeasurement(reason)) => left_out.push(named(reason)),
+            Err(ColumnError::NoMeasurement(reason)) => {
+                left_out.push(named(reason));
+                facts_of_sheets.extend(facts_of_sheet(part));
+            }
             Err(ColumnError::Other(reason)) if is_whole => return Err(reason),
             Err(ColumnError::Other(reason)) => {
                 return Err(format!("{}; or select other parts", named(reason)));
@@ -208,7 +213,18 @@ fn parse_parts(
         let reason = left_out.into_iter().next();
         return Err(reason.unwrap_or_else(|| "it holds no measurement".into()));
     }
+    for part in &mut parts {
+        let room = FACTS_MAX.saturating_sub(part.imported.facts.len());
+        part.imported.facts.extend(facts_of_sheets.iter().take(room).cloned());
+    }
     Ok((parts, left_out))
+}
+
+/// Facts of a sheet without a measurement, such as the parameters of a test.
+fn facts_of_sheet(part: &RawPart<'_>) -> Vec<(String, String)> {
+    let Rows::Cells(_) = part.rows else { return Vec::new() };
+    let facts = facts::in_first_rows(&part.rows, part.rows.len()).into_iter();
+    facts.map(|(key, value)| (format!("{}: {key}", part.part.name), value)).collect()
 }
 
 fn parse_part(
@@ -238,7 +254,10 @@ fn parse_part(
             part: part.part.name.clone(),
             first_time_s: samples.first().map_or(0.0, |first| first.t),
             readings: readings.0,
-            facts: part.part.facts.clone(),
+            facts: match part.part.facts.is_empty() {
+                true => facts::in_first_rows(&part.rows, header.top),
+                false => part.part.facts.clone(),
+            },
             remarks: part.part.remarks.iter().cloned().chain(remarks).collect(),
             ..origin.clone()
         },

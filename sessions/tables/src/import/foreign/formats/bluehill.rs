@@ -12,11 +12,11 @@ pub(super) const LAYOUT: Layout = Layout {
     source: "Bluehill's raw data",
     content: Content::Text { is_it, cut },
     words: &[
-        (Quantity::Time, "time measurement, godzina, 时间"),
-        (Quantity::Depth, "compressive extension, compressive displacement, przemieszczenie, 位移"),
+        (Quantity::Time, "time measurement, godzina"),
+        (Quantity::Depth, "compressive extension, compressive displacement, przemieszczenie"),
         (
             Quantity::Force,
-            "compressive load, compressive force, primary load measurement, obciążenie, 载荷",
+            "compressive load, compressive force, primary load measurement, obciążenie",
         ),
     ],
 };

@@ -178,7 +178,7 @@ pub(super) struct Head {
 }
 
 /// Largest number of facts about a part; longer facts are cut.
-const FACTS_MAX: usize = 64;
+pub(super) const FACTS_MAX: usize = 128;
 const FACT_LENGTH_MAX: usize = 200;
 
 /// Non-blank lines with their numbers. Files of very old computers end lines with a carriage return alone.
@@ -190,12 +190,15 @@ pub(super) fn lines_of(text: &str) -> Vec<Line<'_>> {
 }
 
 /// Parses `key: value` or `key<tab>value`.
-fn parse_fact(line: &str) -> Option<(String, String)> {
+pub(super) fn parse_fact(line: &str) -> Option<(String, String)> {
+    let (key, value) = line.split_once('\t').or_else(|| line.split_once(':'))?;
+    fact(key, value)
+}
+
+/// A fact, cut to its largest length; `None` without a value.
+pub(super) fn fact(key: &str, value: &str) -> Option<(String, String)> {
     let cut = |text: &str| text.trim().chars().take(FACT_LENGTH_MAX).collect::<String>();
-    let (key, value) = line
-        .split_once('\t')
-        .or_else(|| line.split_once(':'))
-        .map(|(key, value)| (cut(key.trim().trim_end_matches(':')), cut(value)))?;
+    let (key, value) = (cut(key.trim().trim_end_matches(':')), cut(value));
     (!key.is_empty() && !value.is_empty()).then_some((key, value))
 }
 
