@@ -112,6 +112,11 @@ fn other_languages_and_units_are_read() {
     assert_eq!(numbers(&read, 0), [[0.0, 0.0746, 1250.0], [30.0, 0.2761, 2500.0]]);
     let chinese = "时间,位移,载荷,压缩应变 (位移),循环计数\n(s),(mm),(N),(%),\n0,0,-0.5,0,0\n0.1,0.25,0.5,0.05,0\n";
     assert_eq!(numbers(&detected(chinese), 0), [[0.0, 0.0, -0.5], [0.1, 0.25, 0.5]]);
+    for names in ["Zeit;Traversenweg;Last", "Tiempo;Extensión;Carga"] {
+        let text =
+            format!("{names}\n(s);(mm);(N)\n\"0,0\";\"0,5\";\"1,25\"\n\"0,1\";\"0,75\";\"2,5\"\n");
+        assert_eq!(numbers(&detected(&text), 0), [[0.0, 0.5, 1.25], [0.1, 0.75, 2.5]], "{names}");
+    }
 }
 
 /// Bluehill Universal: results first, units behind the names.

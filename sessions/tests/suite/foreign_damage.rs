@@ -20,6 +20,11 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         \"0.0\",\"1\",\"2\"\n\"0.1\",\"2\",\"3\"\nSpecimen label,b\nTime,Extension,Load\n(s),(mm),(N)\n0,1,2\n1,2,3\n";
     let optics11 = "Date\t1\tTime\t2\ngel\nTip radius (um)\t10\nTime (s)\tLoad (uN)\tIndentation (nm)\n\
         0.0\t1\t2\n0.1\t2\t3\n";
+    let anton_paar = "Indentation\nNHT S/N: 1\nEIT = 0,2 GPa\nMeasured values\nTime\tPd\tFn\n[s]\t[nm]\t[mN]\n\
+        0,0\t1\t2\n0,1\t2\t3\nIndentation\nMeasured values\nTime\tPd\tFn\n[s]\t[nm]\t[mN]\n0,0\t1\t2\n0,1\t2\t3\n";
+    let press = "<Mach-1 File>\n<INFO>\nTime:\t1:2:3\n<END INFO>\n<Find Contact>\n<DATA>\nTime, s\tPosition (z), mm\tFz, N\n\
+        0.0\t1\t0\n0.1\t2\t0\n<END DATA>\n<INFO>\nTime:\t1:2:4\n<END INFO>\n<Stress Relaxation>\n<DATA>\n\
+        Time, s\tPosition (z), mm\tFz, N\n0.0\t2\t0\n0.1\t3\t1\n<divider>\n0.2\t3\t1\n<END DATA>\n";
     let wide: Vec<u8> =
         "\u{feff}".encode_utf16().chain(table.encode_utf16()).flat_map(u16::to_le_bytes).collect();
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
@@ -29,6 +34,8 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("rheometer", rheometer.into()),
         ("bluehill", bluehill.into()),
         ("optics11", optics11.into()),
+        ("anton-paar", anton_paar.into()),
+        ("mach-1-press", press.into()),
         ("jpk", foreign_jpk::seed()),
         ("utf-16", wide),
         ("xlsx", fs::read(data.join("zwick.xlsx")).unwrap()),

@@ -12,6 +12,7 @@ mod faults;
 mod foreign;
 mod foreign_bluehill;
 mod foreign_damage;
+mod foreign_indenters;
 mod foreign_jpk;
 mod foreign_languages;
 mod foreign_mach1;

@@ -46,7 +46,7 @@ fn names_of(quantity: Quantity) -> &'static str {
             "x, d, depth, indentation, displacement, extension, deformation, position, \
                 position (z), travel, standard travel, crosshead travel, weg, standardweg, \
                 traversenweg, verformung, déplacement, déformation, déplacement standard, \
-                allongement, spostamento, deformazione, desplazamiento, deformación, 位移, 变形"
+                allongement, spostamento, deformazione, desplazamiento, deformación, extensión, 位移, 变形"
         }
         Quantity::Force => {
             "f, fz, force, load, standard force, normal force, axial force, kraft, \
@@ -275,6 +275,12 @@ fn detect(
     };
     let names = header.names.iter().enumerate();
     let found: Vec<usize> = names.filter(|(_, cell)| is_it(cell)).map(|(i, _)| i).collect();
+    // TRIOS writes the time of a step under three names, and the times differ by where they begin.
+    let is_time = |index: &&usize| header.names[**index].trim().eq_ignore_ascii_case("time");
+    let time = found.iter().find(is_time).filter(|_| quantity == Quantity::Time);
+    if let Some(time) = time {
+        return Ok(Some(*time));
+    }
     match found[..] {
         [] => Ok(None),
         [index] => Ok(Some(index)),

@@ -16,7 +16,7 @@ pub(super) const LAYOUT: Layout = Layout {
         (Quantity::Depth, "compressive extension, compressive displacement, przemieszczenie"),
         (
             Quantity::Force,
-            "compressive load, compressive force, primary load measurement, obciążenie",
+            "compressive load, compressive force, primary load measurement, obciążenie, last",
         ),
     ],
 };

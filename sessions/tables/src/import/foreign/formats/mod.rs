@@ -1,6 +1,7 @@
 //! The known layouts, one file each: how to recognise a layout, and how to divide a file into measurements. Columns, units
 //! and numbers are detected in the same way for all layouts.
 
+mod anton_paar;
 mod bluehill;
 mod jpk;
 mod legacy;
@@ -25,6 +26,7 @@ const ALL: &[Layout] = &[
     jpk::LAYOUT,
     workbook::LAYOUT,
     bluehill::LAYOUT,
+    anton_paar::LAYOUT,
 ];
 
 #[derive(Debug)]
