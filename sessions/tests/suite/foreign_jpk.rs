@@ -230,7 +230,7 @@ fn archive_that_unpacks_to_too_much_is_refused() {
         "shared-data/header.properties".into(),
         text.replace("signedinteger", "signedshort").into(),
     );
-    assert!(refused(&long).contains("more than 262144 points"));
+    assert!(refused(&long).contains("more than 196608 points"));
 }
 
 #[test]

@@ -30,7 +30,7 @@ const DEFLECTION: &str = "vDeflection";
 const HEIGHTS: &[&str] =
     &["measuredHeight", "capacitiveSensorHeight", "strainGaugeHeight", "height", "head-height"];
 /// Largest number of points, so that an import takes less than 64 MiB.
-const POINTS_MAX: usize = 1 << 18;
+const POINTS_MAX: usize = 3 << 16;
 /// Largest size of a number in a channel.
 const NUMBER_BYTES_MAX: u64 = 8;
 
