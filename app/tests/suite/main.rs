@@ -30,6 +30,7 @@ mod select;
 mod support;
 mod support_bundle;
 mod trade;
+mod viscoelastic_material;
 mod whole_commands;
 mod window;
 mod wired;

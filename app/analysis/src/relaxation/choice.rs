@@ -1,9 +1,8 @@
 //! How many terms a record is worth.
 
 use super::RelaxationError;
-use super::record::{Press, Record};
-use palpate_indentation::{RelaxationFit, TERMS_MAX};
-use palpate_rheology::fit::ResidualAutocorrelation;
+use super::record::{JudgedFit, Press, Record};
+use palpate_indentation::TERMS_MAX;
 use palpate_rheology::select::criteria;
 use serde::Serialize;
 
@@ -29,40 +28,36 @@ pub struct TermCandidate {
 pub(super) fn choose(
     record: &Record,
     press: Press,
-) -> Result<(RelaxationFit, TermChoice), RelaxationError> {
-    let (mut fits, mut refused) = (Vec::new(), None);
+) -> Result<(JudgedFit, TermChoice), RelaxationError> {
+    let (mut fits, mut refused, mut too_few) = (Vec::new(), None, None);
     for count in 1..=TERMS_MAX {
         match record.fit(press, count) {
             Ok(fit) => fits.push(fit),
+            // More terms may describe it.
+            Err(err @ RelaxationError::Autocorrelated { .. }) => too_few = Some(err),
             // What is refused with so many terms is so with more.
-            Err(RelaxationError::Fit(reason)) => {
-                refused = Some(reason);
+            Err(err @ RelaxationError::Fit(_)) => {
+                refused = Some(err);
                 break;
             }
             Err(err) => return Err(err),
         }
     }
     let squares =
-        |fit: &RelaxationFit| -> f64 { fit.residuals_newtons.iter().map(|one| one * one).sum() };
+        |one: &JudgedFit| one.fit.residuals_newtons.iter().map(|one| one * one).sum::<f64>();
     let closest = fits.iter().min_by(|a, b| squares(a).total_cmp(&squares(b)));
     let Some(closest) = closest else {
-        return Err(match refused {
-            Some(reason) => reason.into(),
-            None => RelaxationError::NoPress,
-        });
+        return Err(too_few.or(refused).unwrap_or(RelaxationError::NoPress));
     };
-    let samples = record.forces.len();
-    let effective = ResidualAutocorrelation::of(&closest.residuals_newtons, &closest.tangents)
-        .ok_or(RelaxationError::NoResiduals { samples })?
-        .effective_samples();
-    let bayesian = |fit: &RelaxationFit| {
-        criteria(squares(fit) / samples as f64, effective, fit.tangents.len()).1
-    };
+    let effective = closest.memory.effective_samples();
+    let samples = record.forces.len() as f64;
+    let bayesian =
+        |one: &JudgedFit| criteria(squares(one) / samples, effective, one.fit.tangents.len()).1;
     let lowest = fits.iter().map(bayesian).fold(f64::INFINITY, f64::min);
-    let candidate = |fit: &RelaxationFit| TermCandidate {
-        terms: fit.modulus.terms.len(),
-        residual_n: fit.residual_newtons,
-        bic_above: bayesian(fit) - lowest,
+    let candidate = |one: &JudgedFit| TermCandidate {
+        terms: one.fit.modulus.terms.len(),
+        residual_n: one.fit.residual_newtons,
+        bic_above: bayesian(one) - lowest,
     };
     let candidates: Vec<TermCandidate> = fits.iter().map(candidate).collect();
     let best = candidates.iter().position(|one| one.bic_above == 0.0).unwrap_or(0);

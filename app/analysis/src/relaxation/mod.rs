@@ -20,7 +20,6 @@ use numbers::Numbers;
 use palpate_indentation::{
     ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
 };
-use palpate_rheology::fit::ResidualAutocorrelation;
 use record::{Record, Source};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -155,6 +154,10 @@ pub enum RelaxationError {
         "a relaxation modulus cannot tell the contact from the relaxation; state the standard uncertainty of the contact, 0 for exact"
     )]
     ContactFree,
+    #[error(
+        "the term with the relaxation time of {time_secs:.3e} s is known to {percent:.0} % only, because the residuals are autocorrelated: the modulus does not describe the record; take another law or another number of terms, or press less deep"
+    )]
+    Autocorrelated { time_secs: f64, percent: f64 },
     #[error("the standard uncertainty of the contact is {error_mm} mm; give mm, not below 0")]
     ContactError { error_mm: f64 },
     #[error(
@@ -181,30 +184,27 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
     };
     let record = Record::of(&read)?;
     let law = (press.law, &press.indenter, &specimen);
-    let (fit, term_choice) = match request.term_count {
+    let (judged, term_choice) = match request.term_count {
         Some(count) => (record.fit(law, count)?, None),
         None => {
-            let (fit, choice) = choice::choose(&record, law)?;
-            (fit, Some(choice))
+            let (judged, choice) = choice::choose(&record, law)?;
+            (judged, Some(choice))
         }
     };
+    let fit = &judged.fit;
     if fit.modulus.equilibrium_mpa <= 0.0 {
         return Err(RelaxationError::NegativeEquilibrium { mpa: fit.modulus.equilibrium_mpa });
     }
-    let samples = record.forces.len();
-    let memory = ResidualAutocorrelation::of(&fit.residuals_newtons, &fit.tangents)
-        .ok_or(RelaxationError::NoResiduals { samples })?;
     let seen_from_s = record.seen_from_secs(law, fit.modulus.terms.len());
     let times = record.decades(seen_from_s);
     let numbers = Numbers::of(&fit.modulus, &times);
-    let mut sources: Vec<(&'static str, Vec<f64>)> =
-        vec![("residuals", numbers.noise(&fit, &memory))];
+    let mut sources: Vec<(&'static str, Vec<f64>)> = vec![("residuals", numbers.noise(&judged))];
     let mut not_included = Vec::new();
     let applied = compliance.as_ref().filter(|one| one.is_applied);
-    for Source { name, errors } in record.sources(law, &fit, &read, contact_error_mm, applied)? {
+    for Source { name, errors } in record.sources(law, fit, &read, contact_error_mm, applied)? {
         match errors.is_empty() {
             true => not_included.push(name),
-            false => sources.push((name, numbers.shifts(&fit, &errors))),
+            false => sources.push((name, numbers.shifts(fit, &errors))),
         }
     }
     let found = numbers.combined(&sources);
@@ -225,15 +225,15 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
         budget: budget(&sources),
         not_included,
         term_choice,
-        samples,
-        effective_samples: memory.effective_samples(),
+        samples: record.forces.len(),
+        effective_samples: judged.memory.effective_samples(),
         depth_mm: record.deepest(),
         ramp_s: record.ramp_secs(),
         record_s: record.secs(),
         contact_error_mm,
         residual_n: fit.residual_newtons,
         noise_n: record.noise,
-        lack_of_fit: lack_of_fit(&fit, &record),
+        lack_of_fit: lack_of_fit(fit, &record),
         validity,
         compliance,
         notes: read.notes,

@@ -1,10 +1,10 @@
 //! The numbers of a report and how they follow those of the fit.
 
+use super::record::JudgedFit;
 use super::{
     ComplianceAtTime, CreepReport, ModulusAtTime, RelaxationTerm, RetardationTerm, UncertainNumber,
 };
 use palpate_indentation::{CreepTerm, PronySeries, RelaxationFit};
-use palpate_rheology::fit::ResidualAutocorrelation;
 
 /// Moduli at once and at last, the terms, the modulus at the times; the compliance at once, its terms, the compliance at the times.
 pub(super) struct Numbers<'a> {
@@ -47,11 +47,8 @@ impl<'a> Numbers<'a> {
     }
 
     /// Standard uncertainties from the residuals.
-    pub fn noise(&self, fit: &RelaxationFit, memory: &ResidualAutocorrelation) -> Vec<f64> {
-        let error = |gradient: &Vec<f64>| {
-            fit.standard_error_along(gradient) * memory.inflation(gradient).sqrt()
-        };
-        self.gradients.iter().map(error).collect()
+    pub fn noise(&self, judged: &JudgedFit) -> Vec<f64> {
+        self.gradients.iter().map(|gradient| judged.standard_error_along(gradient)).collect()
     }
 
     /// Standard uncertainties from independent errors of all forces, in N.

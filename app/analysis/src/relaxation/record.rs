@@ -4,12 +4,12 @@ use super::RelaxationError;
 use crate::compliance::ComplianceCorrection;
 use crate::source::FitSource;
 use palpate_indentation::{
-    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
-    fit_relaxation, lee_radok_force, load_history, vary_uncertain_numbers,
+    ContactLaw, Indenter, LoadHistoryError, RELATIVE_ERROR_MAX, RelaxationFit, RelaxationFitError,
+    Specimen, fit_relaxation, lee_radok_force, load_history, vary_uncertain_numbers,
 };
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::units::Newtons;
-use palpate_rheology::fit::FitSample;
+use palpate_rheology::fit::{FitSample, ResidualAutocorrelation};
 
 pub(super) type Press<'a> = (ContactLaw, &'a Indenter, &'a Specimen);
 
@@ -23,6 +23,41 @@ pub(super) struct Record {
     pub forces: Vec<f64>,
     /// Standard deviation of a force in N, where it is known.
     pub noise: Option<f64>,
+}
+
+/// A fit with the autocorrelation of its residuals.
+pub(super) struct JudgedFit {
+    pub fit: RelaxationFit,
+    pub memory: ResidualAutocorrelation,
+}
+
+impl JudgedFit {
+    /// Refuses a term that is not known once the autocorrelation counts.
+    fn of(fit: RelaxationFit) -> Result<Self, RelaxationError> {
+        let samples = fit.residuals_newtons.len();
+        let memory = ResidualAutocorrelation::of(&fit.residuals_newtons, &fit.tangents)
+            .ok_or(RelaxationError::NoResiduals { samples })?;
+        let judged = Self { fit, memory };
+        let count = judged.fit.modulus.terms.len();
+        for (index, term) in judged.fit.modulus.terms.iter().enumerate() {
+            let error = |unknown: usize| {
+                let along = |one: usize| if one == unknown { 1.0 } else { 0.0 };
+                let along: Vec<f64> = (0..2 * count + 1).map(along).collect();
+                judged.standard_error_along(&along)
+            };
+            let share = (error(index) / term.modulus_mpa).max(error(count + 1 + index));
+            if share > RELATIVE_ERROR_MAX {
+                let (time_secs, percent) = (term.time_secs, 100.0 * share);
+                return Err(RelaxationError::Autocorrelated { time_secs, percent });
+            }
+        }
+        Ok(judged)
+    }
+
+    /// As that of the fit, with the autocorrelation of the residuals.
+    pub fn standard_error_along(&self, gradient: &[f64]) -> f64 {
+        self.fit.standard_error_along(gradient) * self.memory.inflation(gradient).sqrt()
+    }
 }
 
 /// What may be wrong with the forces by one standard uncertainty each; nothing where it is not known.
@@ -67,13 +102,10 @@ impl Record {
         })
     }
 
-    pub fn fit(
-        &self,
-        (law, indenter, specimen): Press,
-        term_count: usize,
-    ) -> Result<RelaxationFit, RelaxationError> {
+    pub fn fit(&self, press: Press, term_count: usize) -> Result<JudgedFit, RelaxationError> {
+        let (law, indenter, specimen) = press;
         let (power, history) = load_history(law, indenter, specimen, &self.times, &self.depths)?;
-        Ok(fit_relaxation(power, &history, &self.forces, term_count)?)
+        JudgedFit::of(fit_relaxation(power, &history, &self.forces, term_count)?)
     }
 
     pub fn deepest(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! Dynamic moduli as people read them: a table over the frequency first, and every assumption under it.
 
 use super::material::{indenter_words, kpa, law_words, length, specimen_words};
-use crate::dynamic::{DynamicModuli, DynamicReport};
+use crate::dynamic::{DynamicBudgetRow, DynamicModuli, DynamicReport};
 use crate::relaxation::UncertainNumber;
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 
@@ -35,18 +35,7 @@ pub fn dynamic_text(report: &DynamicReport) -> String {
         let value = significant(row.value, 3);
         lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
     }
-    for sine in &report.sines {
-        lines.extend(sine.budget.iter().map(|row| {
-            format!(
-                "uncertainty      {} Hz  {:<18} E' {:>8} kPa, E'' {:>8} kPa, tan delta {:>8}",
-                sine.frequency_hz,
-                row.source,
-                error_alone(kpa(row.storage_mpa)),
-                error_alone(kpa(row.loss_mpa)),
-                error_alone(row.tan_delta),
-            )
-        }));
-    }
+    lines.extend(report.sines.iter().flat_map(budget_words));
     if !report.not_included.is_empty() {
         lines.push(format!("not included     {}", report.not_included.join(", ")));
     }
@@ -66,6 +55,29 @@ fn sine_words(sine: &DynamicModuli) -> String {
         modulus(sine.shear_loss_mpa),
         with_error(sine.tan_delta.value, sine.tan_delta.standard_uncertainty),
     )
+}
+
+/// Of the sources that add a hundredth of a variance or more.
+fn budget_words(sine: &DynamicModuli) -> Vec<String> {
+    let is_shown = |row: &&DynamicBudgetRow| {
+        let pairs = [
+            (row.storage_mpa, sine.storage_mpa),
+            (row.loss_mpa, sine.loss_mpa),
+            (row.tan_delta, sine.tan_delta),
+        ];
+        pairs.iter().any(|(part, all)| *part >= 0.1 * all.standard_uncertainty && *part > 0.0)
+    };
+    let words = |row: &DynamicBudgetRow| {
+        format!(
+            "uncertainty      {:<8} {:<18} E' {:>8} kPa, E'' {:>8} kPa, tan delta {:>8}",
+            format!("{} Hz", sine.frequency_hz),
+            row.source,
+            error_alone(kpa(row.storage_mpa)),
+            error_alone(kpa(row.loss_mpa)),
+            error_alone(row.tan_delta),
+        )
+    };
+    sine.budget.iter().filter(is_shown).map(words).collect()
 }
 
 fn predicted_words([storage, loss]: [f64; 2]) -> String {

@@ -100,7 +100,7 @@ fn choice_words(choice: &TermChoice) -> String {
     let candidate =
         |one: &TermCandidate| format!("{} with {}", significant(one.bic_above, 3), one.terms);
     let candidates: Vec<String> = choice.candidates.iter().map(candidate).collect();
-    let refused = choice.refused.as_ref().map(|reason| format!("; one more is refused: {reason}"));
+    let refused = choice.refused.as_ref().map(|reason| format!("; more are refused: {reason}"));
     format!(
         "number of terms  by the Bayesian criterion above its lowest: {}{}",
         candidates.join(", "),

@@ -78,7 +78,7 @@ pub const TERMS_MAX: usize = 5;
 /// such as its first contact, weighs more.
 const RAMP_OVER_TIME_MAX: f64 = 10.0;
 /// Standard errors of a modulus and of a time, over the value, beyond which the linear covariance no longer describes them.
-const RELATIVE_ERROR_MAX: f64 = 0.1;
+pub const RELATIVE_ERROR_MAX: f64 = 0.1;
 
 /// Indenter and specimen with each uncertain number one standard uncertainty lower and higher, for the law of propagation.
 #[must_use]
