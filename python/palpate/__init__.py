@@ -14,6 +14,7 @@ Whatever palpate cannot do is a :class:`PalpateError` whose text says what is wr
 from ._fit import Fit, Parameter, fit
 from ._frames import PalpateWarning
 from ._library import Library, library
+from ._material import Material, material
 from ._native import PalpateError, __version__
 from ._plot import plot
 from ._run import Run, run
@@ -22,6 +23,7 @@ from ._session import Session, open
 __all__ = [
     "Fit",
     "Library",
+    "Material",
     "PalpateError",
     "PalpateWarning",
     "Parameter",
@@ -30,6 +32,7 @@ __all__ = [
     "__version__",
     "fit",
     "library",
+    "material",
     "open",
     "plot",
     "run",

@@ -8,8 +8,9 @@ import os
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Union
 
-from . import _fit, _frames
+from . import _fit, _frames, _material
 from ._fit import Fit
+from ._material import Material
 from ._native import NativeSession, PalpateError, fit_session
 
 
@@ -181,6 +182,16 @@ class Session:
             # The stored analyses have one more.
             self._native = NativeSession(os.fspath(self.path), self.analysis)
         return made
+
+    def material(self, indenter: str, **options: Any) -> Material:
+        """Young's modulus of the press by a contact law; the options are those of :func:`palpate.material`.
+
+        >>> palpate.open("demo").material("flat-punch", radius=6, poisson=0.49, thickness=60)
+        Traceback (most recent call last):
+            ...
+        palpate.PalpateError: the loading reaches ... mm behind the contact, and the strain is ...
+        """
+        return _material.material(self.path, indenter, analysis=self.analysis, **options)
 
 
 def open(path: "str | os.PathLike[str]", analysis: Optional[str] = None) -> Session:

@@ -7,6 +7,7 @@ mod command_line;
 mod error;
 mod fit;
 mod library;
+mod material;
 mod run;
 mod session;
 
@@ -21,6 +22,8 @@ mod _native {
     use super::fit::{fit_arrays, fit_session};
     #[pymodule_export]
     use super::library::{default_library, entry_fields, find};
+    #[pymodule_export]
+    use super::material::fit_material;
     #[pymodule_export]
     use super::run::NativeRun;
     #[pymodule_export]

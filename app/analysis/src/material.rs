@@ -11,7 +11,7 @@ use palpate_model::units::{Newtons, Volts};
 use palpate_rheology::fit::UnloadedMean;
 use palpate_tables::import::ColumnNames;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// A press and what is known of it.
@@ -96,6 +96,18 @@ pub struct MaterialReport {
     pub compliance: Option<ComplianceCorrection>,
     #[serde(skip)]
     pub notes: Vec<String>,
+    /// The samples that were fitted, for a plot.
+    #[serde(skip)]
+    pub curve: Vec<LoadingPoint>,
+}
+
+/// A sample of a loading and the force of the law there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadingPoint {
+    /// From the contact as fitted.
+    pub depth_mm: f64,
+    pub force_n: f64,
+    pub law_n: f64,
 }
 
 /// A source of uncertainty of a modulus.
@@ -130,10 +142,10 @@ pub enum MaterialError {
     Source(#[from] SourceError),
     #[error(transparent)]
     Fit(#[from] LoadingFitError),
-    #[error("{reason}; for this indenter and specimen give --depth-max {depth_max_mm:.4} or less")]
+    #[error("{reason}; for this indenter and specimen the law holds down to {depth_max_mm:.4} mm")]
     TooDeep { reason: LoadingFitError, depth_max_mm: f64 },
     #[error(
-        "the thickness of the specimen is not known; give --thickness, or find the base in the session with the step find-base"
+        "the thickness of the specimen is not known; state it, or find the base in the session with the step find-base"
     )]
     NoThickness,
     #[error("a greatest depth of {depth_mm} mm is not possible; give a depth above 0 mm")]
@@ -211,6 +223,7 @@ pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialErr
         lack_of_fit,
         compliance,
         notes: read.notes,
+        curve: curve(&fit, &loading),
     })
 }
 
@@ -240,6 +253,23 @@ pub(crate) fn read_press(
         poisson_basis: request.poisson_basis,
     };
     Ok(PressRecord { read, compliance, specimen })
+}
+
+fn curve(fit: &LoadingFit, loading: &Loading) -> Vec<LoadingPoint> {
+    let samples = loading.samples.iter().zip(&fit.residuals_newtons);
+    let point = |(one, residual): (&LoadingSample, &f64)| LoadingPoint {
+        depth_mm: one.depth_mm - fit.contact_shift_mm,
+        force_n: one.force_newtons,
+        law_n: one.force_newtons - residual,
+    };
+    samples.map(point).collect()
+}
+
+/// The thickness in mm that a session measured by touching the base; `None` where it did not, and for a table.
+pub fn measured_thickness(source: &Path) -> Result<Option<Quantity>, SourceError> {
+    let wanted = SourceSelection { is_rejected_included: true, ..SourceSelection::default() };
+    let measured = source::read_analysed(source, None, wanted, None)?.thickness_mm;
+    Ok(measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty }))
 }
 
 /// The largest first.

@@ -30,7 +30,7 @@ pub struct WindowSettings {
     pub left: Option<f32>,
     pub right: Option<f32>,
     pub log: Option<f32>,
-    /// How the parts of screens are arranged, by the names of the screens.
+    /// What screens keep, such as how their parts are arranged, by the names of the screens.
     pub layouts: BTreeMap<String, Value>,
     /// Of the last run.
     pub operator: String,

@@ -13,6 +13,7 @@ mod gui_flows;
 mod gui_layout;
 mod gui_library;
 mod gui_link;
+mod gui_material;
 mod gui_models;
 mod gui_pictures;
 mod gui_playback;

@@ -1,55 +1,81 @@
 //! A modulus as people read it: the number first, and every assumption under it.
 
-use crate::material::{LoadingLackOfFit, MaterialReport};
+use crate::material::{LoadingLackOfFit, MaterialBudgetRow, MaterialReport};
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 use palpate_indentation::{
     Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
 };
 
-const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
+/// What no budget has.
+pub const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
 
 #[must_use]
 pub fn material_text(report: &MaterialReport) -> String {
-    let mut lines = vec![format!(
-        "Young's modulus  {} kPa, 95 % interval {} to {} kPa",
-        with_error(kpa(report.modulus_mpa), kpa(report.standard_uncertainty_mpa)),
-        significant(kpa(report.total95_mpa[0]), 4),
-        significant(kpa(report.total95_mpa[1]), 4),
+    let line = |name: &str, words: &str| format!("{name:<17}{words}");
+    let mut lines = vec![line(
+        "Young's modulus",
+        &format!("{}, {}", modulus_words(report), interval_words(report)),
     )];
-    lines.extend(report.lack_of_fit.map(lack_words));
-    lines.push(format!("law              {}", law_words(report.law)));
-    lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
-    lines.push(format!("specimen         {}", specimen_words(&report.specimen)));
-    lines.push(format!("loading          {}", loading_words(report)));
-    lines.push(format!("contact          {}", contact_words(report)));
-    lines.push(format!("force zero       {}", zero_words(report)));
+    lines.extend(report.lack_of_fit.map(|lack| line("lack of fit", &lack_words(lack))));
+    lines.extend(assumptions(report).iter().map(|(name, words)| line(name, words)));
     for row in &report.validity {
         let value = significant(row.value, 3);
-        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
+        lines.push(line("valid", &format!("{} {value}, at most {}", row.ratio, row.max)));
     }
     for row in &report.budget {
-        lines.push(format!(
-            "uncertainty      {:<18} {:>8} kPa  {:>3.0} %",
-            row.source,
-            error_alone(kpa(row.mpa)),
-            row.percent
-        ));
+        let words =
+            format!("{:<18} {:>8} kPa  {:>3.0} %", row.source, budget_kpa(row), row.percent);
+        lines.push(line("uncertainty", &words));
     }
     if !report.not_included.is_empty() {
-        lines.push(format!("not included     {}", report.not_included.join(", ")));
+        lines.push(line("not included", &report.not_included.join(", ")));
     }
     lines.push(RELAXES.into());
     lines.join("\n")
+}
+
+/// The modulus with its standard uncertainty.
+#[must_use]
+pub fn modulus_words(report: &MaterialReport) -> String {
+    let modulus = with_error(kpa(report.modulus_mpa), kpa(report.standard_uncertainty_mpa));
+    format!("{modulus} kPa")
+}
+
+#[must_use]
+pub fn interval_words(report: &MaterialReport) -> String {
+    let [low, high] = report.total95_mpa.map(|end| significant(kpa(end), 4));
+    format!("95 % interval {low} to {high} kPa")
+}
+
+/// What the modulus rests on: a name and its words each.
+#[must_use]
+pub fn assumptions(report: &MaterialReport) -> Vec<(&'static str, String)> {
+    vec![
+        ("law", law_words(report.law).to_owned()),
+        ("indenter", indenter_words(&report.indenter)),
+        ("specimen", specimen_words(&report.specimen)),
+        ("loading", loading_words(report)),
+        ("contact", contact_words(report)),
+        ("force zero", zero_words(report)),
+    ]
+}
+
+/// Standard uncertainty in kPa that a source adds.
+#[must_use]
+pub fn budget_kpa(row: &MaterialBudgetRow) -> String {
+    error_alone(kpa(row.mpa))
 }
 
 pub(super) fn kpa(mpa: f64) -> f64 {
     1e3 * mpa
 }
 
-fn lack_words(lack: LoadingLackOfFit) -> String {
+/// How the law misses the loading.
+#[must_use]
+pub fn lack_words(lack: LoadingLackOfFit) -> String {
     let LoadingLackOfFit { residual_over_noise, halves_mpa: [shallow, deep] } = lack;
     format!(
-        "lack of fit      residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa; the interval counts the misfit as noise that lasts",
+        "residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa; the interval counts the misfit as noise that lasts",
         significant(residual_over_noise, 3),
         significant(kpa(shallow), 4),
         significant(kpa(deep), 4),

@@ -16,6 +16,7 @@ pub mod fit_json;
 pub mod haptics;
 pub mod live;
 pub mod material;
+pub mod material_plot;
 pub mod panels;
 pub mod picture;
 pub mod plan_picture;

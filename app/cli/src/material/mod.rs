@@ -198,6 +198,10 @@ fn failure(err: MaterialError) -> Failure {
             | LoadingFitError::ZeroMoved { .. }
             | LoadingFitError::Samples { .. },
         ) => Failure::failed(err),
+        MaterialError::TooDeep { reason, depth_max_mm } => Failure::usage(format!(
+            "{reason}; for this indenter and specimen give --depth-max {depth_max_mm:.4} or less"
+        )),
+        MaterialError::NoThickness => Failure::usage(format!("{err}; give --thickness")),
         err => Failure::usage(err),
     }
 }

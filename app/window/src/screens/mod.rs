@@ -10,6 +10,7 @@ pub mod form;
 pub mod haptics;
 pub mod library;
 pub mod live_panel;
+pub mod material;
 pub mod models;
 pub mod parameters;
 pub mod preview_view;

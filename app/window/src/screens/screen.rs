@@ -130,12 +130,12 @@ pub trait Screen: Any {
         false
     }
 
-    /// How its parts are arranged, to be kept; none where that is as usual.
+    /// What the next window opens with, such as how its parts are arranged; none where that is as usual.
     fn layout(&self) -> Option<Value> {
         None
     }
 
-    /// Arranges its parts as they were kept.
+    /// Takes what a window before kept.
     fn take_layout(&mut self, _kept: &Value) {}
 
     /// Its actions for the palette, each possible or with the reason why not.
@@ -144,7 +144,7 @@ pub trait Screen: Any {
     }
 }
 
-/// How the parts of screens are arranged, by the names of the screens.
+/// What screens keep from window to window, by their names.
 pub type ScreenLayouts = BTreeMap<String, Value>;
 
 /// Every screen, and which is shown.
@@ -169,7 +169,7 @@ impl Screens {
         screens
     }
 
-    /// How the screens are arranged that are not as usual.
+    /// What the screens keep that are not as usual.
     pub fn layouts(&self) -> ScreenLayouts {
         let all = self.all.iter();
         all.filter_map(|(name, one)| Some(((*name).to_owned(), one.layout()?))).collect()

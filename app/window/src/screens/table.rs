@@ -24,6 +24,7 @@ pub const GROUPS: [ScreenGroup; 3] = [
             super::library::SCREEN,
             super::review::SCREEN,
             super::models::SCREEN,
+            super::material::SCREEN,
             super::trade::SCREEN,
             super::extremes::SCREEN,
             super::haptics::SCREEN,

@@ -14,9 +14,11 @@ use palpate_model::quantity::{in_base_unit, split, units_like};
 use palpate_model::typed_number::plain_text;
 use palpate_rheology::families;
 use palpate_rheology::tolerance::Tolerance;
+use serde::{Deserialize, Serialize};
 
-/// A number as it is typed, and what it means.
-#[derive(Clone, Debug, PartialEq)]
+/// A number as it is typed, and what it means; its text alone is kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
 pub struct QuantityField {
     pub text: String,
     /// Of a number that is typed without one; as it was drawn last.
@@ -28,6 +30,18 @@ pub struct QuantityField {
 impl Default for QuantityField {
     fn default() -> Self {
         Self::new(0.0)
+    }
+}
+
+impl From<String> for QuantityField {
+    fn from(text: String) -> Self {
+        Self::typed(text)
+    }
+}
+
+impl From<QuantityField> for String {
+    fn from(field: QuantityField) -> Self {
+        field.text
     }
 }
 
@@ -61,6 +75,48 @@ pub fn check_rate(rate: f64) -> Result<(), String> {
     Period::of_rate(rate).map(|_| ()).map_err(|err| err.to_string())
 }
 
+/// A number as it is typed with its standard uncertainty; zero for one that is taken as exact.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UncertainField {
+    pub value: QuantityField,
+    pub error: QuantityField,
+}
+
+impl UncertainField {
+    /// A field with texts that are not read yet.
+    #[must_use]
+    pub fn typed([value, error]: [&str; 2]) -> Self {
+        Self {
+            value: QuantityField::typed(value.into()),
+            error: QuantityField::typed(error.into()),
+        }
+    }
+
+    pub fn texts(&self) -> [&str; 2] {
+        [&self.value.text, &self.error.text]
+    }
+
+    /// Reads both texts again and checks the numbers together.
+    pub fn check(&mut self, check: impl FnOnce([f64; 2]) -> Result<(), String>) {
+        self.value.check(|_| Ok(()));
+        self.error.check(|_| Ok(()));
+        if let (Ok(value), Ok(error)) = (&self.value.value, &self.error.value)
+            && let Err(reason) = check([*value, *error])
+        {
+            self.value.value = Err(reason);
+        }
+    }
+
+    /// The number and its standard uncertainty, or the name and what is wrong.
+    pub fn named_values(&self, name: &str) -> Result<[f64; 2], String> {
+        Ok([self.value.named_value(name)?, self.error.named_value(&uncertainty_name(name))?])
+    }
+}
+
+fn uncertainty_name(name: &str) -> String {
+    format!("uncertainty of {name}")
+}
+
 /// A finite number in the unit of its field, or one sentence.
 fn parse(text: &str, unit: &str) -> Result<f64, String> {
     let text = text.trim();
@@ -87,18 +143,15 @@ fn parse(text: &str, unit: &str) -> Result<f64, String> {
 /// Width in points of the labels in front of the inputs of a form.
 const LABEL_WIDTH: f32 = 84.0;
 
+/// Width in points of the input of a number.
+const NUMBER_WIDTH: f32 = 76.0;
+
 /// Draws a labelled input with its unit; true when the text changed.
 pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {
-    let tokens = tokens_of(ui);
-    if field.unit != unit {
-        unit.clone_into(&mut field.unit);
-    }
     let row = |ui: &mut Ui| {
         let label = form_label(ui, name);
-        let input = TextEdit::singleline(&mut field.text).desired_width(76.0).char_limit(24);
-        let input = ui.add(input.align(Align2::RIGHT_CENTER));
-        select_on_entry(&input, &field.text);
-        ui.label(RichText::new(unit).color(tokens.text_quiet));
+        let input = input_ui(ui, unit, NUMBER_WIDTH, field);
+        ui.label(RichText::new(unit).color(tokens_of(ui).text_quiet));
         input.labelled_by(label.id).named(name).changed()
     };
     let has_changed = steady(ui, name, |ui| ui.horizontal(row).inner);
@@ -106,6 +159,43 @@ pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityFiel
         small_alarm_ui(ui, reason);
     }
     has_changed
+}
+
+/// The same for a number and its standard uncertainty; `wanted` stands below until the number is typed.
+pub fn uncertain_ui(
+    ui: &mut Ui,
+    [name, unit, wanted]: [&str; 3],
+    field: &mut UncertainField,
+) -> bool {
+    let row = |ui: &mut Ui| {
+        let label = form_label(ui, name);
+        let value = input_ui(ui, unit, NUMBER_WIDTH, &mut field.value);
+        ui.label("±");
+        let error = input_ui(ui, unit, 0.75 * NUMBER_WIDTH, &mut field.error);
+        ui.label(RichText::new(unit).color(tokens_of(ui).text_quiet));
+        let value = value.labelled_by(label.id).named(name);
+        let name = uncertainty_name(name);
+        let error = error.accessible_name(name.as_str()).named(&name);
+        value.changed() || error.changed()
+    };
+    let has_changed = steady(ui, name, |ui| ui.horizontal(row).inner);
+    match (&field.value.value, &field.error.value) {
+        (Err(_), _) if field.value.text.trim().is_empty() => quiet_ui(ui, wanted),
+        (Err(reason), _) | (_, Err(reason)) => small_alarm_ui(ui, reason),
+        _ => {}
+    }
+    has_changed
+}
+
+/// Draws the input of a number in a unit.
+fn input_ui(ui: &mut Ui, unit: &str, width: f32, field: &mut QuantityField) -> Response {
+    if field.unit != unit {
+        unit.clone_into(&mut field.unit);
+    }
+    let input = TextEdit::singleline(&mut field.text).desired_width(width).char_limit(24);
+    let input = ui.add(input.align(Align2::RIGHT_CENTER));
+    select_on_entry(&input, &field.text);
+    input
 }
 
 /// Selects all of a field that has just been entered, by key or by a click, so that what is typed takes its place.

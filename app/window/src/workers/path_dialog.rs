@@ -20,6 +20,8 @@ pub enum PathPurpose {
     Protocol,
     /// A recorded session to feel.
     Body,
+    /// A recorded session whose modulus is wanted.
+    Press,
     /// A scene file.
     Scene,
     /// A recorded session to look at.
@@ -118,7 +120,7 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
     };
     let path = match ask {
         PathPurpose::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-        PathPurpose::Session | PathPurpose::Body | PathPurpose::Opened => {
+        PathPurpose::Session | PathPurpose::Body | PathPurpose::Press | PathPurpose::Opened => {
             dialog.set_title("Folder of a session").pick_folder()
         }
         PathPurpose::Specimens => of_kind("Table of specimens", "tables", &["csv", "tsv", "txt"]),

@@ -83,6 +83,8 @@ pub struct LoadingFit {
     pub force_zero_newtons: f64,
     /// Root mean square of the residuals in N.
     pub residual_newtons: f64,
+    /// Force less that of the law, sample by sample, in N.
+    pub residuals_newtons: Vec<f64>,
     /// What each source adds, in MPa.
     pub terms: BTreeMap<ModulusTerm, f64>,
     /// Degrees of freedom of the noise, for Student's t; infinite where the noise was known and describes the residuals.
@@ -201,6 +203,7 @@ pub fn fit_loading(
         contact_shift_mm: found.at[SHIFT],
         force_zero_newtons: found.at[ZERO],
         residual_newtons: (squares / samples.len() as f64).sqrt(),
+        residuals_newtons: residuals,
         terms,
         noise_freedom: noise.freedom,
         validity: law.validity(indenter, specimen, deepest)?,

@@ -1,0 +1,338 @@
+//! The press, the indenter and the specimen as typed.
+
+use crate::widgets::{
+    QuantityField, UncertainField, choice_ui, quantity_ui, quiet_ui, require, section_ui,
+    small_alarm_ui, text_row, tick_box, uncertain_ui,
+};
+use crate::workbench::ScreenOffers;
+use eframe::egui::{Button, Ui};
+use palpate_analysis::compliance::ComplianceCorrections;
+use palpate_analysis::material::{ErrorSource, MaterialRequest};
+use palpate_indentation::{
+    Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
+};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum Shape {
+    #[default]
+    FlatPunch,
+    Sphere,
+    Cone,
+    PyramidThree,
+    PyramidFour,
+}
+
+const SHAPES: [(Shape, &str); 5] = [
+    (Shape::FlatPunch, "flat punch"),
+    (Shape::Sphere, "sphere"),
+    (Shape::Cone, "cone"),
+    (Shape::PyramidThree, "pyramid of three faces"),
+    (Shape::PyramidFour, "pyramid of four faces"),
+];
+
+impl Shape {
+    const fn has_radius(self) -> bool {
+        matches!(self, Self::FlatPunch | Self::Sphere)
+    }
+
+    /// `size` is a radius in mm, or a half angle in degrees.
+    const fn indenter(self, size: Quantity) -> Indenter {
+        match self {
+            Self::FlatPunch => Indenter::FlatPunch { radius_mm: size },
+            Self::Sphere => Indenter::Sphere { radius_mm: size },
+            Self::Cone => Indenter::Cone { half_angle_degrees: size },
+            Self::PyramidThree => {
+                Indenter::Pyramid { faces: PyramidFaces::Three, half_angle_degrees: size }
+            }
+            Self::PyramidFour => {
+                Indenter::Pyramid { faces: PyramidFaces::Four, half_angle_degrees: size }
+            }
+        }
+    }
+}
+
+const BASES: [(Base, &str); 2] =
+    [(Base::Bonded, "the specimen sticks to it"), (Base::Frictionless, "the specimen slips on it")];
+
+const LAWS: [(ContactLaw, &str); 3] = [
+    (ContactLaw::Layer, "layer on a rigid base"),
+    (ContactLaw::Sneddon, "half-space, any shape"),
+    (ContactLaw::Hertz, "half-space, shallow sphere"),
+];
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum ContactChoice {
+    #[default]
+    Recorded,
+    Stated,
+    Free,
+}
+
+const CONTACTS: [(ContactChoice, &str); 3] = [
+    (ContactChoice::Recorded, "as the session found it"),
+    (ContactChoice::Stated, "with a stated uncertainty"),
+    (ContactChoice::Free, "from the loading alone"),
+];
+
+/// Name of the field of Poisson's ratio, which has room for no more.
+const POISSON: &str = "Poisson";
+
+/// What is typed; of it the window keeps everything but the session.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(super) struct MaterialForm {
+    #[serde(skip)]
+    session: String,
+    /// The session that was put into the field last by itself, which the next one in front replaces.
+    #[serde(skip)]
+    offered: Option<PathBuf>,
+    /// The texts that the measured thickness gave the field of the thickness.
+    #[serde(skip)]
+    measured: Option<[String; 2]>,
+    shape: Shape,
+    radius: UncertainField,
+    half_angle: UncertainField,
+    thickness: UncertainField,
+    poisson: UncertainField,
+    is_poisson_measured: bool,
+    base: Base,
+    law: ContactLaw,
+    is_depth_limited: bool,
+    depth_max: QuantityField,
+    contact: ContactChoice,
+    contact_error: QuantityField,
+    /// Depths are corrected with the compliance in force for the session's rig.
+    pub is_compliance_corrected: bool,
+}
+
+impl Default for MaterialForm {
+    fn default() -> Self {
+        let empty = || UncertainField::typed(["", "0"]);
+        Self {
+            session: String::new(),
+            offered: None,
+            measured: None,
+            shape: Shape::default(),
+            radius: empty(),
+            half_angle: empty(),
+            thickness: empty(),
+            poisson: empty(),
+            is_poisson_measured: false,
+            base: Base::Bonded,
+            law: ContactLaw::Layer,
+            is_depth_limited: false,
+            depth_max: QuantityField::typed("1".into()),
+            contact: ContactChoice::default(),
+            contact_error: QuantityField::typed("0.01".into()),
+            is_compliance_corrected: false,
+        }
+    }
+}
+
+impl MaterialForm {
+    /// What the next window opens with; none where all is as at first.
+    pub fn kept(&self) -> Option<Value> {
+        let mut kept = self.clone();
+        // What this session measured says nothing of the next one.
+        if self.is_thickness_measured() {
+            kept.thickness = Self::default().thickness;
+        }
+        let [kept, usual] = [kept, Self::default()].map(|form| serde_json::to_value(form).ok());
+        if kept == usual { None } else { kept }
+    }
+
+    /// Takes a session or a table.
+    pub fn take(&mut self, path: &Path) {
+        self.session = path.display().to_string();
+    }
+
+    /// Takes the session in front, until another one is typed.
+    pub fn follow(&mut self, front: Option<&PathBuf>) {
+        let is_own = match &self.offered {
+            Some(offered) => Path::new(&self.session) == offered,
+            None => self.session.is_empty(),
+        };
+        if let Some(front) = front.filter(|front| is_own && self.offered.as_ref() != Some(front)) {
+            self.take(front);
+            self.offered = Some(front.clone());
+        }
+    }
+
+    /// The path typed.
+    pub fn source(&self) -> &Path {
+        Path::new(self.session.trim())
+    }
+
+    /// Takes the thickness that the session measured. Where it measured none, one that was typed stays, and one that the
+    /// session before measured does not.
+    pub fn take_thickness(&mut self, measured: Option<Quantity>) {
+        let was_measured = self.is_thickness_measured();
+        let round = |value: f64| format!("{}", (value * 1e4).round() / 1e4);
+        self.measured = measured.map(|one| [one.value, one.standard_uncertainty].map(round));
+        if let Some(texts) = &self.measured {
+            self.thickness = UncertainField::typed(texts.each_ref().map(String::as_str));
+        } else if was_measured {
+            self.thickness = Self::default().thickness;
+        }
+    }
+
+    /// Limits the depth in mm.
+    pub fn limit_depth(&mut self, depth_mm: f64) {
+        self.is_depth_limited = true;
+        self.depth_max = QuantityField::typed(format!("{depth_mm:.4}"));
+    }
+
+    /// Checks every field.
+    pub fn check(&mut self) {
+        let shape = self.shape;
+        let size = |pair| shape.indenter(quantity(pair)).shape().map(|_| ());
+        let size_field = if shape.has_radius() { &mut self.radius } else { &mut self.half_angle };
+        size_field.check(|pair| size(pair).map_err(|err| err.to_string()));
+        // What is not checked here is one that passes.
+        let one = Quantity { value: 0.5, standard_uncertainty: 0.0 };
+        let specimen = Specimen {
+            thickness_mm: one,
+            base: self.base,
+            poisson_ratio: one,
+            poisson_basis: PoissonBasis::Assumed,
+        };
+        let possible =
+            |specimen: Specimen| specimen.layer().map(|_| ()).map_err(|err| err.to_string());
+        self.thickness
+            .check(|pair| possible(Specimen { thickness_mm: quantity(pair), ..specimen }));
+        self.poisson.check(|pair| possible(Specimen { poisson_ratio: quantity(pair), ..specimen }));
+        self.depth_max.check(|depth| require(depth > 0.0, "must be above 0"));
+        self.contact_error.check(|error| require(error >= 0.0, "must be 0 or more"));
+    }
+
+    /// The press to fit, its depths as they were measured, or the first thing that is wrong.
+    pub fn request(&self) -> Result<MaterialRequest, String> {
+        let source = self.source();
+        require(!source.as_os_str().is_empty(), "choose a session first")?;
+        let (name, size) = self.size();
+        let size = quantity(size.named_values(name)?);
+        let is_measured = self.is_thickness_measured();
+        let thickness = quantity(self.thickness.named_values("thickness")?);
+        let poisson_ratio = quantity(self.poisson.named_values(POISSON)?);
+        self.law_verdict()?;
+        let depth_max_mm =
+            self.is_depth_limited.then(|| self.depth_max.named_value("depth")).transpose()?;
+        Ok(MaterialRequest {
+            source: source.to_owned(),
+            columns: None,
+            analysis: None,
+            is_rejected_included: false,
+            corrections: ComplianceCorrections::none(None),
+            law: self.law,
+            indenter: self.shape.indenter(size),
+            thickness_mm: (!is_measured).then_some(thickness),
+            base: self.base,
+            poisson_ratio,
+            poisson_basis: match self.is_poisson_measured {
+                true => PoissonBasis::Measured,
+                false => PoissonBasis::Assumed,
+            },
+            depth_max_mm,
+            contact: match self.contact {
+                ContactChoice::Recorded => ErrorSource::Recorded,
+                ContactChoice::Free => ErrorSource::Free,
+                ContactChoice::Stated => {
+                    ErrorSource::Stated(self.contact_error.named_value("contact")?)
+                }
+            },
+        })
+    }
+
+    fn size(&self) -> (&'static str, &UncertainField) {
+        match self.shape.has_radius() {
+            true => ("radius", &self.radius),
+            false => ("half angle", &self.half_angle),
+        }
+    }
+
+    fn is_thickness_measured(&self) -> bool {
+        self.measured.as_ref().is_some_and(|texts| *texts == self.thickness.texts())
+    }
+
+    fn law_verdict(&self) -> Result<(), String> {
+        let is_possible = self.law != ContactLaw::Hertz || self.shape == Shape::Sphere;
+        require(is_possible, "this law describes a sphere only; choose another law")
+    }
+
+    /// Draws the fields; true when the button of the session dialog is pressed.
+    pub fn ui(&mut self, ui: &mut Ui, offers: &ScreenOffers) -> bool {
+        section_ui(ui, "Press");
+        text_row(ui, "session", "a session's folder, or a table", &mut self.session);
+        let mut is_dialog_pressed = false;
+        ui.horizontal_wrapped(|ui| {
+            for (name, session) in [("In review", &offers.review), ("In library", &offers.library)]
+            {
+                let button = ui.add_enabled(session.is_some(), Button::new(name));
+                if let (true, Some(session)) = (button.clicked(), session) {
+                    self.take(session);
+                }
+            }
+            is_dialog_pressed = ui.button("Choose a session...").clicked();
+        });
+        self.indenter_ui(ui);
+        self.specimen_ui(ui);
+        self.law_ui(ui);
+        is_dialog_pressed
+    }
+
+    fn indenter_ui(&mut self, ui: &mut Ui) {
+        section_ui(ui, "Indenter");
+        choice_ui(ui, "shape", &mut self.shape, &SHAPES);
+        match self.shape.has_radius() {
+            true => {
+                let wanted = "the radius with its standard uncertainty, 0 for exact";
+                uncertain_ui(ui, ["radius", "mm", wanted], &mut self.radius);
+            }
+            false => {
+                let wanted = "between axis and flank, with its standard uncertainty";
+                uncertain_ui(ui, ["half angle", "°", wanted], &mut self.half_angle);
+            }
+        }
+    }
+
+    fn specimen_ui(&mut self, ui: &mut Ui) {
+        section_ui(ui, "Specimen");
+        let wanted = "the session measured none; type it with its standard uncertainty";
+        uncertain_ui(ui, ["thickness", "mm", wanted], &mut self.thickness);
+        if self.is_thickness_measured() {
+            quiet_ui(ui, "as the session measured it by touching the base");
+        }
+        choice_ui(ui, "base", &mut self.base, &BASES);
+        let wanted =
+            "Poisson's ratio, 0 to 0.5; the modulus changes with it, so there is no default";
+        uncertain_ui(ui, [POISSON, "", wanted], &mut self.poisson);
+        tick_box(ui, &mut self.is_poisson_measured, "measured on this tissue, not assumed");
+    }
+
+    fn law_ui(&mut self, ui: &mut Ui) {
+        section_ui(ui, "Law");
+        choice_ui(ui, "law", &mut self.law, &LAWS);
+        if let Err(reason) = self.law_verdict() {
+            small_alarm_ui(ui, reason);
+        }
+        tick_box(ui, &mut self.is_depth_limited, "a part of the loading only");
+        if self.is_depth_limited {
+            quantity_ui(ui, "depth", "mm, greatest", &mut self.depth_max);
+        }
+        choice_ui(ui, "contact", &mut self.contact, &CONTACTS);
+        if self.contact == ContactChoice::Stated {
+            quantity_ui(ui, "uncertainty", "mm, standard", &mut self.contact_error);
+        }
+        tick_box(ui, &mut self.is_compliance_corrected, "correct depths for machine compliance");
+    }
+}
+
+const fn quantity([value, standard_uncertainty]: [f64; 2]) -> Quantity {
+    Quantity { value, standard_uncertainty }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,167 @@
+//! From a press to Young's modulus: indenter, specimen and law on the left, the loading in the middle, the number and all
+//! that it rests on at the right.
+
+mod form;
+mod result;
+
+pub use result::FittedMaterial;
+
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
+use crate::widgets::{alarm_ui, answer_ui, placeholder_ui, section_ui, work_ui};
+use crate::workers::{BackgroundTask, PathPurpose};
+use eframe::egui::{Context, Key, Ui};
+use form::MaterialForm;
+use palpate_analysis::compliance::{ComplianceCorrections, LATEST_COMPLIANCE};
+use palpate_analysis::material::{MaterialError, MaterialRequest, material, measured_thickness};
+use palpate_analysis::progress::Progress;
+use palpate_indentation::Quantity;
+use serde_json::Value;
+use std::path::PathBuf;
+
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Material",
+    icon: lucide_icons::Icon::Layers,
+    purpose: "Young's modulus of a press, with what makes it uncertain",
+    key: Some(Key::M),
+    open: |workbench| Box::new(MaterialScreen::new(workbench.library.clone().ok())),
+};
+
+const BEFORE: &str = "Choose a session, describe the indenter and the specimen, and fit a contact law to the loading. The modulus belongs to the tissue; force and depth belong to one probe and one specimen.";
+
+/// A modulus, or why a contact law gives none.
+type MaterialAnswer = Result<FittedMaterial, MaterialError>;
+
+pub struct MaterialScreen {
+    library: Option<PathBuf>,
+    form: MaterialForm,
+    task: BackgroundTask<MaterialAnswer>,
+    /// The thickness that a session measured, once it is read.
+    thickness: BackgroundTask<Option<Quantity>>,
+    /// The session whose thickness is read or was read last.
+    thickness_of: PathBuf,
+}
+
+impl MaterialScreen {
+    fn new(library: Option<PathBuf>) -> Self {
+        Self {
+            library,
+            form: MaterialForm::default(),
+            task: BackgroundTask::default(),
+            thickness: BackgroundTask::default(),
+            thickness_of: PathBuf::new(),
+        }
+    }
+
+    /// The last modulus, unless there is none or it was refused.
+    pub fn fitted(&self) -> Option<&FittedMaterial> {
+        self.task.answer()?.as_ref().ok()?.as_ref().ok()
+    }
+
+    /// Why the last press has no modulus.
+    pub fn refused(&self) -> Option<&MaterialError> {
+        self.task.answer()?.as_ref().ok()?.as_ref().err()
+    }
+
+    fn refusal_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let Some(refused) = self.refused() else { return };
+        alarm_ui(ui, refused.to_string());
+        let MaterialError::TooDeep { depth_max_mm, .. } = *refused else { return };
+        if ui.button(format!("Fit the loading down to {depth_max_mm:.4} mm")).clicked() {
+            self.form.limit_depth(depth_max_mm);
+            commands.push(UiCommand::Work);
+        }
+    }
+}
+
+impl Screen for MaterialScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        if self.form.ui(ui, &workbench.front) {
+            commands.push(UiCommand::Choose(PathPurpose::Press));
+        }
+        ui.add_space(6.0);
+        let verdict = self.form.request().map(|_| ());
+        work_ui(ui, "Fit modulus  F6", &self.task, &verdict, commands);
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+        match answer_ui(ui, &self.task, BEFORE) {
+            Some(Ok(fitted)) => result::plots_ui(ui, fitted),
+            Some(Err(_)) => self.refusal_ui(ui, commands),
+            None => {}
+        }
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        match self.fitted() {
+            Some(fitted) => result::number_ui(ui, &fitted.report),
+            None => {
+                section_ui(ui, "Young's modulus");
+                placeholder_ui(ui, "no modulus yet");
+            }
+        }
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        let source = self.form.source();
+        if self.thickness.is_busy() || source == self.thickness_of {
+            return;
+        }
+        self.thickness_of = source.to_owned();
+        let source = self.thickness_of.clone();
+        self.thickness.start("material-thickness", ctx, move |_| {
+            measured_thickness(&source).map_err(|err| err.to_string())
+        });
+    }
+
+    fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+        self.task.poll();
+        self.form.follow(workbench.front.review.as_ref().or(workbench.front.library.as_ref()));
+        if self.thickness.poll() && self.form.source() == self.thickness_of {
+            // What cannot be read is said by the fit.
+            let measured = self.thickness.answer().and_then(|answer| answer.clone().ok()).flatten();
+            self.form.take_thickness(measured);
+        }
+        self.form.check();
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _workbench: &mut Workbench) -> Reaction {
+        match command {
+            UiCommand::Chosen(PathPurpose::Press, path) => self.form.take(path),
+            _ => return Reaction::NotMine,
+        }
+        Reaction::Done
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        self.form.check();
+        let Ok(request) = self.form.request() else { return };
+        let library = self.library.clone();
+        let is_corrected = self.form.is_compliance_corrected;
+        self.task.start("material", ctx, move |progress| {
+            progress.share(0.0, "reading the press and fitting the law");
+            let library = library.as_deref();
+            let corrections = match is_corrected {
+                true => ComplianceCorrections::named(LATEST_COMPLIANCE, library)
+                    .map_err(|err| err.to_string())?,
+                false => ComplianceCorrections::none(library),
+            };
+            Ok(material(&MaterialRequest { corrections, ..request }).map(FittedMaterial::from))
+        });
+    }
+
+    fn cancel(&mut self) {
+        self.task.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.is_busy()
+    }
+
+    fn layout(&self) -> Option<Value> {
+        self.form.kept()
+    }
+
+    fn take_layout(&mut self, kept: &Value) {
+        self.form = serde_json::from_value(kept.clone()).unwrap_or_default();
+    }
+}

@@ -1,0 +1,149 @@
+"""Young's modulus of a press by a contact law."""
+from __future__ import annotations
+
+import json
+import numbers
+import os
+from collections.abc import Mapping as _Mapping
+from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Optional, Tuple, Union
+
+from ._native import PalpateError, fit_material
+
+if TYPE_CHECKING:
+    import numpy as np
+
+#: A number that is taken as exact, or a number and its standard uncertainty.
+Quantity = Union[float, Tuple[float, float]]
+
+#: The indenters of the command line, each with its fields.
+_INDENTERS: Dict[str, Dict[str, str]] = {
+    "flat-punch": {"shape": "flat-punch"},
+    "sphere": {"shape": "sphere"},
+    "cone": {"shape": "cone"},
+    "pyramid-3": {"shape": "pyramid", "faces": "three"},
+    "pyramid-4": {"shape": "pyramid", "faces": "four"},
+}
+_WORDS = {"law": ("hertz", "sneddon", "layer"), "base": ("bonded", "frictionless")}
+
+
+class Material(_Mapping):  # type: ignore[type-arg]
+    """A modulus with all it rests on: a mapping with the content of ``palpate material --json``.
+
+    >>> press = {"thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "depth_max": 0.9}
+    >>> found = palpate.open("demo").material("flat-punch", radius=(6.00, 0.02), **press)
+    >>> found["specimen"]["poisson_basis"], found["not_included"]
+    ('assumed', ['machine compliance'])
+    >>> found.total95_kpa[0] < found.modulus_kpa < found.total95_kpa[1]
+    True
+    """
+
+    def __init__(self, report: Dict[str, Any], text: str, curve: "Tuple[np.ndarray, ...]", notes: List[str]) -> None:
+        self._report = report
+        self._text = text
+        #: The loading that was fitted: depths from the contact in mm, forces and those of the law in N.
+        self.depth, self.force, self.law_force = curve
+        #: Remarks on the data.
+        self.notes = notes
+
+    def __getitem__(self, key: str) -> Any:
+        return self._report[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._report)
+
+    def __len__(self) -> int:
+        return len(self._report)
+
+    @property
+    def modulus_kpa(self) -> float:
+        """Young's modulus in kPa."""
+        return 1e3 * self._report["modulus_mpa"]
+
+    @property
+    def total95_kpa(self) -> Tuple[float, float]:
+        """Its 95 % interval in kPa, which holds no lack of fit."""
+        low, high = self._report["total95_mpa"]
+        return 1e3 * low, 1e3 * high
+
+    def to_dict(self) -> Dict[str, Any]:
+        """The report as a plain dictionary, as in JSON."""
+        return self._report
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+def _number(value: Any, what: str) -> float:
+    if isinstance(value, numbers.Real) and not isinstance(value, bool):
+        return float(value)
+    raise PalpateError(f"{what} cannot be {value!r}; give a number, or a pair of a number and its standard uncertainty")
+
+
+def _quantity(value: Any, what: str) -> Dict[str, float]:
+    number, error = value if isinstance(value, (tuple, list)) and len(value) == 2 else (value, 0.0)
+    return {"value": _number(number, what), "standard_uncertainty": _number(error, what)}
+
+
+def _indenter(word: str, radius: Any, half_angle: Any) -> Dict[str, Any]:
+    if word not in _INDENTERS:
+        raise PalpateError(f"{word!r} is not an indenter; the indenters are {', '.join(_INDENTERS)}")
+    needed, other = ("radius", "half_angle") if word in ("flat-punch", "sphere") else ("half_angle", "radius")
+    sizes = {"radius": radius, "half_angle": half_angle}
+    if sizes[other] is not None:
+        raise PalpateError(f"a {word} has no {other}; leave it out")
+    if sizes[needed] is None:
+        raise PalpateError(f"a {word} needs its {needed}; give it, with its standard uncertainty")
+    field = {"radius": "radius_mm", "half_angle": "half_angle_degrees"}[needed]
+    return {**_INDENTERS[word], field: _quantity(sizes[needed], needed)}
+
+
+def _word(word: str, what: str) -> str:
+    if word not in _WORDS[what]:
+        raise PalpateError(f"{word!r} is not a {what}; give one of {', '.join(_WORDS[what])}")
+    return word
+
+
+def material(
+    source: "str | os.PathLike[str]",
+    indenter: str,
+    *,
+    radius: Optional[Quantity] = None,
+    half_angle: Optional[Quantity] = None,
+    thickness: Optional[Quantity] = None,
+    poisson: Quantity,
+    poisson_measured: bool = False,
+    base: str = "bonded",
+    law: str = "layer",
+    depth_max: Optional[float] = None,
+    contact_error: Union[None, str, float] = None,
+    analysis: Optional[str] = None,
+    include_rejected: bool = False,
+    compliance: Optional[str] = None,
+) -> Material:
+    """Young's modulus of a press, of a session's folder or a table, as ``palpate material`` gives it.
+
+    The options are those of the command. A radius in mm, a half angle in degrees, a thickness in mm and Poisson's ratio
+    are a number that is taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is
+    the one that the session measured. ``contact_error`` is ``"free"``, or a standard uncertainty in mm.
+
+    >>> palpate.material("demo", "sphere", poisson=0.5)
+    Traceback (most recent call last):
+        ...
+    palpate.PalpateError: a sphere needs its radius; give it, with its standard uncertainty
+    """
+    request = {
+        "indenter": json.dumps(_indenter(indenter, radius, half_angle)),
+        "thickness": None if thickness is None else json.dumps(_quantity(thickness, "thickness")),
+        "poisson": json.dumps(_quantity(poisson, "poisson")),
+        "poisson_measured": bool(poisson_measured),
+        "base": json.dumps(_word(base, "base")),
+        "law": json.dumps(_word(law, "law")),
+        "depth_max": None if depth_max is None else _number(depth_max, "depth_max"),
+        "contact_free": contact_error == "free",
+        "contact_error": None if contact_error in (None, "free") else _number(contact_error, "contact_error"),
+        "analysis": analysis,
+        "include_rejected": bool(include_rejected),
+        "compliance": None if compliance is None else os.fspath(compliance),
+    }
+    report, text, curve, notes = fit_material(os.fspath(source), request)
+    return Material(json.loads(report), text, curve, notes)

@@ -1,0 +1,90 @@
+//! The modulus of a press, with the report of `palpate material --json`.
+
+use crate::error::refused;
+use numpy::{IntoPyArray, PyArray1};
+use palpate_analysis::compliance::ComplianceCorrections;
+use palpate_analysis::material::{ErrorSource, LoadingPoint, MaterialRequest, material};
+use palpate_analysis::report::material::material_text;
+use palpate_indentation::PoissonBasis;
+use palpate_sessions::library_folder;
+use pyo3::prelude::*;
+use serde::de::DeserializeOwned;
+use std::path::PathBuf;
+
+/// What a modulus is asked for; quantities and words are JSON.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct MaterialOptions {
+    indenter: String,
+    thickness: Option<String>,
+    poisson: String,
+    poisson_measured: bool,
+    base: String,
+    law: String,
+    depth_max: Option<f64>,
+    contact_free: bool,
+    contact_error: Option<f64>,
+    analysis: Option<String>,
+    include_rejected: bool,
+    compliance: Option<String>,
+}
+
+fn read<T: DeserializeOwned>(text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(refused)
+}
+
+impl MaterialOptions {
+    fn request(&self, source: PathBuf) -> PyResult<MaterialRequest> {
+        let library = library_folder();
+        let corrections = match &self.compliance {
+            None => ComplianceCorrections::none(library.ok().as_deref()),
+            Some(name) => {
+                let library = library.map_err(refused)?;
+                ComplianceCorrections::named(name, Some(&library)).map_err(refused)?
+            }
+        };
+        Ok(MaterialRequest {
+            source,
+            columns: None,
+            analysis: self.analysis.clone(),
+            is_rejected_included: self.include_rejected,
+            corrections,
+            law: read(&self.law)?,
+            indenter: read(&self.indenter)?,
+            thickness_mm: self.thickness.as_deref().map(read).transpose()?,
+            base: read(&self.base)?,
+            poisson_ratio: read(&self.poisson)?,
+            poisson_basis: match self.poisson_measured {
+                true => PoissonBasis::Measured,
+                false => PoissonBasis::Assumed,
+            },
+            depth_max_mm: self.depth_max,
+            contact: match (self.contact_free, self.contact_error) {
+                (true, _) => ErrorSource::Free,
+                (false, Some(error_mm)) => ErrorSource::Stated(error_mm),
+                (false, None) => ErrorSource::Recorded,
+            },
+        })
+    }
+}
+
+type Array<'py> = Bound<'py, PyArray1<f64>>;
+type MaterialTuple<'py> = (String, String, (Array<'py>, Array<'py>, Array<'py>), Vec<String>);
+
+/// The report in JSON and in words, its curve as depths in mm, forces and forces of the law in N, and remarks.
+#[pyfunction]
+pub fn fit_material(
+    py: Python<'_>,
+    source: PathBuf,
+    options: MaterialOptions,
+) -> PyResult<MaterialTuple<'_>> {
+    let request = options.request(source)?;
+    let report = py.detach(|| material(&request)).map_err(refused)?;
+    let column = |of: fn(&LoadingPoint) -> f64| {
+        report.curve.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)
+    };
+    let curve =
+        (column(|one| one.depth_mm), column(|one| one.force_n), column(|one| one.law_n));
+    let text = serde_json::to_string(&report).map_err(refused)?;
+    Ok((text, material_text(&report), curve, report.notes))
+}
