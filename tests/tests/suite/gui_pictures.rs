@@ -20,6 +20,7 @@ use palpate_tests::flow::screen_of;
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
 use palpate_window::screens::haptics::HapticsScreen;
+use palpate_window::screens::material::MaterialScreen;
 use palpate_window::screens::scene::SceneScreen;
 use palpate_window::screens::table::screens;
 use palpate_window::window::WindowOptions;
@@ -186,6 +187,40 @@ fn check_buzz(window: &mut Window) {
     panic!("the check never ended");
 }
 
+/// Fits the modulus of the session in review on the material screen, unless that is done.
+fn fit_modulus(window: &mut Window) {
+    if screen_of::<MaterialScreen>(window).fitted().is_some() {
+        return;
+    }
+    window.get_by_label("a part of the loading only").click_accesskit();
+    window.run_steps(2);
+    for (name, text) in [
+        ("radius", "6.00"),
+        ("uncertainty of radius", "0.02"),
+        ("thickness", "60.0"),
+        ("uncertainty of thickness", "0.5"),
+        ("Poisson", "0.49"),
+        ("uncertainty of Poisson", "0.01"),
+        ("depth", "0.9"),
+    ] {
+        window.get_by_label(name).focus();
+        window.step();
+        window.get_by_label(name).set_text_value_accesskit(text);
+        window.run_steps(2);
+    }
+    window.get_by_label("Fit modulus  F6").click_accesskit();
+    for _ in 0..FRAMES_MAX {
+        window.step();
+        if screen_of::<MaterialScreen>(window).fitted().is_some() {
+            window.get_by_label("Fit modulus  F6").focus();
+            window.run_steps(2);
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("the modulus was never fitted");
+}
+
 /// Waits for the poke that the scene screen computes when it is shown first: at its deepest, whatever the computer's pace.
 fn compute_poke(window: &mut Window) {
     for _ in 0..FRAMES_MAX {
@@ -246,6 +281,9 @@ fn every_screen_looks_as_it_did() {
             }
             if screen.name == "Haptics" {
                 check_buzz(&mut window);
+            }
+            if screen.name == "Material" {
+                fit_modulus(&mut window);
             }
             if screen.name == "Scene" {
                 compute_poke(&mut window);
