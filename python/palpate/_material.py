@@ -5,7 +5,7 @@ import json
 import numbers
 import os
 from collections.abc import Mapping as _Mapping
-from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Optional, Sequence, Tuple, Union
 
 from ._native import PalpateError, fit_material
 
@@ -37,13 +37,20 @@ class Material(_Mapping):  # type: ignore[type-arg]
     True
     """
 
-    def __init__(self, report: Dict[str, Any], text: str, curve: "Tuple[np.ndarray, ...]", notes: List[str]) -> None:
+    def __init__(
+        self,
+        report: Dict[str, Any],
+        text: str,
+        curve: "Tuple[Optional[np.ndarray], ...]" = (None, None, None),
+        notes: Sequence[str] = (),
+    ) -> None:
         self._report = report
         self._text = text
-        #: The loading that was fitted: depths from the contact in mm, forces and those of the law in N.
+        #: The loading that was fitted: depths from the contact in mm, forces and those of the law in N; None where the
+        #: modulus was read from a session.
         self.depth, self.force, self.law_force = curve
         #: Remarks on the data.
-        self.notes = notes
+        self.notes: List[str] = list(notes)
 
     def __getitem__(self, key: str) -> Any:
         return self._report[key]
@@ -119,12 +126,16 @@ def material(
     analysis: Optional[str] = None,
     include_rejected: bool = False,
     compliance: Optional[str] = None,
+    save: Optional[str] = None,
+    by: Optional[str] = None,
+    reason: str = "",
 ) -> Material:
     """Young's modulus of a press, of a session's folder or a table, as ``palpate material`` gives it.
 
     The options are those of the command. A radius in mm, a half angle in degrees, a thickness in mm and Poisson's ratio
     are a number that is taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is
-    the one that the session measured. ``contact_error`` is ``"free"``, or a standard uncertainty in mm.
+    the one that the session measured. ``contact_error`` is ``"free"``, or a standard uncertainty in mm. ``save`` stores the
+    modulus with the session under that name.
 
     >>> palpate.material("demo", "sphere", poisson=0.5)
     Traceback (most recent call last):
@@ -144,6 +155,9 @@ def material(
         "analysis": analysis,
         "include_rejected": bool(include_rejected),
         "compliance": None if compliance is None else os.fspath(compliance),
+        "save": save,
+        "by": by,
+        "reason": reason,
     }
     report, text, curve, notes = fit_material(os.fspath(source), request)
     return Material(json.loads(report), text, curve, notes)

@@ -103,6 +103,12 @@ class Session:
         stored = [one for one in json.loads(self._native.analyses()) if one["analysis"] == "fit"]
         return {one["name"]: Fit(one["results"], name=one["name"]) for one in stored}
 
+    @property
+    def moduli(self) -> Dict[str, Material]:
+        """Moduli that are stored with the session, by the name of their analysis."""
+        stored = [one for one in json.loads(self._native.analyses()) if one["analysis"] == "material"]
+        return {one["name"]: Material(one["results"], one["words"]) for one in stored}
+
     def samples(
         self,
         frame: Optional[str] = None,
@@ -191,7 +197,10 @@ class Session:
             ...
         palpate.PalpateError: the loading reaches ... mm behind the contact, and the strain is ...
         """
-        return _material.material(self.path, indenter, analysis=self.analysis, **options)
+        made = _material.material(self.path, indenter, analysis=self.analysis, **options)
+        if options.get("save") is not None:
+            self._native = NativeSession(os.fspath(self.path), self.analysis)
+        return made
 
 
 def open(path: "str | os.PathLike[str]", analysis: Optional[str] = None) -> Session:

@@ -3,8 +3,10 @@
 use crate::error::refused;
 use numpy::{IntoPyArray, PyArray1};
 use palpate_analysis::compliance::ComplianceCorrections;
+use palpate_analysis::edits::author;
 use palpate_analysis::material::{ErrorSource, LoadingPoint, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
+use palpate_analysis::session_actions::{Attribution, MaterialToStore};
 use palpate_indentation::PoissonBasis;
 use palpate_sessions::library_folder;
 use pyo3::prelude::*;
@@ -27,6 +29,9 @@ pub struct MaterialOptions {
     analysis: Option<String>,
     include_rejected: bool,
     compliance: Option<String>,
+    save: Option<String>,
+    by: Option<String>,
+    reason: String,
 }
 
 fn read<T: DeserializeOwned>(text: &str) -> PyResult<T> {
@@ -80,6 +85,10 @@ pub fn fit_material(
 ) -> PyResult<MaterialTuple<'_>> {
     let request = options.request(source)?;
     let report = py.detach(|| material(&request)).map_err(refused)?;
+    if let Some(name) = &options.save {
+        let who = Attribution { by: author(options.by.as_deref()), reason: options.reason.clone() };
+        MaterialToStore::of(&request, &report).store(name, &who).map_err(refused)?;
+    }
     let column = |of: fn(&LoadingPoint) -> f64| {
         report.curve.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)
     };

@@ -43,6 +43,16 @@ def test_every_option_is_the_one_of_the_command(command, tmp_path):
         same(found.to_dict(), {key: expected[key] for key in found})
 
 
+def test_saved_modulus_is_stored_with_the_session(command, session):
+    opened = palpate.open(session)
+    assert opened.moduli == {}
+    made = opened.material("flat-punch", **PRESS, save="stiffness", by="Ada", reason="first look")
+    (stored,) = opened.moduli.values()
+    assert dict(stored) == dict(made) and repr(stored) == repr(made)
+    (known,) = command("info", session)["analyses"]
+    assert (known["name"], known["analysis"], known["by"]) == ("stiffness", "material", "Ada")
+
+
 def test_what_cannot_be_is_refused_in_one_sentence(recorded):
     material = palpate.open(recorded).material
     for call, sentence in [
