@@ -19,6 +19,8 @@ use thiserror::Error;
 
 /// Name of the file of analyses in a session folder.
 pub const ANALYSES_FILE: &str = "analyses.jsonl";
+/// Version of the results of a modulus; a field that changes its meaning raises it.
+pub const MATERIAL_VERSION: u32 = 1;
 /// Longest name of an analysis in letters: it has to fit on a line.
 const NAME_MAX: usize = 80;
 
@@ -42,6 +44,19 @@ pub enum AnalysisContent {
         /// The report, as `palpate fit --json` prints it.
         results: Value,
     },
+    /// Young's modulus by a contact law.
+    Material {
+        /// [`MATERIAL_VERSION`] of the program that wrote it.
+        material_version: u32,
+        /// Name of the analysis whose forces were fitted, if any.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        based_on: Option<String>,
+        settings: Value,
+        /// The report, as `palpate material --json` prints it.
+        results: Value,
+        /// The same, as `palpate material` prints it.
+        words: String,
+    },
     /// Forces computed from the raw signal with another calibration.
     Recalibration { calibration: Value, results: Value },
     /// Stretches of a session whose forces are ignored.
@@ -57,6 +72,7 @@ impl AnalysisContent {
     pub const fn word(&self) -> &'static str {
         match self {
             Self::Fit { .. } => "fit",
+            Self::Material { .. } => "material",
             Self::Recalibration { .. } => "recalibration",
             Self::Mask { .. } => "mask",
             Self::Withdrawal => "withdrawal",

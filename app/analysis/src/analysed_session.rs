@@ -77,7 +77,8 @@ impl AnalysisReading {
                 reading.notes.push(format!("{changed} changed after analysis '{name}' was made"));
             }
             match one.what {
-                AnalysisContent::Fit { based_on, .. } => next = based_on,
+                AnalysisContent::Fit { based_on, .. }
+                | AnalysisContent::Material { based_on, .. } => next = based_on,
                 AnalysisContent::Recalibration { calibration, .. } => {
                     let own: Calibration =
                         serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;

@@ -1,6 +1,6 @@
 //! `palpate material` as a user meets it.
 
-use crate::support::{assert_refused, json, stdout, typed};
+use crate::support::{assert_refused, json, palpate, stdout, typed};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -85,6 +85,54 @@ fn a_session_states_contact_calibration_and_lack_of_fit() {
     assert!(number(&found, "/lack_of_fit/residual_over_noise") > 1.1, "{found}");
     assert!(number(&found, "/contact_error_mm") > 0.0);
     assert_eq!(found["validity"][1]["ratio"], "strain");
+}
+
+#[test]
+fn a_saved_modulus_is_listed_searched_and_printed_on_the_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let session = at.join("library/press");
+    std::fs::create_dir_all(&session).unwrap();
+    std::fs::copy(Path::new(SESSION).join("000.mcap"), session.join("000.mcap")).unwrap();
+    let line = "material library/press --indenter flat-punch --radius 6.00±0.02 --thickness 60 --poisson 0.49 --depth-max 0.9";
+    let save = format!("{line} --save <b>soft --by Ada --reason first");
+    let text = stdout(&typed(at, &save));
+    let (words, saved) = text.trim_end().rsplit_once('\n').unwrap();
+    assert_eq!(saved, "saved as analysis '<b>soft'");
+    // A name is never used twice.
+    assert_refused(&typed(at, &save), 2, "already has an analysis '<b>soft'");
+    let found = json(&typed(at, &format!("{line} --json")));
+    let info = json(&typed(at, "info library/press --json"));
+    let kept = &info["analyses"][0];
+    assert_eq!((kept["analysis"].as_str(), kept["by"].as_str()), (Some("material"), Some("Ada")));
+    let lines = std::fs::read_to_string(session.join("analyses.jsonl")).unwrap();
+    let stored: Value = serde_json::from_str(lines.lines().next().unwrap()).unwrap();
+    let stored = &stored["body"];
+    assert_eq!((&stored["material_version"], &stored["words"]), (&1.into(), &words.into()));
+    assert_eq!(stored["settings"]["depth_max_mm"], 0.9);
+    assert_eq!(stored["results"]["modulus_mpa"], found["modulus_mpa"]);
+    let kpa = 1e3 * number(&found, "/modulus_mpa");
+    for (condition, count) in [("modulus_mpa>0.001", 1), ("modulus_mpa>0.1", 0)] {
+        let found = json(&palpate(at, &["find", "--json", condition]));
+        assert_eq!(
+            found["sessions"].as_array().unwrap().len(),
+            count,
+            "{condition}: {kpa} kPa, {found}"
+        );
+    }
+    stdout(&typed(at, "report library/press --html page.html"));
+    let page = std::fs::read_to_string(at.join("page.html")).unwrap();
+    for part in [
+        "Modulus &apos;&lt;b&gt;soft&apos;:",
+        "Poisson&apos;s ratio assumed",
+        "Young&apos;s modulus",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    // The session is read as before.
+    stdout(&typed(at, "fit library/press --analysis <b>soft --json"));
+    let table = format!("{line} --save soft").replace("press ", "press/000.mcap ");
+    assert_refused(&typed(at, &table), 2, "is not a session folder");
 }
 
 #[test]

@@ -254,9 +254,15 @@ impl CatalogEntry {
                 at: one.at,
                 by: one.by.clone(),
             });
-            if let AnalysisContent::Fit { results, .. } = &one.what {
-                let parameters = results["parameters"].as_array();
-                self.named.extend(parameters.into_iter().flatten().filter_map(fitted_value));
+            match &one.what {
+                AnalysisContent::Fit { results, .. } => {
+                    let parameters = results["parameters"].as_array();
+                    self.named.extend(parameters.into_iter().flatten().filter_map(fitted_value));
+                }
+                AnalysisContent::Material { results, .. } => {
+                    self.named.extend(modulus_value(results));
+                }
+                _ => {}
             }
         }
     }
@@ -295,6 +301,13 @@ fn fitted_value(parameter: &Value) -> Option<NamedValue> {
     let unit = parameter["unit"].as_str().unwrap_or_default();
     let name = parameter["name"].as_str()?;
     Some(NamedValue::new(NamedValueSource::Fit, name, (Some(number), unit), number.to_string()))
+}
+
+/// The modulus in a report, as `palpate material --json` prints it.
+fn modulus_value(results: &Value) -> Option<NamedValue> {
+    const NAME: &str = "modulus_mpa";
+    let modulus = results[NAME].as_f64()?;
+    Some(NamedValue::new(NamedValueSource::Fit, NAME, (Some(modulus), ""), modulus.to_string()))
 }
 
 /// The number in a text such as `20 mm`, converted to its base unit.

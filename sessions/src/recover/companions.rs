@@ -83,7 +83,7 @@ impl CompanionFiles {
                 AnalysisContent::Recalibration { .. } if !salvage.has_every_decision => {
                     "tares that it needs may be among the missing decisions"
                 }
-                AnalysisContent::Fit { .. } => {
+                AnalysisContent::Fit { .. } | AnalysisContent::Material { .. } => {
                     "it was made from the samples of the original session; fit the recovered session again"
                 }
                 // The withdrawn analysis is not in the copy.

@@ -126,7 +126,7 @@ fn companions_with_the_same_meaning_are_copied_and_others_reported() {
         let is_kept = |one: &Analysis| match one.what {
             AnalysisContent::Mask { .. } | AnalysisContent::Withdrawal => has_first,
             AnalysisContent::Recalibration { .. } => is_sure,
-            AnalysisContent::Fit { .. } => false,
+            AnalysisContent::Fit { .. } | AnalysisContent::Material { .. } => false,
         };
         let expected: Vec<Analysis> = analyses().into_iter().filter(is_kept).collect();
         assert_eq!(remaining, expected, "{place}: {missing:?}");

@@ -6,7 +6,8 @@ use eframe::egui::accesskit::Role;
 use eframe::egui::{Rect, Vec2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{TestWindow, WindowFlow};
+use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
+use palpate_window::screens::material::MaterialScreen;
 use palpate_window::screens::table::screens;
 use palpate_window::shell::rail;
 use palpate_window::shell::sizes::{PanelEdge, Sizes};
@@ -15,8 +16,16 @@ use palpate_window::shell::sizes::{PanelEdge, Sizes};
 const SEEN: f32 = 2.0;
 
 /// A tablet upright, a small screen, larger text, and what laboratories have.
-const SIZES: [[u16; 2]; 7] =
-    [[800, 1280], [1024, 768], [1180, 640], [1280, 720], [1440, 900], [1920, 1080], [3840, 2160]];
+const SIZES: [[u16; 2]; 8] = [
+    [768, 600],
+    [800, 1280],
+    [1024, 768],
+    [1180, 640],
+    [1280, 720],
+    [1440, 900],
+    [1920, 1080],
+    [3840, 2160],
+];
 
 /// Columns of the library's list.
 const COLUMNS: [&str; 2] = ["health", "folder"];
@@ -102,6 +111,28 @@ fn overlaps(all: &[(String, Rect)]) -> Vec<String> {
     found
 }
 
+/// Fits the modulus of the session that was recorded, where there is one.
+fn fit_modulus(flow: &mut WindowFlow) {
+    let Some(session) = flow.sessions().into_iter().find(|folder| folder.join("000.mcap").exists())
+    else {
+        return;
+    };
+    flow.click("a part of the loading only");
+    let session = session.display().to_string();
+    for (name, text) in [
+        ("session", session.as_str()),
+        ("radius", "6"),
+        ("thickness", "60"),
+        ("Poisson", "0.5"),
+        ("depth", "0.9"),
+    ] {
+        flow.type_into(name, text);
+    }
+    flow.click("Fit modulus  F6");
+    flow.wait("the modulus", |window| screen_of::<MaterialScreen>(window).fitted().is_some());
+    flow.window.run_steps(5);
+}
+
 #[test]
 fn nothing_reaches_over_the_edge_of_its_panel_or_over_its_neighbour() {
     let mut found = Vec::new();
@@ -133,6 +164,9 @@ fn nothing_reaches_over_the_edge_of_its_panel_or_over_its_neighbour() {
                 window.query_all_by_label_contains("reading the").next().is_none()
             });
             flow.window.run_steps(5);
+            if screen.name == "Material" {
+                fit_modulus(&mut flow);
+            }
             let all = shown(&flow.window, size);
             let mut words = over_edges(&all, &edges(screen.name, size));
             words.extend(overlaps(&all));

@@ -94,9 +94,12 @@ fn the_modulus_of_a_press_stands_beside_what_it_assumes() {
 }
 
 #[test]
-fn the_session_in_review_is_the_one_that_is_fitted() {
+fn the_session_in_review_is_fitted_and_its_modulus_saved_with_it() {
     let mut flow = WindowFlow::open(TimeScale::Max);
-    let session = workspace().join("tests/sessions/ramp-hold-lab");
+    let session = flow.folder.path().join("press");
+    std::fs::create_dir(&session).unwrap();
+    let recorded = workspace().join("tests/sessions/ramp-hold-lab");
+    std::fs::copy(recorded.join("000.mcap"), session.join("000.mcap")).unwrap();
     flow.show(&palpate_window::screens::review::SCREEN);
     flow.type_into("session", &session.display().to_string());
     flow.click("Add to view");
@@ -115,4 +118,13 @@ fn the_session_in_review_is_the_one_that_is_fitted() {
     let squares: f64 = report.curve.iter().map(|one| (one.force_n - one.law_n).powi(2)).sum();
     let rms = (squares / report.samples as f64).sqrt();
     assert!((rms / report.residual_n - 1.0).abs() < 1e-9, "{rms} {}", report.residual_n);
+    assert!(!flow.is_enabled("Save modulus") && flow.says("type a name for the analysis"));
+    flow.type_into("name", "stiffness");
+    flow.type_into("by", "Ada");
+    flow.click("Save modulus");
+    flow.wait_for_words("saved as analysis 'stiffness'");
+    // Once more it is refused, because nothing is overwritten.
+    flow.click("Save modulus");
+    flow.wait_for_words("already has an analysis 'stiffness'");
+    flow.window.check_accessibility();
 }

@@ -49,6 +49,10 @@ pub fn describe_analysis(what: &AnalysisContent) -> String {
                 None => family,
             }
         }
+        // The number is their first line.
+        AnalysisContent::Material { words, .. } => {
+            words.lines().next().unwrap_or_default().to_owned()
+        }
         AnalysisContent::Recalibration { calibration, results } => {
             let name = calibration["name"].as_str().unwrap_or("another");
             match ForceChange::deserialize(results) {

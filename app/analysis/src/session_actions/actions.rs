@@ -166,7 +166,7 @@ fn check_name(session: &Path, name: &str) -> Result<String, SessionActionError> 
     Ok(id)
 }
 
-fn keep(
+pub(super) fn keep(
     session: &Path,
     id: &str,
     name: &str,

@@ -2,12 +2,14 @@
 
 mod actions;
 mod fits;
+mod materials;
 
 pub use actions::{
     Attribution, ContactCorrection, FitToStore, MaskResult, RecalibrationResult, SessionAction,
     SessionActionError, correct_contact, mask, recalibrate, set_data_quality, store_fit, withdraw,
 };
 pub use fits::{FitSettings, SessionFitRequest, fit_without_analysis};
+pub use materials::MaterialToStore;
 
 use crate::edited_session;
 use crate::progress::Progress;

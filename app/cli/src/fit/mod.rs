@@ -4,7 +4,7 @@ mod batch;
 mod intervals;
 mod joint;
 mod lake;
-mod saved;
+pub(super) mod saved;
 
 use super::Failure;
 use super::arguments::{parse_columns, parse_number};
@@ -163,7 +163,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
 fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
     new_file::check("picture", to)?;
-    saved::check(args, source)?;
+    saved::check(args.save.as_ref(), source)?;
     let fitted = recipe.fit(source).map_err(source_failure)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();

@@ -7,9 +7,9 @@ use serde::Serialize;
 use serde_json::to_value;
 use std::path::Path;
 
-/// Refuses before the fit what could not be saved after it.
-pub(super) fn check(args: &FitArgs, source: &Path) -> Result<(), Failure> {
-    match (&args.save, source.is_dir()) {
+/// Refuses before a fit or a modulus what could not be saved after it.
+pub(crate) fn check(save: Option<&String>, source: &Path) -> Result<(), Failure> {
+    match (save, source.is_dir()) {
         (Some(name), false) => Err(Failure::usage(format!(
             "analysis '{name}' cannot be saved, because {} is not a session folder; give a session folder",
             source.display()

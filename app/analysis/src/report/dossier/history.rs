@@ -136,10 +136,17 @@ pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8
     let heads = ["name", "kind", "when (UTC)", "by", "why", "what", "made with", "state"];
     body.table("Analyses in order of creation", &heads, &rows);
     for one in made {
-        if let AnalysisContent::Fit { results, .. } = &one.what {
-            body.paragraph(&format!("Fit '{}' found:", one.name));
-            parameters(body, &stored_analysis::parameters(results));
-            body.list(stored_analysis::sentences(results).iter().map(String::as_str));
+        match &one.what {
+            AnalysisContent::Fit { results, .. } => {
+                body.paragraph(&format!("Fit '{}' found:", one.name));
+                parameters(body, &stored_analysis::parameters(results));
+                body.list(stored_analysis::sentences(results).iter().map(String::as_str));
+            }
+            AnalysisContent::Material { words, .. } => {
+                body.paragraph(&format!("Modulus '{}':", one.name));
+                body.pre(words);
+            }
+            _ => {}
         }
     }
 }

@@ -7,13 +7,17 @@ mod result;
 pub use result::FittedMaterial;
 
 use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
-use crate::widgets::{alarm_ui, answer_ui, placeholder_ui, section_ui, work_ui};
+use crate::widgets::{
+    alarm_ui, answer_ui, placeholder_ui, quiet_ui, require, section_ui, task_ui, text_row, work_ui,
+};
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
 use form::MaterialForm;
 use palpate_analysis::compliance::{ComplianceCorrections, LATEST_COMPLIANCE};
+use palpate_analysis::edits::author;
 use palpate_analysis::material::{MaterialError, MaterialRequest, material, measured_thickness};
 use palpate_analysis::progress::Progress;
+use palpate_analysis::session_actions::Attribution;
 use palpate_indentation::Quantity;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -39,6 +43,16 @@ pub struct MaterialScreen {
     thickness: BackgroundTask<Option<Quantity>>,
     /// The session whose thickness is read or was read last.
     thickness_of: PathBuf,
+    save: SaveForm,
+    /// The sentence of what was saved last.
+    saving: BackgroundTask<String>,
+}
+
+/// Name of the analysis as which a modulus is saved, its author and the reason.
+struct SaveForm {
+    name: String,
+    by: String,
+    reason: String,
 }
 
 impl MaterialScreen {
@@ -49,6 +63,8 @@ impl MaterialScreen {
             task: BackgroundTask::default(),
             thickness: BackgroundTask::default(),
             thickness_of: PathBuf::new(),
+            save: SaveForm { name: String::new(), by: author(None), reason: String::new() },
+            saving: BackgroundTask::default(),
         }
     }
 
@@ -60,6 +76,35 @@ impl MaterialScreen {
     /// Why the last press has no modulus.
     pub fn refused(&self) -> Option<&MaterialError> {
         self.task.answer()?.as_ref().ok()?.as_ref().err()
+    }
+
+    /// Draws what saves the modulus with its session.
+    fn save_ui(&mut self, ui: &mut Ui) {
+        section_ui(ui, "Save with the session");
+        text_row(ui, "name", "of the analysis, such as modulus", &mut self.save.name);
+        text_row(ui, "by", "your name", &mut self.save.by);
+        text_row(ui, "reason", "why, in a few words", &mut self.save.reason);
+        let [name, by] = [&self.save.name, &self.save.by].map(|text| text.trim());
+        let verdict = require(!name.is_empty(), "type a name for the analysis")
+            .and(require(!by.is_empty(), "type your name into the field 'by'"));
+        if task_ui(ui, "Save modulus", &self.saving, &verdict) {
+            self.start_saving(ui.ctx());
+        }
+        match self.saving.answer() {
+            Some(Ok(sentence)) => quiet_ui(ui, sentence),
+            Some(Err(reason)) => alarm_ui(ui, reason),
+            None => {}
+        }
+    }
+
+    fn start_saving(&mut self, ctx: &Context) {
+        let Some(to_store) = self.fitted().map(|fitted| fitted.to_store.clone()) else { return };
+        let SaveForm { name, by, reason } = &self.save;
+        let [name, by, reason] = [name, by, reason].map(|text| text.trim().to_owned());
+        self.saving.start("material-save", ctx, move |_| {
+            let stored = to_store.store(&name, &Attribution { by, reason });
+            stored.map(|_| format!("saved as analysis '{name}'")).map_err(|err| err.to_string())
+        });
     }
 
     fn refusal_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
@@ -93,7 +138,10 @@ impl Screen for MaterialScreen {
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         match self.fitted() {
-            Some(fitted) => result::number_ui(ui, &fitted.report),
+            Some(fitted) => {
+                result::number_ui(ui, &fitted.report);
+                self.save_ui(ui);
+            }
             None => {
                 section_ui(ui, "Young's modulus");
                 placeholder_ui(ui, "no modulus yet");
@@ -115,6 +163,7 @@ impl Screen for MaterialScreen {
 
     fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
         self.task.poll();
+        self.saving.poll();
         self.form.follow(workbench.front.review.as_ref().or(workbench.front.library.as_ref()));
         if self.thickness.poll() && self.form.source() == self.thickness_of {
             // What cannot be read is said by the fit.
@@ -134,6 +183,8 @@ impl Screen for MaterialScreen {
 
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
         self.form.check();
+        // What was saved of the modulus before says nothing of this one.
+        self.saving = BackgroundTask::default();
         let Ok(request) = self.form.request() else { return };
         let library = self.library.clone();
         let is_corrected = self.form.is_compliance_corrected;
@@ -145,7 +196,8 @@ impl Screen for MaterialScreen {
                     .map_err(|err| err.to_string())?,
                 false => ComplianceCorrections::none(library),
             };
-            Ok(material(&MaterialRequest { corrections, ..request }).map(FittedMaterial::from))
+            let request = MaterialRequest { corrections, ..request };
+            Ok(material(&request).map(|report| FittedMaterial::of(&request, report)))
         });
     }
 
@@ -154,7 +206,7 @@ impl Screen for MaterialScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.task.is_busy()
+        self.task.is_busy() || self.saving.is_busy()
     }
 
     fn layout(&self) -> Option<Value> {

@@ -5,11 +5,12 @@ use crate::widgets::{
     alarm_ui, fact_ui, heading_ui, placeholder_ui, quiet_ui, section_ui, sentence_ui,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_analysis::material::MaterialReport;
+use palpate_analysis::material::{MaterialReport, MaterialRequest};
 use palpate_analysis::report::material::{
     RELAXES, assumptions, budget_kpa, interval_words, lack_words, modulus_words,
 };
 use palpate_analysis::report::material_plot::material_plots;
+use palpate_analysis::session_actions::MaterialToStore;
 use palpate_figures::uncertain::significant;
 
 /// Share of the height that the plot of the loading gets.
@@ -19,11 +20,16 @@ const LOADING_SHARE: f32 = 0.64;
 pub struct FittedMaterial {
     pub report: MaterialReport,
     plots: [PlacedPlot; 2],
+    pub(super) to_store: MaterialToStore,
 }
 
-impl From<MaterialReport> for FittedMaterial {
-    fn from(report: MaterialReport) -> Self {
-        Self { plots: material_plots(&report).map(PlacedPlot::from), report }
+impl FittedMaterial {
+    pub(super) fn of(request: &MaterialRequest, report: MaterialReport) -> Self {
+        Self {
+            plots: material_plots(&report).map(PlacedPlot::from),
+            to_store: MaterialToStore::of(request, &report),
+            report,
+        }
     }
 }
 

@@ -57,6 +57,10 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.add_space(4.0);
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
     quiet_ui(ui, stored_analysis::describe_analysis(&one.what));
+    if let AnalysisContent::Material { words, .. } = &one.what {
+        // The first one stands above.
+        words.lines().skip(1).for_each(|line| small_ui(ui, line));
+    }
     let AnalysisContent::Fit { results, .. } = &one.what else { return false };
     let parameters = stored_analysis::parameters(results);
     for parameter in &parameters {

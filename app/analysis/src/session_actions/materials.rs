@@ -1,0 +1,58 @@
+//! A modulus of a session, and its stored form.
+
+use super::actions::keep;
+use super::{Attribution, SessionActionError};
+use crate::analysed_session;
+use crate::material::{ContactKnowledge, MaterialReport, MaterialRequest};
+use crate::report::material::material_text;
+use palpate_sessions::analyses::{Analysis, AnalysisContent, MATERIAL_VERSION};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// A modulus that can be stored with its session.
+#[derive(Clone, Debug)]
+pub struct MaterialToStore {
+    session: PathBuf,
+    based_on: Option<String>,
+    settings: Value,
+    results: Value,
+    words: String,
+}
+
+impl MaterialToStore {
+    #[must_use]
+    pub fn of(request: &MaterialRequest, report: &MaterialReport) -> Self {
+        // Everything else that was asked for is in the report.
+        let settings = json!({
+            "depth_max_mm": request.depth_max_mm,
+            "contact": match request.contact {
+                ContactKnowledge::Recorded => json!("recorded"),
+                ContactKnowledge::Stated(error_mm) => json!(error_mm),
+                ContactKnowledge::Free => json!("free"),
+            },
+            "include_rejected": request.is_rejected_included,
+        });
+        Self {
+            session: request.source.clone(),
+            based_on: request.analysis.clone(),
+            settings,
+            results: json!(report),
+            words: material_text(report),
+        }
+    }
+
+    /// Stores it as an analysis of this name beside its session.
+    pub fn store(self, name: &str, who: &Attribution) -> Result<Analysis, SessionActionError> {
+        let opened = analysed_session::open(&self.session, self.based_on.as_deref())?;
+        let inputs = opened.inputs(&self.session, self.based_on.as_deref())?;
+        let what = AnalysisContent::Material {
+            material_version: MATERIAL_VERSION,
+            based_on: self.based_on,
+            settings: self.settings,
+            results: self.results,
+            words: self.words,
+        };
+        let id = &opened.edited.session.manifest.session_id;
+        keep(&self.session, id, name, inputs, what, who)
+    }
+}
