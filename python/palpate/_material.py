@@ -68,7 +68,7 @@ class Material(_Mapping):  # type: ignore[type-arg]
 
     @property
     def total95_kpa(self) -> Tuple[float, float]:
-        """Its 95 % interval in kPa, which holds no lack of fit."""
+        """Its 95 % interval in kPa, in which a lack of fit counts as noise that lasts."""
         low, high = self._report["total95_mpa"]
         return 1e3 * low, 1e3 * high
 
@@ -91,7 +91,7 @@ def _quantity(value: Any, what: str) -> Dict[str, float]:
     return {"value": _number(number, what), "standard_uncertainty": _number(error, what)}
 
 
-def _indenter(word: str, radius: Any, half_angle: Any) -> Dict[str, Any]:
+def _indenter(word: str, radius: Any, half_angle: Any, tip_radius: Any, chamfer: Any) -> Dict[str, Any]:
     if word not in _INDENTERS:
         raise PalpateError(f"{word!r} is not an indenter; the indenters are {', '.join(_INDENTERS)}")
     needed, other = ("radius", "half_angle") if word in ("flat-punch", "sphere") else ("half_angle", "radius")
@@ -101,7 +101,22 @@ def _indenter(word: str, radius: Any, half_angle: Any) -> Dict[str, Any]:
     if sizes[needed] is None:
         raise PalpateError(f"a {word} needs its {needed}; give it, with its standard uncertainty")
     field = {"radius": "radius_mm", "half_angle": "half_angle_degrees"}[needed]
-    return {**_INDENTERS[word], field: _quantity(sizes[needed], needed)}
+    document = {**_INDENTERS[word], field: _quantity(sizes[needed], needed)}
+    is_pointed = needed == "half_angle"
+    if chamfer is not None and word != "flat-punch":
+        raise PalpateError(f"a {word} has no chamfer; leave it out")
+    if tip_radius is not None and not is_pointed:
+        raise PalpateError(f"a {word} has no tip_radius; leave it out")
+    if chamfer is not None:
+        document |= {"shape": "chamfered-punch", "chamfer_mm": _quantity(chamfer, "chamfer")}
+    if tip_radius is not None:
+        shape = f"rounded-{document['shape']}"
+        document |= {"shape": shape, "tip_radius_mm": _quantity(tip_radius, "tip_radius")}
+    return document
+
+
+def _error_source(value: Union[None, str, float], what: str) -> Optional[str]:
+    return value if value in (None, "free") else json.dumps(_number(value, what))  # type: ignore[return-value]
 
 
 def _word(word: str, what: str) -> str:
@@ -116,6 +131,8 @@ def material(
     *,
     radius: Optional[Quantity] = None,
     half_angle: Optional[Quantity] = None,
+    tip_radius: Optional[Quantity] = None,
+    chamfer: Optional[Quantity] = None,
     thickness: Optional[Quantity] = None,
     poisson: Quantity,
     poisson_measured: bool = False,
@@ -123,6 +140,7 @@ def material(
     law: str = "layer",
     depth_max: Optional[float] = None,
     contact_error: Union[None, str, float] = None,
+    zero_error: Union[None, str, float] = None,
     analysis: Optional[str] = None,
     include_rejected: bool = False,
     compliance: Optional[str] = None,
@@ -132,10 +150,10 @@ def material(
 ) -> Material:
     """Young's modulus of a press, of a session's folder or a table, as ``palpate material`` gives it.
 
-    The options are those of the command. A radius in mm, a half angle in degrees, a thickness in mm and Poisson's ratio
-    are a number that is taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is
-    the one that the session measured. ``contact_error`` is ``"free"``, or a standard uncertainty in mm. ``save`` stores the
-    modulus with the session under that name.
+    The options are those of the command. Lengths in mm, a half angle in degrees and Poisson's ratio are a number that is
+    taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is the one that the session
+    measured. ``contact_error`` and ``zero_error`` are ``"free"``, or a standard uncertainty in mm and in N. ``save`` stores
+    the modulus with the session under that name.
 
     >>> palpate.material("demo", "sphere", poisson=0.5)
     Traceback (most recent call last):
@@ -143,15 +161,15 @@ def material(
     palpate.PalpateError: a sphere needs its radius; give it, with its standard uncertainty
     """
     request = {
-        "indenter": json.dumps(_indenter(indenter, radius, half_angle)),
+        "indenter": json.dumps(_indenter(indenter, radius, half_angle, tip_radius, chamfer)),
         "thickness": None if thickness is None else json.dumps(_quantity(thickness, "thickness")),
         "poisson": json.dumps(_quantity(poisson, "poisson")),
         "poisson_measured": bool(poisson_measured),
         "base": json.dumps(_word(base, "base")),
         "law": json.dumps(_word(law, "law")),
         "depth_max": None if depth_max is None else _number(depth_max, "depth_max"),
-        "contact_free": contact_error == "free",
-        "contact_error": None if contact_error in (None, "free") else _number(contact_error, "contact_error"),
+        "contact_error": _error_source(contact_error, "contact_error"),
+        "zero_error": _error_source(zero_error, "zero_error"),
         "analysis": analysis,
         "include_rejected": bool(include_rejected),
         "compliance": None if compliance is None else os.fspath(compliance),

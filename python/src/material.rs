@@ -24,8 +24,8 @@ pub struct MaterialOptions {
     base: String,
     law: String,
     depth_max: Option<f64>,
-    contact_free: bool,
-    contact_error: Option<f64>,
+    contact_error: Option<String>,
+    zero_error: Option<String>,
     analysis: Option<String>,
     include_rejected: bool,
     compliance: Option<String>,
@@ -36,6 +36,15 @@ pub struct MaterialOptions {
 
 fn read<T: DeserializeOwned>(text: &str) -> PyResult<T> {
     serde_json::from_str(text).map_err(refused)
+}
+
+/// The word `free`, or a number in JSON.
+fn error_source(text: Option<&str>) -> PyResult<ErrorSource> {
+    Ok(match text {
+        None => ErrorSource::Recorded,
+        Some("free") => ErrorSource::Free,
+        Some(number) => ErrorSource::Stated(read(number)?),
+    })
 }
 
 impl MaterialOptions {
@@ -64,11 +73,8 @@ impl MaterialOptions {
                 false => PoissonBasis::Assumed,
             },
             depth_max_mm: self.depth_max,
-            contact: match (self.contact_free, self.contact_error) {
-                (true, _) => ErrorSource::Free,
-                (false, Some(error_mm)) => ErrorSource::Stated(error_mm),
-                (false, None) => ErrorSource::Recorded,
-            },
+            contact: error_source(self.contact_error.as_deref())?,
+            force_zero: error_source(self.zero_error.as_deref())?,
         })
     }
 }

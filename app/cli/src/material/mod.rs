@@ -5,12 +5,15 @@ mod relaxation;
 mod unloading;
 
 use super::arguments::{Choice, choice, parse_columns, parse_number, positive};
+use super::fit::saved;
 use super::output::Output;
+use super::recalibrate::{self, AuthorArgs};
 use super::{Failure, compliance, source_failure};
 use clap::Args;
 use palpate_analysis::dynamic::DynamicRequest;
 use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
+use palpate_analysis::session_actions::MaterialToStore;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
 };
@@ -87,6 +90,11 @@ pub struct MaterialArgs {
     /// Mass in g that moves between load cell and specimen, as probe and rod; without it none
     #[arg(long, value_name = "GRAMS", value_parser = quantity, allow_hyphen_values = true)]
     moving_mass: Option<Quantity>,
+    /// Save the modulus of the loading as an analysis of this name with its session
+    #[arg(long, value_name = "NAME")]
+    save: Option<String>,
+    #[command(flatten)]
+    author: AuthorArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,12 +141,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
     let request = request(args)?;
     match args.property {
-        Property::Modulus => {
-            let report = material(&request).map_err(failure)?;
-            report.notes.iter().for_each(|note| output.note(note));
-            output.answer("material", &report, || material_text(&report));
-            Ok(())
-        }
+        Property::Modulus => modulus(args, &request, output),
         Property::Unloading => unloading::run(&request, output),
         Property::Relaxation => relaxation::run(&request, args.terms, output),
         Property::Dynamic => {
@@ -148,11 +151,27 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     }
 }
 
+fn modulus(args: &MaterialArgs, request: &MaterialRequest, output: &Output) -> Result<(), Failure> {
+    saved::check(args.save.as_ref(), &args.source)?;
+    let report = material(request).map_err(failure)?;
+    if let Some(name) = &args.save {
+        let stored = MaterialToStore::of(request, &report).store(name, &args.author.author());
+        stored.map_err(recalibrate::analysis_edit_failure)?;
+    }
+    report.notes.iter().for_each(|note| output.note(note));
+    output.answer("material", &report, || {
+        let saved = args.save.iter().map(|name| format!("saved as analysis '{name}'"));
+        [material_text(&report)].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
+    });
+    Ok(())
+}
+
 /// A flag that belongs to another property.
 fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
     use Property::{Dynamic, Modulus, Relaxation, Unloading};
-    let given: [(&str, bool, &[Property], &str); 6] = [
+    let given: [(&str, bool, &[Property], &str); 7] = [
         ("depth-max", args.depth_max.is_some(), &[Modulus], "the modulus of a loading"),
+        ("save", args.save.is_some(), &[Modulus], "the modulus of a loading"),
         ("zero-error", args.zero_error.is_some(), &[Modulus, Unloading], "a Young's modulus"),
         ("law", args.law.is_some(), &[Modulus, Relaxation, Dynamic], "what is no unloading"),
         ("terms", args.terms.is_some(), &[Relaxation], "a relaxation modulus"),

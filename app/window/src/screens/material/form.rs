@@ -23,24 +23,59 @@ enum Shape {
     Cone,
     PyramidThree,
     PyramidFour,
+    ChamferedPunch,
+    RoundedCone,
+    RoundedPyramidThree,
+    RoundedPyramidFour,
 }
 
-const SHAPES: [(Shape, &str); 5] = [
+const SHAPES: [(Shape, &str); 9] = [
     (Shape::FlatPunch, "flat punch"),
     (Shape::Sphere, "sphere"),
     (Shape::Cone, "cone"),
     (Shape::PyramidThree, "pyramid of three faces"),
     (Shape::PyramidFour, "pyramid of four faces"),
+    (Shape::ChamferedPunch, "flat punch with a chamfer"),
+    (Shape::RoundedCone, "cone with a round tip"),
+    (Shape::RoundedPyramidThree, "three faces, round tip"),
+    (Shape::RoundedPyramidFour, "four faces, round tip"),
 ];
 
 impl Shape {
     const fn has_radius(self) -> bool {
-        matches!(self, Self::FlatPunch | Self::Sphere)
+        matches!(self, Self::FlatPunch | Self::Sphere | Self::ChamferedPunch)
     }
 
-    /// `size` is a radius in mm, or a half angle in degrees.
-    const fn indenter(self, size: Quantity) -> Indenter {
+    /// Name and meaning of its second length in mm, where it has one.
+    const fn edge(self) -> Option<(&'static str, &'static str)> {
         match self {
+            Self::ChamferedPunch => {
+                Some(("chamfer", "its width at 45°, with its standard uncertainty"))
+            }
+            Self::RoundedCone | Self::RoundedPyramidThree | Self::RoundedPyramidFour => {
+                Some(("tip radius", "with its standard uncertainty"))
+            }
+            _ => None,
+        }
+    }
+
+    /// `size` is a radius in mm, or a half angle in degrees; `edge` a chamfer or the radius of a tip in mm.
+    const fn indenter(self, size: Quantity, edge: Quantity) -> Indenter {
+        match self {
+            Self::ChamferedPunch => Indenter::ChamferedPunch { radius_mm: size, chamfer_mm: edge },
+            Self::RoundedCone => {
+                Indenter::RoundedCone { half_angle_degrees: size, tip_radius_mm: edge }
+            }
+            Self::RoundedPyramidThree => Indenter::RoundedPyramid {
+                faces: PyramidFaces::Three,
+                half_angle_degrees: size,
+                tip_radius_mm: edge,
+            },
+            Self::RoundedPyramidFour => Indenter::RoundedPyramid {
+                faces: PyramidFaces::Four,
+                half_angle_degrees: size,
+                tip_radius_mm: edge,
+            },
             Self::FlatPunch => Indenter::FlatPunch { radius_mm: size },
             Self::Sphere => Indenter::Sphere { radius_mm: size },
             Self::Cone => Indenter::Cone { half_angle_degrees: size },
@@ -64,18 +99,35 @@ const LAWS: [(ContactLaw, &str); 3] = [
 ];
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-enum ContactChoice {
+enum ErrorChoice {
     #[default]
     Recorded,
     Stated,
     Free,
 }
 
-const CONTACTS: [(ContactChoice, &str); 3] = [
-    (ContactChoice::Recorded, "as the session found it"),
-    (ContactChoice::Stated, "with a stated uncertainty"),
-    (ContactChoice::Free, "from the loading alone"),
+const CONTACTS: [(ErrorChoice, &str); 3] = [
+    (ErrorChoice::Recorded, "as the session found it"),
+    (ErrorChoice::Stated, "with a stated uncertainty"),
+    (ErrorChoice::Free, "from the loading alone"),
 ];
+
+const ZEROS: [(ErrorChoice, &str); 3] = [
+    (ErrorChoice::Recorded, "as the session tared it"),
+    (ErrorChoice::Stated, "with a stated uncertainty"),
+    (ErrorChoice::Free, "from the approach alone"),
+];
+
+impl ErrorChoice {
+    /// `field` is that of the uncertainty, of this name.
+    fn source(self, name: &str, field: &QuantityField) -> Result<ErrorSource, String> {
+        Ok(match self {
+            Self::Recorded => ErrorSource::Recorded,
+            Self::Free => ErrorSource::Free,
+            Self::Stated => ErrorSource::Stated(field.named_value(name)?),
+        })
+    }
+}
 
 /// Name of the field of Poisson's ratio, which has room for no more.
 const POISSON: &str = "Poisson";
@@ -95,6 +147,7 @@ pub(super) struct MaterialForm {
     shape: Shape,
     radius: UncertainField,
     half_angle: UncertainField,
+    edge: UncertainField,
     thickness: UncertainField,
     poisson: UncertainField,
     is_poisson_measured: bool,
@@ -102,8 +155,10 @@ pub(super) struct MaterialForm {
     law: ContactLaw,
     is_depth_limited: bool,
     depth_max: QuantityField,
-    contact: ContactChoice,
+    contact: ErrorChoice,
     contact_error: QuantityField,
+    force_zero: ErrorChoice,
+    zero_error: QuantityField,
     /// Depths are corrected with the compliance in force for the session's rig.
     pub is_compliance_corrected: bool,
 }
@@ -118,6 +173,7 @@ impl Default for MaterialForm {
             shape: Shape::default(),
             radius: empty(),
             half_angle: empty(),
+            edge: empty(),
             thickness: empty(),
             poisson: empty(),
             is_poisson_measured: false,
@@ -125,8 +181,10 @@ impl Default for MaterialForm {
             law: ContactLaw::Layer,
             is_depth_limited: false,
             depth_max: QuantityField::typed("1".into()),
-            contact: ContactChoice::default(),
+            contact: ErrorChoice::default(),
             contact_error: QuantityField::typed("0.01".into()),
+            force_zero: ErrorChoice::default(),
+            zero_error: QuantityField::typed("0".into()),
             is_compliance_corrected: false,
         }
     }
@@ -188,9 +246,15 @@ impl MaterialForm {
     /// Checks every field.
     pub fn check(&mut self) {
         let shape = self.shape;
-        let size = |pair| shape.indenter(quantity(pair)).shape().map(|_| ());
+        let possible = |size, edge| {
+            let indenter = shape.indenter(quantity(size), quantity(edge));
+            indenter.shape().map(|_| ()).map_err(|err| err.to_string())
+        };
         let size_field = if shape.has_radius() { &mut self.radius } else { &mut self.half_angle };
-        size_field.check(|pair| size(pair).map_err(|err| err.to_string()));
+        // An edge that passes with any size, and the size that the edge must fit.
+        size_field.check(|size| possible(size, [f64::MIN_POSITIVE, 0.0]));
+        let size = size_field.named_values("size").unwrap_or([1.0, 0.0]);
+        self.edge.check(|edge| possible(size, edge));
         // What is not checked here is one that passes.
         let one = Quantity { value: 0.5, standard_uncertainty: 0.0 };
         let specimen = Specimen {
@@ -205,7 +269,9 @@ impl MaterialForm {
             .check(|pair| possible(Specimen { thickness_mm: quantity(pair), ..specimen }));
         self.poisson.check(|pair| possible(Specimen { poisson_ratio: quantity(pair), ..specimen }));
         self.depth_max.check(|depth| require(depth > 0.0, "must be above 0"));
-        self.contact_error.check(|error| require(error >= 0.0, "must be 0 or more"));
+        for error in [&mut self.contact_error, &mut self.zero_error] {
+            error.check(|error| require(error >= 0.0, "must be 0 or more"));
+        }
     }
 
     /// The press to fit, its depths as they were measured, or the first thing that is wrong.
@@ -214,6 +280,10 @@ impl MaterialForm {
         require(!source.as_os_str().is_empty(), "choose a session first")?;
         let (name, size) = self.size();
         let size = quantity(size.named_values(name)?);
+        let edge = match self.shape.edge() {
+            Some((name, _)) => quantity(self.edge.named_values(name)?),
+            None => quantity([0.0; 2]),
+        };
         let is_measured = self.is_thickness_measured();
         let thickness = quantity(self.thickness.named_values("thickness")?);
         let poisson_ratio = quantity(self.poisson.named_values(POISSON)?);
@@ -227,7 +297,7 @@ impl MaterialForm {
             is_rejected_included: false,
             corrections: ComplianceCorrections::none(None),
             law: self.law,
-            indenter: self.shape.indenter(size),
+            indenter: self.shape.indenter(size, edge),
             thickness_mm: (!is_measured).then_some(thickness),
             base: self.base,
             poisson_ratio,
@@ -236,13 +306,8 @@ impl MaterialForm {
                 false => PoissonBasis::Assumed,
             },
             depth_max_mm,
-            contact: match self.contact {
-                ContactChoice::Recorded => ErrorSource::Recorded,
-                ContactChoice::Free => ErrorSource::Free,
-                ContactChoice::Stated => {
-                    ErrorSource::Stated(self.contact_error.named_value("contact")?)
-                }
-            },
+            contact: self.contact.source("contact", &self.contact_error)?,
+            force_zero: self.force_zero.source("force zero", &self.zero_error)?,
         })
     }
 
@@ -296,6 +361,9 @@ impl MaterialForm {
                 uncertain_ui(ui, ["half angle", "°", wanted], &mut self.half_angle);
             }
         }
+        if let Some((name, wanted)) = self.shape.edge() {
+            uncertain_ui(ui, [name, "mm", wanted], &mut self.edge);
+        }
     }
 
     fn specimen_ui(&mut self, ui: &mut Ui) {
@@ -323,8 +391,12 @@ impl MaterialForm {
             quantity_ui(ui, "depth", "mm, greatest", &mut self.depth_max);
         }
         choice_ui(ui, "contact", &mut self.contact, &CONTACTS);
-        if self.contact == ContactChoice::Stated {
+        if self.contact == ErrorChoice::Stated {
             quantity_ui(ui, "uncertainty", "mm, standard", &mut self.contact_error);
+        }
+        choice_ui(ui, "force zero", &mut self.force_zero, &ZEROS);
+        if self.force_zero == ErrorChoice::Stated {
+            quantity_ui(ui, "zero error", "N, standard", &mut self.zero_error);
         }
         tick_box(ui, &mut self.is_compliance_corrected, "correct depths for machine compliance");
     }

@@ -19,7 +19,8 @@ fn punch() -> MaterialForm {
 fn typed_values_reach_the_request() {
     let mut form = punch();
     form.limit_depth(0.9);
-    form.contact = ContactChoice::Stated;
+    form.contact = ErrorChoice::Stated;
+    form.force_zero = ErrorChoice::Free;
     form.check();
     let request = form.request().unwrap();
     assert_eq!(request.source, Path::new("session"));
@@ -30,6 +31,7 @@ fn typed_values_reach_the_request() {
     assert_eq!((request.base, request.law), (Base::Bonded, ContactLaw::Layer));
     assert_eq!(request.depth_max_mm, Some(0.9));
     assert_eq!(request.contact, ErrorSource::Stated(0.01));
+    assert_eq!(request.force_zero, ErrorSource::Free);
     // Where all of the loading counts, what stands in a hidden field does not.
     form.is_depth_limited = false;
     form.depth_max.text = "deep".into();
