@@ -303,3 +303,32 @@ fn frequency_sweep_of_the_simulated_rig_gives_the_moduli_of_its_tissue() {
     let relaxation = line.replace("dynamic", "relaxation").replace(" --moving-mass 0±1", "");
     assert_refused(&typed(at, &relaxation), 1, "autocorrelated");
 }
+
+/// Its commands are run as they stand, and print every line that the page shows.
+#[test]
+fn worked_examples_of_the_guide_print_what_it_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/guide/relaxation-modulus.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut printed = String::new();
+    let mut shown = 0;
+    // Every second part is between fences.
+    for block in page.split("```").skip(1).step_by(2) {
+        match block.strip_prefix("text\n") {
+            Some(lines) => {
+                for line in lines.lines() {
+                    assert!(printed.contains(line), "{line}\n{printed}");
+                    shown += 1;
+                }
+            }
+            None => {
+                for line in block.trim().lines() {
+                    let output = typed(folder.path(), line.strip_prefix("palpate ").unwrap());
+                    succeeded(&output);
+                    printed = stdout(&output);
+                }
+            }
+        }
+    }
+    assert_eq!(shown, 10);
+}

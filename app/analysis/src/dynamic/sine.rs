@@ -13,6 +13,9 @@ pub(super) const AMPLITUDE_OVER_DEPTH_MAX: f64 = 0.05;
 /// a contact that grows and shrinks).
 const SHRINKING: f64 = 0.75;
 
+/// A smaller share of a modulus is rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// Storage and loss of Young's modulus and of the shear modulus in MPa, and tan delta.
 pub(super) type Moduli = [f64; 5];
 
@@ -92,7 +95,10 @@ impl SineContact {
             (Ok(one), Err(_)) | (Err(_), Ok(one)) => (self.moduli()?, one, 1.0),
             (Err(err), Err(_)) => return Err(err),
         };
-        Ok(std::array::from_fn(|number| share * (other[number] - one[number]).abs()))
+        Ok(std::array::from_fn(|number| {
+            let change = share * (other[number] - one[number]).abs();
+            if change > ROUNDING * one[number].abs() { change } else { 0.0 }
+        }))
     }
 
     fn scaled(self, factor: f64) -> Self {
