@@ -29,8 +29,8 @@ _WORDS = {"law": ("hertz", "sneddon", "layer"), "base": ("bonded", "frictionless
 class Material(_Mapping):  # type: ignore[type-arg]
     """A modulus with all it rests on: a mapping with the content of ``palpate material --json``.
 
-    >>> press = {"thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "depth_max": 0.9}
-    >>> found = palpate.open("demo").material("flat-punch", radius=(6.00, 0.02), **press)
+    >>> known = {"thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "contact_error": "free"}
+    >>> found = palpate.open("demo").material("flat-punch", radius=(6.00, 0.02), depth_max=0.9, **known)
     >>> found["specimen"]["poisson_basis"], found["not_included"]
     ('assumed', ['machine compliance'])
     >>> found.total95_kpa[0] < found.modulus_kpa < found.total95_kpa[1]

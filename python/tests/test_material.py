@@ -2,7 +2,6 @@
 import numpy as np
 import palpate
 import pytest
-from test_fit import same
 
 PRESS = {"radius": (6.00, 0.02), "thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "depth_max": 0.9}
 WORDS = ["--indenter", "flat-punch", "--radius", "6.00±0.02", "--thickness", "60.0±0.5", "--poisson", "0.49±0.01", "--depth-max", "0.9"]
@@ -14,7 +13,7 @@ def test_modulus_of_a_session_is_that_of_the_command(command, recorded):
     # Whose command it is stands in no report.
     for key in expected.keys() - found.keys():
         assert key in ("command", "version")
-    same(found.to_dict(), {key: expected[key] for key in found})
+    assert found.to_dict() == {key: expected[key] for key in found}
     assert found.modulus_kpa == pytest.approx(1e3 * expected["modulus_mpa"], rel=1e-12)
     assert repr(found).startswith("Young's modulus")
     # The curve is that of which the residuals are stated.
@@ -40,7 +39,7 @@ def test_every_option_is_the_one_of_the_command(command, tmp_path):
     ]:
         found = palpate.material(table, "sphere", **sphere, **options)
         expected = command("material", table, *words, *flags)
-        same(found.to_dict(), {key: expected[key] for key in found})
+        assert found.to_dict() == {key: expected[key] for key in found}
 
 
 def test_saved_modulus_is_stored_with_the_session(command, session):
