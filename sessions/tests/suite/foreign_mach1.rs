@@ -78,10 +78,10 @@ fn assert_near(found: f64, expected: f64) {
 #[test]
 fn contact_and_relaxation_become_one_part_with_phases() {
     let read = read(&whole());
-    assert_eq!(names(&read), ["Move Absolute 1", "Press 1"]);
+    assert_eq!(names(&read), ["Press 1", "Move Absolute 1"]);
     let in_press = |reason: &&String| reason.contains("'Press 1'");
     assert_eq!(read.left_out.iter().filter(in_press).count(), 3, "{:?}", read.left_out);
-    let press = &read.parts[1];
+    let press = &read.parts[0];
     let count = |phase| press.samples.iter().filter(|one| one.phase == phase).count();
     let phases = [Phase::Contact, Phase::Rest, Phase::Ramp, Phase::Hold];
     assert_eq!(phases.map(count), [5, 2, 6, 4]);
@@ -151,8 +151,8 @@ fn ramps_whose_times_go_on_belong_to_the_press() {
     // Times that begin again do not say how long the pause before them was.
     let begins_again = goes_on.replace("1.000000\t3.0", "0.000000\t3.0");
     let read = read(&file(&[contact(""), begins_again]));
-    assert_eq!(names(&read), ["Stress Relaxation 1 ramp 2", "Press 1"]);
-    assert_eq!(read.parts[1].samples.len(), 15);
+    assert_eq!(names(&read), ["Press 1", "Stress Relaxation 1 ramp 2"]);
+    assert_eq!(read.parts[0].samples.len(), 15);
 }
 
 #[test]

@@ -94,7 +94,7 @@ pub fn parse_foreign(
             let sheets = read(&bytes)?.into_iter().map(|sheet| RawPart {
                 layout: format.0,
                 rows: Rows::Cells(sheet.rows),
-                part: TextPart { name: sheet.name, facts: sheet.facts, ..TextPart::default() },
+                outline: TextPart { name: sheet.name, facts: sheet.facts, ..TextPart::default() },
             });
             let mut readings = ReadingList::default();
             readings.add_layout(format, options);
@@ -140,7 +140,7 @@ fn parse_text(file: &str, bytes: &[u8], options: &ImportOptions) -> Result<Parse
     let parts = cut(lines, delimiter)?.into_iter().map(|mut part| RawPart {
         layout: format.0,
         rows: Rows::Lines { lines: std::mem::take(&mut part.lines), delimiter },
-        part,
+        outline: part,
     });
     let origin = origin(file, bytes, format, readings);
     let (mut parts, left_out) = parse_parts(parts.collect(), &origin, options)?;
@@ -157,7 +157,7 @@ struct RawPart<'a> {
     layout: &'static Layout,
     rows: Rows<'a>,
     /// Without its lines, which are the rows.
-    part: TextPart<'a>,
+    outline: TextPart<'a>,
 }
 
 /// Reads the selected parts; one without a time is left out.
@@ -166,15 +166,15 @@ fn parse_parts(
     origin: &ImportOrigin,
     options: &ImportOptions,
 ) -> Result<ParsedParts, String> {
-    let is_whole = cut.len() == 1 && cut[0].part.name.is_empty();
+    let is_whole = cut.len() == 1 && cut[0].outline.name.is_empty();
     let is_it = |selector: &String, index: usize, part: &RawPart<'_>| {
-        selector.to_lowercase() == part.part.name.to_lowercase()
+        selector.to_lowercase() == part.outline.name.to_lowercase()
             || *selector == (index + 1).to_string()
     };
     for selector in &options.parts {
         if !cut.iter().enumerate().any(|(index, part)| is_it(selector, index, part)) {
             let names: Vec<String> =
-                cut.iter().map(|part| format!("'{}'", part.part.name)).collect();
+                cut.iter().map(|part| format!("'{}'", part.outline.name)).collect();
             return Err(format!(
                 "the file has no part '{selector}'; its parts are {}",
                 names.join(", ")
@@ -190,9 +190,9 @@ fn parse_parts(
         }
         let named = |reason: String| match is_whole {
             true => reason,
-            false => format!("part '{}': {reason}", part.part.name),
+            false => format!("part '{}': {reason}", part.outline.name),
         };
-        if let (Some(whole), true) = (&part.part.included_in, options.parts.is_empty()) {
+        if let (Some(whole), true) = (&part.outline.included_in, options.parts.is_empty()) {
             left_out
                 .push(named(format!("it is in the part '{whole}'; select it to read it alone")));
             continue;
@@ -224,7 +224,7 @@ fn parse_parts(
 fn facts_of_sheet(part: &RawPart<'_>) -> Vec<(String, String)> {
     let Rows::Cells(_) = part.rows else { return Vec::new() };
     let facts = facts::in_first_rows(&part.rows, part.rows.len()).into_iter();
-    facts.map(|(key, value)| (format!("{}: {key}", part.part.name), value)).collect()
+    facts.map(|(key, value)| (format!("{}: {key}", part.outline.name), value)).collect()
 }
 
 fn parse_part(
@@ -233,7 +233,7 @@ fn parse_part(
     options: &ImportOptions,
 ) -> Result<ForeignPart, ColumnError> {
     let mut readings = ReadingList(origin.readings.clone());
-    let header = layout::find(&part.rows, options, part.part.head, &mut readings)
+    let header = layout::find(&part.rows, options, part.outline.head, &mut readings)
         .map_err(ColumnError::NoMeasurement)?
         .ok_or_else(|| ColumnError::NoMeasurement("it has no rows of numbers".into()))?;
     if part.rows.len() - header.first < 2 {
@@ -247,18 +247,18 @@ fn parse_part(
     let decimal = layout::decimal(&part.rows, &header, &read, options.decimal, &mut readings)
         .map_err(ColumnError::Other)?;
     let (samples, remarks) =
-        samples::read(&part.rows, &header, &columns, &part.part.stages, decimal, &options.skip)
+        samples::read(&part.rows, &header, &columns, &part.outline.stages, decimal, &options.skip)
             .map_err(ColumnError::Other)?;
     Ok(ForeignPart {
         imported: ImportOrigin {
-            part: part.part.name.clone(),
+            part: part.outline.name.clone(),
             first_time_s: samples.first().map_or(0.0, |first| first.t),
             readings: readings.0,
-            facts: match part.part.facts.is_empty() {
+            facts: match part.outline.facts.is_empty() {
                 true => facts::in_first_rows(&part.rows, header.top),
-                false => part.part.facts.clone(),
+                false => part.outline.facts.clone(),
             },
-            remarks: part.part.remarks.iter().cloned().chain(remarks).collect(),
+            remarks: part.outline.remarks.iter().cloned().chain(remarks).collect(),
             ..origin.clone()
         },
         samples,
@@ -267,7 +267,7 @@ fn parse_part(
 
 /// Counts the depth of a joined part from the last row of the block that found the contact, unless a zero is given.
 fn count_depth_from_contact(part: &RawPart<'_>, columns: &mut Columns, readings: &mut ReadingList) {
-    let stages = &part.part.stages;
+    let stages = &part.outline.stages;
     let is_contact = |stage: &&formats::Stage| stage.kind == StageKind::Contact;
     let after = stages.iter().find(|stage| !is_contact(stage));
     let (Some(after), Zero::Unchanged) = (after, columns.depth.zero) else { return };

@@ -72,7 +72,11 @@ impl<'a> Block<'a> {
 fn cut<'a>(lines: &[Line<'a>]) -> Result<Vec<TextPart<'a>>, String> {
     let mut blocks = blocks(lines)?;
     let presses = press::join(&mut blocks);
-    Ok(blocks.into_iter().flat_map(Block::parts).chain(presses).collect())
+    let mut parts: Vec<TextPart<'a>> =
+        blocks.into_iter().flat_map(Block::parts).chain(presses).collect();
+    // A press stands after its last block, and the part that ends the file is the last.
+    parts.sort_by_key(|part| part.lines.last().map(|(number, _)| *number));
+    Ok(parts)
 }
 
 fn blocks<'a>(lines: &[Line<'a>]) -> Result<Vec<Block<'a>>, String> {
