@@ -34,25 +34,18 @@ impl LoadCurve {
     ) -> Result<Self, ContactError> {
         let deepest = law.contact(indenter, specimen, depth_max)?;
         let (shape, layer) = (indenter.shape()?, specimen.layer()?);
-        let exponent = match (law, shape) {
-            (_, IndenterShape::FlatPunch { .. }) => 1.0,
-            (ContactLaw::Hertz, _) => 1.5,
-            (ContactLaw::Sneddon, IndenterShape::Cone { .. }) => 2.0,
-            _ => {
-                let [begin, _] = shape.contact_radii();
-                let knot = |number: u32| {
-                    let share = f64::from(number) / f64::from(KNOTS);
-                    // From a flat on the depth grows with the root of the radius.
-                    let share = if begin > 0.0 { share * share } else { share };
-                    let radius = begin + (deepest.radius_mm - begin) * share;
-                    match law {
-                        _ if radius == 0.0 => LoadKnot::default(),
-                        ContactLaw::Layer => layer.load_knot(shape, radius),
-                        _ => half_space_knot(shape, radius, layer),
-                    }
-                };
-                return Ok(Self::Table((0..=KNOTS).map(knot).collect()));
-            }
+        let Some(exponent) = exponent(law, shape) else {
+            let [begin, _] = shape.contact_radii();
+            let numbered = |number: u32| {
+                let share = f64::from(number) / f64::from(KNOTS);
+                // From a flat on the depth grows with the root of the radius.
+                let share = if begin > 0.0 { share * share } else { share };
+                match begin + (deepest.radius_mm - begin) * share {
+                    0.0 => LoadKnot::default(),
+                    radius => knot(law, shape, layer, radius),
+                }
+            };
+            return Ok(Self::Table((0..=KNOTS).map(numbered).collect()));
         };
         let coefficient = deepest.force_over_modulus / depth_max.powf(exponent);
         Ok(Self::Power { coefficient, exponent })
@@ -85,6 +78,40 @@ impl LoadCurve {
                 hermite(from, to, depth)
             }
         }
+    }
+}
+
+/// Force over modulus and its slope at one depth, without the curve to it.
+pub(crate) fn load_at(
+    law: ContactLaw,
+    indenter: &Indenter,
+    specimen: &Specimen,
+    depth: f64,
+) -> Result<[f64; 2], ContactError> {
+    let contact = law.contact(indenter, specimen, depth)?;
+    let (shape, layer) = (indenter.shape()?, specimen.layer()?);
+    let force = contact.force_over_modulus;
+    let slope = match exponent(law, shape) {
+        Some(exponent) => exponent * force / depth,
+        None => knot(law, shape, layer, contact.radius_mm).slope,
+    };
+    Ok([force, slope])
+}
+
+/// Of the depth, where the law is a power of it.
+fn exponent(law: ContactLaw, shape: IndenterShape) -> Option<f64> {
+    match (law, shape) {
+        (_, IndenterShape::FlatPunch { .. }) => Some(1.0),
+        (ContactLaw::Hertz, _) => Some(1.5),
+        (ContactLaw::Sneddon, IndenterShape::Cone { .. }) => Some(2.0),
+        _ => None,
+    }
+}
+
+fn knot(law: ContactLaw, shape: IndenterShape, layer: Layer, radius: f64) -> LoadKnot {
+    match law {
+        ContactLaw::Layer => layer.load_knot(shape, radius),
+        _ => half_space_knot(shape, radius, layer),
     }
 }
 
@@ -156,6 +183,9 @@ mod tests {
                 let rise = (curve.at(depth + step)[0] - curve.at(depth - step)[0]) / (2.0 * step);
                 assert!((slope / rise - 1.0).abs() < 1e-3 || share == 1.0, "{slope} {rise}");
             }
+            let [force, slope] = load_at(law, &indenter, &specimen, depth_max).unwrap();
+            let [expected, rise] = curve.at(depth_max);
+            assert!((force / expected - 1.0).abs() < 1e-6 && (slope / rise - 1.0).abs() < 1e-6);
             assert_eq!(curve.at(-0.1), [0.0; 2]);
         }
     }

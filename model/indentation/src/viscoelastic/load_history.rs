@@ -3,7 +3,7 @@
 use super::contact::PowerLaw;
 use super::history::{DepthHistory, HistoryError};
 use crate::document::{Indenter, Specimen};
-use crate::load_curve::LoadCurve;
+use crate::load_curve::{LoadCurve, load_at};
 use crate::validity::{ContactError, ContactLaw};
 use thiserror::Error;
 
@@ -51,7 +51,7 @@ pub fn load_and_slope(
     specimen: &Specimen,
     depth_mm: f64,
 ) -> Result<[f64; 2], ContactError> {
-    Ok(LoadCurve::new(law, indenter, specimen, depth_mm)?.at(depth_mm))
+    load_at(law, indenter, specimen, depth_mm)
 }
 
 #[cfg(test)]
