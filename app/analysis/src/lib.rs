@@ -35,6 +35,7 @@ pub mod kept_files;
 #[cfg(feature = "haptics")]
 pub mod margin;
 pub mod material;
+pub mod material_lake;
 pub mod plan;
 pub mod pool;
 pub mod progress;

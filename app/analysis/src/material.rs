@@ -163,12 +163,20 @@ pub(crate) const COVERAGE: f64 = 1.96;
 
 /// The modulus of the loading of a session or a table.
 pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialError> {
+    material_of(read_source(request, RecordStretch::RampHold)?, request)
+}
+
+/// The same of a press that is read already.
+pub fn material_of(
+    read: FitSource,
+    request: &MaterialRequest,
+) -> Result<MaterialReport, MaterialError> {
     if let Some(depth_mm) = request.depth_max_mm
         && !(depth_mm > 0.0 && depth_mm.is_finite())
     {
         return Err(MaterialError::DepthMax { depth_mm });
     }
-    let PressRecord { read, compliance, specimen } = read_press(request, RecordStretch::RampHold)?;
+    let PressRecord { read, compliance, specimen } = PressRecord::of(read, request)?;
     let loading = Loading::of(&read, request.depth_max_mm);
     let signal = read.signal.as_ref();
     let contact_error_mm =
@@ -238,21 +246,33 @@ pub(crate) fn read_press(
     request: &MaterialRequest,
     stretch: RecordStretch,
 ) -> Result<PressRecord, MaterialError> {
+    PressRecord::of(read_source(request, stretch)?, request)
+}
+
+fn read_source(
+    request: &MaterialRequest,
+    stretch: RecordStretch,
+) -> Result<FitSource, SourceError> {
     let wanted = SourceSelection { stretch, is_rejected_included: request.is_rejected_included };
     let (path, analysis) = (request.source.as_path(), request.analysis.as_deref());
-    let mut read = source::read_analysed(path, request.columns.as_ref(), wanted, analysis)?;
-    let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
-    let measured = read.thickness_mm;
-    let measured =
-        measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty });
-    let thickness_mm = request.thickness_mm.or(measured).ok_or(MaterialError::NoThickness)?;
-    let specimen = Specimen {
-        thickness_mm,
-        base: request.base,
-        poisson_ratio: request.poisson_ratio,
-        poisson_basis: request.poisson_basis,
-    };
-    Ok(PressRecord { read, compliance, specimen })
+    source::read_analysed(path, request.columns.as_ref(), wanted, analysis)
+}
+
+impl PressRecord {
+    fn of(mut read: FitSource, request: &MaterialRequest) -> Result<Self, MaterialError> {
+        let compliance = request.corrections.apply(&mut read).map_err(SourceError::from)?;
+        let measured = read.thickness_mm;
+        let measured =
+            measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty });
+        let thickness_mm = request.thickness_mm.or(measured).ok_or(MaterialError::NoThickness)?;
+        let specimen = Specimen {
+            thickness_mm,
+            base: request.base,
+            poisson_ratio: request.poisson_ratio,
+            poisson_basis: request.poisson_basis,
+        };
+        Ok(Self { read, compliance, specimen })
+    }
 }
 
 fn curve(fit: &LoadingFit, loading: &Loading) -> Vec<LoadingPoint> {

@@ -136,6 +136,46 @@ fn a_saved_modulus_is_listed_searched_and_printed_on_the_report() {
 }
 
 #[test]
+fn moduli_of_a_lake_are_those_of_its_sessions_and_made_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    stdout(&typed(at, &format!("export {SESSION} --lake lake")));
+    let options =
+        "--indenter flat-punch --radius 6.00±0.02 --thickness 60 --poisson 0.49 --depth-max 0.9";
+    let line = format!("material lake {options} --json");
+    for (more, refusal) in [("--save x", "--save does not apply"), ("--analysis x", "--analysis")] {
+        assert_refused(&typed(at, &format!("{line} {more}")), 2, refusal);
+    }
+    // Which part the session is in depends on its name.
+    for shard in ["1/2", "2/2"] {
+        let [first, again] = [0, 1].map(|_| json(&typed(at, &format!("{line} --shard {shard}"))));
+        assert_eq!(first["made"], first["sessions"], "{first}");
+        assert_eq!(again["were_there"], first["sessions"], "{again}");
+    }
+    let stored: Vec<_> = std::fs::read_dir(at.join("lake/v1/moduli/law=layer")).unwrap().collect();
+    let [Ok(file)] = stored.as_slice() else { panic!("{stored:?}") };
+    let stored: Value =
+        serde_json::from_str(&std::fs::read_to_string(file.path()).unwrap()).unwrap();
+    let alone = json(&typed(at, &format!("material {SESSION} {options} --json")));
+    assert_eq!(
+        (&stored["law"], &stored["modulus"]["source"]),
+        (&"layer".into(), &stored["session_id"])
+    );
+    for key in ["modulus_mpa", "total95_mpa", "budget", "validity", "lack_of_fit"] {
+        assert_eq!(stored["modulus"][key], alone[key], "{key}");
+    }
+    // Files of a lake are never overwritten.
+    let other = typed(at, &line.replace("0.49", "0.45"));
+    assert_eq!(other.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&other.stdout).contains("different content"));
+    assert_refused(
+        &typed(at, &format!("material {SESSION} {options} --shard 1/2")),
+        2,
+        "needs a lake",
+    );
+}
+
+#[test]
 fn what_no_law_describes_is_refused_in_one_sentence() {
     let at = tempfile::tempdir().unwrap();
     hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.0]);

@@ -5,8 +5,8 @@ use palpate_sessions::edits::DataQuality;
 use palpate_sessions::{EntryKind, LogEntry, Session, SessionOutline};
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
-    FitFile, FitState, LakeAddition, LakeError, LakeQuality, add_session, find_fit, is_lake,
-    list_sessions, read_session, store_fit,
+    FitFile, FitState, LakeAddition, LakeError, LakeQuality, LakeResult, add_session, find_fit,
+    is_lake, list_sessions, read_session, store_fit,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -159,6 +159,7 @@ fn a_fit_is_kept_once_and_made_with_other_settings_refused() {
     let others = serde_json::json!({"fixed": []});
     let file = FitFile {
         lake: folder.path(),
+        result: LakeResult::Fit,
         model: "kelvin/3",
         session_id: "20260305T141507Z-0badcafe",
         settings: &settings,

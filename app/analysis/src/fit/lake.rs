@@ -3,6 +3,7 @@
 use super::{FitRecipe, SourceFit, SourceFitError};
 use crate::compliance::ComplianceCorrection;
 use crate::exports::sweep_lake;
+use crate::material::MaterialError;
 use crate::pool::{WorkEvent, WorkFailure, in_order};
 use crate::recordings::recovered_originals_note;
 use crate::source;
@@ -10,8 +11,8 @@ use palpate_rheology::fit::{FitReport, SystematicUncertainty};
 use palpate_sessions::recover::recovered_id;
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
-    FitFile, FitState, LakeError, LakeSession, Shard, find_fit, list_sessions, read_session,
-    store_fit,
+    FitFile, FitState, LakeError, LakeResult, LakeSession, Shard, find_fit, list_sessions,
+    read_session, store_fit,
 };
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -54,6 +55,8 @@ pub enum LakeFitError {
     Keep(#[from] ExportError),
     #[error(transparent)]
     NotFitted(#[from] SourceFitError),
+    #[error(transparent)]
+    NoModulus(#[from] MaterialError),
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
 }
@@ -100,7 +103,7 @@ struct StoredFit<'a> {
 pub fn fit_lake(
     request: &LakeFitRequest<'_>,
     is_ending: &AtomicBool,
-    mut hear: impl FnMut(LakeFitEvent<'_>),
+    hear: impl FnMut(LakeFitEvent<'_>),
 ) -> Result<LakeTally, LakeFitError> {
     // Named or not, it is one body, whose fits are kept in one folder.
     let key = request.recipe.options.family().key();
@@ -109,36 +112,58 @@ pub fn fit_lake(
         key => key,
     };
     let settings = request.settings(model);
-    let mut found = list_sessions(request.lake)?;
-    sweep_lake(request.lake);
-    // Before the shards are made, so that all leave out the same.
-    let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
-    let is_copied = |one: &LakeSession| ids.contains(&recovered_id(&one.id));
-    let copied = found.iter().filter(|one| is_copied(one));
-    if let Some(note) = recovered_originals_note(copied.map(|one| one.id.clone())) {
-        hear(LakeFitEvent::Note(note));
-    }
-    found.retain(|one| !is_copied(one) && request.shard.has(&one.id));
-    let mut tally =
-        LakeTally { model: model.to_owned(), sessions: found.len(), ..LakeTally::default() };
-    let mut ids = found.iter().map(|one| one.id.as_str());
-    let work = |one: &LakeSession| request.fit_one(one, model, &settings);
-    in_order(request.jobs, &found, is_ending, work, |news| match news {
-        WorkEvent::Done(count) => hear(LakeFitEvent::Done(count, found.len())),
-        WorkEvent::Next(answer) => {
-            let came = answer
-                .unwrap_or_else(|failure: WorkFailure| Err(SourceFitError::from(failure).into()));
-            match &came {
-                Ok(LakeFitOutcome::Fitted) => tally.made += 1,
-                Ok(LakeFitOutcome::AlreadyFitted) => tally.were_there += 1,
-                Ok(LakeFitOutcome::Rejected) => tally.rejected += 1,
-                Err(_) => {}
-            }
-            hear(LakeFitEvent::Next(ids.next().unwrap_or_default(), came));
+    let LakeFitRequest { lake, shard, jobs, .. } = *request;
+    let part = LakePart { lake, shard, jobs, model };
+    part.fit_each(is_ending, |one| request.fit_one(one, model, &settings), hear)
+}
+
+/// Sessions of a lake to be fitted with a model or a law.
+pub(crate) struct LakePart<'a> {
+    pub lake: &'a Path,
+    pub shard: Shard,
+    pub jobs: usize,
+    /// Its key.
+    pub model: &'a str,
+}
+
+impl LakePart<'_> {
+    pub fn fit_each(
+        &self,
+        is_ending: &AtomicBool,
+        fit_one: impl Fn(&LakeSession) -> Result<LakeFitOutcome, LakeFitError> + Sync,
+        mut hear: impl FnMut(LakeFitEvent<'_>),
+    ) -> Result<LakeTally, LakeFitError> {
+        let mut found = list_sessions(self.lake)?;
+        sweep_lake(self.lake);
+        // Before the shards are made, so that all leave out the same.
+        let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
+        let is_copied = |one: &LakeSession| ids.contains(&recovered_id(&one.id));
+        let copied = found.iter().filter(|one| is_copied(one));
+        if let Some(note) = recovered_originals_note(copied.map(|one| one.id.clone())) {
+            hear(LakeFitEvent::Note(note));
         }
-    })
-    .map_err(LakeFitError::Threads)?;
-    Ok(tally)
+        found.retain(|one| !is_copied(one) && self.shard.has(&one.id));
+        let model = self.model.to_owned();
+        let mut tally = LakeTally { model, sessions: found.len(), ..LakeTally::default() };
+        let mut ids = found.iter().map(|one| one.id.as_str());
+        in_order(self.jobs, &found, is_ending, fit_one, |news| match news {
+            WorkEvent::Done(count) => hear(LakeFitEvent::Done(count, found.len())),
+            WorkEvent::Next(answer) => {
+                let came = answer.unwrap_or_else(|failure: WorkFailure| {
+                    Err(SourceFitError::from(failure).into())
+                });
+                match &came {
+                    Ok(LakeFitOutcome::Fitted) => tally.made += 1,
+                    Ok(LakeFitOutcome::AlreadyFitted) => tally.were_there += 1,
+                    Ok(LakeFitOutcome::Rejected) => tally.rejected += 1,
+                    Err(_) => {}
+                }
+                hear(LakeFitEvent::Next(ids.next().unwrap_or_default(), came));
+            }
+        })
+        .map_err(LakeFitError::Threads)?;
+        Ok(tally)
+    }
 }
 
 impl LakeFitRequest<'_> {
@@ -148,7 +173,8 @@ impl LakeFitRequest<'_> {
         model: &str,
         settings: &Value,
     ) -> Result<LakeFitOutcome, LakeFitError> {
-        let file = FitFile { lake: self.lake, model, session_id: &one.id, settings };
+        let result = LakeResult::Fit;
+        let file = FitFile { lake: self.lake, result, model, session_id: &one.id, settings };
         if find_fit(&file)? == FitState::There {
             return Ok(LakeFitOutcome::AlreadyFitted);
         }

@@ -7,6 +7,7 @@ pub(crate) mod last;
 mod together;
 
 pub use choice::{FitChoice, FitChoiceError};
+pub(crate) use lake::LakePart;
 pub use lake::{LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally, fit_lake};
 pub use last::{KnownFit, KnownFitError, is_poorly_identified, remember};
 pub use together::{JointFit, JointFitRequest, fit_together};

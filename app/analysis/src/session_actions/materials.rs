@@ -3,7 +3,8 @@
 use super::actions::keep;
 use super::{Attribution, SessionActionError};
 use crate::analysed_session;
-use crate::material::{ErrorSource, MaterialReport, MaterialRequest};
+use crate::material::{MaterialReport, MaterialRequest};
+use crate::material_lake::error_setting;
 use crate::report::material::material_text;
 use palpate_sessions::analyses::{Analysis, AnalysisContent, MATERIAL_VERSION};
 use serde_json::{Value, json};
@@ -19,22 +20,14 @@ pub struct MaterialToStore {
     words: String,
 }
 
-fn error_source(source: ErrorSource) -> Value {
-    match source {
-        ErrorSource::Recorded => json!("recorded"),
-        ErrorSource::Stated(error) => json!(error),
-        ErrorSource::Free => json!("free"),
-    }
-}
-
 impl MaterialToStore {
     #[must_use]
     pub fn of(request: &MaterialRequest, report: &MaterialReport) -> Self {
         // Everything else that was asked for is in the report.
         let settings = json!({
             "depth_max_mm": request.depth_max_mm,
-            "contact": error_source(request.contact),
-            "force_zero": error_source(request.force_zero),
+            "contact": error_setting(request.contact),
+            "force_zero": error_setting(request.force_zero),
             "include_rejected": request.is_rejected_included,
         });
         Self {

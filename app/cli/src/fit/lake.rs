@@ -1,9 +1,10 @@
 //! Fits the sessions of a lake, or of one shard, and stores the fits in the lake.
 
-use super::super::{Failure, export, output::Output, source_failure};
+use super::super::{Failure, export, material, output::Output, source_failure};
 use super::{FitArgs, batch, jobs};
 use palpate_analysis::fit::{
-    FitRecipe, LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, SourceFitError, fit_lake,
+    FitRecipe, LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally,
+    SourceFitError, fit_lake,
 };
 use palpate_analysis::progress::Progress;
 use palpate_sessions::text::sha256_of_file;
@@ -27,13 +28,23 @@ pub(super) fn run(
         fixed: &args.fixed,
         free: &args.free,
         compliance_sha256: args.compliance.as_deref().map(hash_file).transpose()?,
-        jobs: jobs(args),
+        jobs: jobs(args.jobs),
     };
+    fit_each("fit", lake, output, |is_ending, hear| fit_lake(&request, is_ending, hear))
+}
+
+/// Fits a lake as `command`, with notes, progress and the tally.
+pub(crate) fn fit_each(
+    command: &str,
+    lake: &Path,
+    output: &Output,
+    fit: impl FnOnce(&AtomicBool, &mut dyn FnMut(LakeFitEvent<'_>)) -> Result<LakeTally, LakeFitError>,
+) -> Result<(), Failure> {
     let is_ending = Arc::new(AtomicBool::new(false));
     batch::end_on_signals(&is_ending)?;
     let bar = output.count_bar(0);
     let mut failed = Vec::new();
-    let tally = fit_lake(&request, &is_ending, |event| match event {
+    let tally = fit(&is_ending, &mut |event| match event {
         LakeFitEvent::Note(note) => output.note(&note),
         LakeFitEvent::Done(count, of) => {
             // The sessions under way are waited for in any case.
@@ -54,7 +65,7 @@ pub(super) fn run(
     let mut object = json!(tally);
     object["lake"] = json!(lake);
     object["failed"] = json!(failed);
-    output.answer("fit", &object, || {
+    output.answer(command, &object, || {
         format!(
             "{} fits made, {} already present, {} sessions rejected, {} not fitted",
             tally.made,
@@ -79,7 +90,7 @@ pub(super) fn run(
 
 /// Refuses options that a lake does not have.
 fn check(args: &FitArgs) -> Result<(), Failure> {
-    let others = [
+    refuse_options(&[
         ("--picture", args.picture.is_some()),
         ("--share", args.share.is_some()),
         ("--columns", args.columns.is_some()),
@@ -87,7 +98,11 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
         ("--bootstrap", args.bootstrap.is_some()),
         ("--save", args.save.is_some()),
         ("--analysis", args.analysis.is_some()),
-    ];
+    ])
+}
+
+/// Refuses the first of these options that is given.
+pub(crate) fn refuse_options(others: &[(&str, bool)]) -> Result<(), Failure> {
     match others.iter().find(|(_, is_given)| *is_given) {
         Some((name, _)) => Err(Failure::usage(format!(
             "{name} does not apply to a lake; give a single session, or leave out {name}"
@@ -97,7 +112,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
 }
 
 /// The compliance in force differs between machines, so that of a lake is a file.
-fn hash_file(file: &str) -> Result<String, Failure> {
+pub(crate) fn hash_file(file: &str) -> Result<String, Failure> {
     sha256_of_file(Path::new(file)).map_err(|err| {
         Failure::usage(format!(
             "--compliance {file} is not a readable file ({err}); give a file, so that every computer fits the lake with the same compliance"
@@ -112,6 +127,7 @@ fn failure(err: LakeFitError) -> Failure {
         }
         LakeFitError::Keep(err) => export::failure(err),
         LakeFitError::NotFitted(SourceFitError::Source(err)) => source_failure(err),
+        LakeFitError::NoModulus(err) => material::failure(err),
         _ => Failure::failed(err),
     }
 }

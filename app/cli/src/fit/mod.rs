@@ -3,7 +3,7 @@
 mod batch;
 mod intervals;
 mod joint;
-mod lake;
+pub(super) mod lake;
 pub(super) mod saved;
 
 use super::Failure;
@@ -106,8 +106,8 @@ impl FitArgs {
 }
 
 /// Sources fitted at a time.
-fn jobs(args: &FitArgs) -> usize {
-    let jobs = args.jobs.or(std::thread::available_parallelism().ok());
+pub(super) fn jobs(given: Option<NonZeroUsize>) -> usize {
+    let jobs = given.or(std::thread::available_parallelism().ok());
     jobs.map_or(1, NonZeroUsize::get)
 }
 
@@ -157,7 +157,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     let found = recordings::find(&args.sources).map_err(sources_failure)?;
     found.note().iter().for_each(|note| output.note(note));
-    batch::run(&found.paths, jobs(args), &recipe, output)
+    batch::run(&found.paths, jobs(args.jobs), &recipe, output)
 }
 
 fn one(source: &Path, recipe: &FitRecipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {

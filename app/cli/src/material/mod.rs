@@ -5,24 +5,28 @@ mod relaxation;
 mod unloading;
 
 use super::arguments::{Choice, choice, parse_columns, parse_number, positive};
-use super::fit::saved;
+use super::fit::{jobs, lake, saved};
 use super::output::Output;
 use super::recalibrate::{self, AuthorArgs};
 use super::{Failure, compliance, source_failure};
 use clap::Args;
 use palpate_analysis::dynamic::DynamicRequest;
 use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
+use palpate_analysis::material_lake::{LakeMaterialRequest, material_lake};
 use palpate_analysis::report::material::material_text;
 use palpate_analysis::session_actions::MaterialToStore;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
 };
+use palpate_tables::lake::{Shard, is_lake};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 /// Moduli of a press by a contact law, with the probe's shape and the thickness taken out
 #[derive(Debug, Args)]
 pub struct MaterialArgs {
-    /// Session folder, or a delimited table with columns for time, depth and force
+    /// Session folder, or a delimited table with columns for time, depth and force; or a lake, which keeps the moduli of
+    /// loadings
     source: PathBuf,
     /// What is found of the material
     #[arg(long, value_parser = choice(PROPERTIES), default_value = "modulus")]
@@ -95,6 +99,12 @@ pub struct MaterialArgs {
     save: Option<String>,
     #[command(flatten)]
     author: AuthorArgs,
+    /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Number of sessions of a lake fitted at a time; without it the number of processors
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,6 +150,12 @@ const LAWS: &[Choice<ContactLaw>] = &[
 pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
     let request = request(args)?;
+    if is_lake(&args.source) {
+        return over_lake(args, &request, output);
+    }
+    if args.shard.is_some() {
+        return Err(Failure::usage("--shard needs a lake; give a lake, or leave out --shard"));
+    }
     match args.property {
         Property::Modulus => modulus(args, &request, output),
         Property::Unloading => unloading::run(&request, output),
@@ -164,6 +180,25 @@ fn modulus(args: &MaterialArgs, request: &MaterialRequest, output: &Output) -> R
         [material_text(&report)].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
     });
     Ok(())
+}
+
+/// Fits the sessions of a lake, or of one shard, and stores the moduli in the lake.
+fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> Result<(), Failure> {
+    lake::refuse_options(&[
+        ("--property", args.property != Property::Modulus),
+        ("--columns", args.columns.is_some()),
+        ("--save", args.save.is_some()),
+        ("--analysis", args.analysis.is_some()),
+    ])?;
+    let request = LakeMaterialRequest {
+        press,
+        shard: args.shard.unwrap_or(Shard::WHOLE),
+        compliance_sha256: args.compliance.as_deref().map(lake::hash_file).transpose()?,
+        jobs: jobs(args.jobs),
+    };
+    lake::fit_each("material", &args.source, output, |is_ending, hear| {
+        material_lake(&request, is_ending, hear)
+    })
 }
 
 /// A flag that belongs to another property.
@@ -207,7 +242,7 @@ fn request(args: &MaterialArgs) -> Result<MaterialRequest, Failure> {
     })
 }
 
-fn failure(err: MaterialError) -> Failure {
+pub(super) fn failure(err: MaterialError) -> Failure {
     match err {
         MaterialError::Source(err) => source_failure(err),
         // The record has no answer, whatever is given.

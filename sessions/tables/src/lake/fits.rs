@@ -1,4 +1,4 @@
-//! Fits in a lake: one file each, with settings and result.
+//! Fits and moduli in a lake: one file each, with settings and result.
 
 use super::layout::{encode_value, is_file_name, root};
 use crate::export::atomic::{io_error, write_or_same};
@@ -9,10 +9,31 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+/// What was fitted to a session of a lake.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LakeResult {
+    /// A force model.
+    Fit,
+    /// A contact law.
+    Modulus,
+}
+
+impl LakeResult {
+    /// Its folder, the key of the folders below and of the file, and the key of the result in the file.
+    const fn names(self) -> [&'static str; 3] {
+        match self {
+            Self::Fit => ["fits", "model", "fit"],
+            Self::Modulus => ["moduli", "law", "modulus"],
+        }
+    }
+}
+
 /// Identity of a fit in a lake.
 #[derive(Clone, Copy, Debug)]
 pub struct FitFile<'a> {
     pub lake: &'a Path,
+    pub result: LakeResult,
+    /// Key of the model or of the law.
     pub model: &'a str,
     pub session_id: &'a str,
     /// Everything except the session that determines the result: options and software version.
@@ -28,8 +49,9 @@ pub enum FitState {
 
 impl FitFile<'_> {
     pub fn path(&self) -> PathBuf {
-        let folder = root(self.lake).join("fits");
-        let folder = folder.join(format!("model={}", encode_value(self.model)));
+        let [folder, key, _] = self.result.names();
+        let folder = root(self.lake).join(folder);
+        let folder = folder.join(format!("{key}={}", encode_value(self.model)));
         folder.join(format!("{}.json", self.session_id))
     }
 
@@ -53,7 +75,8 @@ pub fn find_fit(file: &FitFile) -> Result<FitState, ExportError> {
     }
 }
 
-/// Stores a fit as a JSON object with `session_id`, `model`, `settings`, `settings_sha256` and `fit`.
+/// Stores a fit as a JSON object with `session_id`, `model`, `settings`, `settings_sha256` and `fit`; a modulus with `law` and
+/// `modulus` instead of `model` and `fit`.
 pub fn store_fit(file: &FitFile, fit: &impl serde::Serialize) -> Result<WriteOutcome, ExportError> {
     let id = file.session_id;
     if !is_file_name(id) {
@@ -64,9 +87,10 @@ pub fn store_fit(file: &FitFile, fit: &impl serde::Serialize) -> Result<WriteOut
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(&failed)?;
     }
+    let [_, key, result] = file.result.names();
     let object = json!({
-        "session_id": id, "model": file.model, "settings": file.settings,
-        "settings_sha256": file.settings_sha256(), "fit": fit,
+        "session_id": id, key: file.model, "settings": file.settings,
+        "settings_sha256": file.settings_sha256(), result: fit,
     });
     write_or_same(&path, |out| writeln!(out, "{object}").map_err(&failed))
 }

@@ -7,6 +7,7 @@
 //! v1/events/rig=R/month=YYYY-MM/ID.parquet      one row per input, decision and fit
 //! v1/checksums/rig=R/month=YYYY-MM/ID.json      the CRC-32 of those three files
 //! v1/fits/model=M/ID.json                       one fit
+//! v1/moduli/law=L/ID.json                       one modulus by a contact law
 //! ```
 //!
 //! The session's name is a column and the name of the file, not a folder, because there are too many. Files appear complete
@@ -19,7 +20,7 @@ mod read;
 mod rows;
 mod write;
 
-pub use fits::{FitFile, FitState, find_fit, store_fit};
+pub use fits::{FitFile, FitState, LakeResult, find_fit, store_fit};
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
 pub use read::{LakeError, LakeSession, list_sessions, read_session};
 pub use write::{LakeAddition, LakeQuality, add_session};

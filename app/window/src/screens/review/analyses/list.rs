@@ -58,8 +58,9 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&OwnFit>) -> bool {
     ui.label(RichText::new(format!("Found by '{}'", one.name)).strong());
     quiet_ui(ui, stored_analysis::describe_analysis(&one.what));
     if let AnalysisContent::Material { words, .. } = &one.what {
-        // The first one stands above.
-        words.lines().skip(1).for_each(|line| small_ui(ui, line));
+        // The first one stands above; columns of spaces stand in no line here.
+        let lines = words.lines().skip(1).map(|line| line.split_whitespace().collect::<Vec<_>>());
+        lines.for_each(|line| small_ui(ui, line.join(" ")));
     }
     let AnalysisContent::Fit { results, .. } = &one.what else { return false };
     let parameters = stored_analysis::parameters(results);
