@@ -54,6 +54,15 @@ impl SineContact {
     /// Machine and contact are in series, so their compliances add as complex numbers; the cell moves the mass as well as the
     /// specimen, so it feels the mass times its acceleration less.
     pub fn moduli(&self) -> Result<Moduli, DynamicError> {
+        self.moduli_over(self.slope()?)
+    }
+
+    /// Of the law at the mean depth, over Young's modulus, in mm.
+    fn slope(&self) -> Result<f64, DynamicError> {
+        Ok(load_and_slope(self.law, &self.indenter, &self.specimen, self.probe_depth())?[1])
+    }
+
+    fn moduli_over(&self, slope: f64) -> Result<Moduli, DynamicError> {
         let [storage, loss] = inverse(self.stiffness_n_per_mm);
         let [storage, loss] = [storage - self.compliance_mm_per_n, loss];
         if storage <= 0.0 {
@@ -62,8 +71,6 @@ impl SineContact {
         let [storage, loss] = inverse([storage, loss]);
         // g/s² is 1e-6 N/mm.
         let inertia = 1e-6 * self.moving_mass_g * (TAU * self.frequency_hz).powi(2);
-        let [_, slope] =
-            load_and_slope(self.law, &self.indenter, &self.specimen, self.probe_depth())?;
         let [storage, loss] = [(storage + inertia) / slope, loss / slope];
         let shear = 0.5 / (1.0 + self.specimen.poisson_ratio.value);
         Ok([storage, loss, shear * storage, shear * loss, loss / storage])
@@ -90,15 +97,11 @@ impl SineContact {
 
     /// Half of what two cases differ by; where one is beyond the law, what the other differs by from this one.
     fn effect(&self, low: Self, high: Self) -> Result<Moduli, DynamicError> {
-        let (one, other, share) = match (low.moduli(), high.moduli()) {
-            (Ok(low), Ok(high)) => (low, high, 0.5),
-            (Ok(one), Err(_)) | (Err(_), Ok(one)) => (self.moduli()?, one, 1.0),
+        Ok(match (low.moduli(), high.moduli()) {
+            (Ok(low), Ok(high)) => difference(low, high, 0.5),
+            (Ok(one), Err(_)) | (Err(_), Ok(one)) => difference(self.moduli()?, one, 1.0),
             (Err(err), Err(_)) => return Err(err),
-        };
-        Ok(std::array::from_fn(|number| {
-            let change = share * (other[number] - one[number]).abs();
-            if change > ROUNDING * one[number].abs() { change } else { 0.0 }
-        }))
+        })
     }
 
     fn scaled(self, factor: f64) -> Self {
@@ -173,13 +176,24 @@ fn calibration_effect(
 ) -> Result<Moduli, DynamicError> {
     let amplitude = found.force_amplitude.value.0;
     let shift = |error: usize, force: f64| known.shift(error, Newtons(force)).0;
+    // One slope for all: an error of force moves no contact.
+    let slope = sine.slope()?;
     let effect = |error: usize| {
         let [low, high] = [-1.0, 1.0].map(|sign| shift(error, sine.force_n + sign * amplitude));
         let gain = 0.5 * (high - low) / amplitude;
-        sine.effect(sine.scaled(1.0 - gain), sine.scaled(1.0 + gain))
+        let [low, high] = [1.0 - gain, 1.0 + gain].map(|factor| sine.scaled(factor));
+        Ok(difference(low.moduli_over(slope)?, high.moduli_over(slope)?, 0.5))
     };
-    let effects: Result<Vec<Moduli>, _> = (0..known.errors().count()).map(effect).collect();
+    let effects: Result<Vec<Moduli>, DynamicError> =
+        (0..known.errors().count()).map(effect).collect();
     Ok(root_of_squares(&effects?))
+}
+
+fn difference(one: Moduli, other: Moduli, share: f64) -> Moduli {
+    std::array::from_fn(|number| {
+        let change = share * (other[number] - one[number]).abs();
+        if change > ROUNDING * one[number].abs() { change } else { 0.0 }
+    })
 }
 
 fn root_of_squares(effects: &[Moduli]) -> Moduli {
