@@ -129,6 +129,8 @@ pub enum LoadingFitError {
     NoApproach,
 }
 
+/// A record that begins far above the specimen is a hundred thousand times as long as the part that the law describes.
+const SHORTER_MAX: usize = 40;
 /// Fewer in contact give no residual to judge by, and fewer before it no force out of contact.
 const SAMPLES_MIN: usize = 5;
 /// Of a standard uncertainty of contact or zero: beyond, it or the law is wrong.
@@ -295,7 +297,7 @@ fn curve_of_any(
     depth_max: f64,
 ) -> Result<LoadCurve, LoadingFitError> {
     let mut depth = depth_max;
-    for _ in 0..8 {
+    for _ in 0..SHORTER_MAX {
         match LoadCurve::new(law, indenter, specimen, depth) {
             Err(ContactError::Outside { .. }) => depth *= 0.75,
             other => return other.map_err(LoadingFitError::from),

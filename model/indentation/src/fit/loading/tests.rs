@@ -231,3 +231,24 @@ fn contact_and_zero_of_a_line_are_not_told_apart() {
     assert!((fit.modulus_mpa / 0.02 - 1.0).abs() < 1e-9, "{fit:?}");
     assert!((fit.contact_shift_mm + 0.05).abs() < 1e-9, "{fit:?}");
 }
+
+/// An approach of a hundred times the depth, as of an atomic force microscope, on which the law would be far outside of its
+/// range if all of it were a press.
+#[test]
+fn contact_behind_a_long_approach_is_found() {
+    let thick = specimen(known(500.0, 0.0), known(0.5, 0.0));
+    let sphere = Indenter::Sphere { radius_mm: known(1.0, 0.0) };
+    for law in [ContactLaw::Sneddon, ContactLaw::Layer] {
+        let press = Press {
+            depths_mm: [0.0, 10.1],
+            shift_mm: 10.0,
+            zero_newtons: -0.001,
+            count: 5000,
+            ..PRESS
+        };
+        let samples = press.loading(law, (&sphere, &thick), || 0.0);
+        let fit = fit_loading(law, &sphere, &thick, &samples, NOTHING_KNOWN).unwrap();
+        assert!((fit.modulus_mpa / press.modulus_mpa - 1.0).abs() < 1e-4, "{law:?} {fit:?}");
+        assert!((fit.contact_shift_mm - 10.0).abs() < 1e-5, "{law:?}");
+    }
+}

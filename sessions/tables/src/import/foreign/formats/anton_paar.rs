@@ -37,9 +37,9 @@ fn cut<'a>(lines: &[Line<'a>], delimiter: Delimiter) -> Result<Vec<TextPart<'a>>
         if line.1.trim() == INDENTATION {
             facts.clear();
         } else if is_values(line) {
-            let [names, units, below @ ..] = rest else {
+            let [names, below @ ..] = rest else {
                 return Err(format!(
-                    "line {}: no names and units follow 'Measured values'; restore the missing end of the file",
+                    "line {}: no names follow 'Measured values'; restore the missing end of the file",
                     line.0
                 ));
             };
@@ -47,12 +47,17 @@ fn cut<'a>(lines: &[Line<'a>], delimiter: Delimiter) -> Result<Vec<TextPart<'a>>
                 let cells = delimiter.cells(row.1, row.0).unwrap_or_default();
                 cells.iter().find(|cell| !cell.is_empty()).is_some_and(Cell::is_number)
             };
-            let count = below.iter().take_while(is_row).count();
+            // Bioindenters write units behind the names and leave a line empty.
+            let is_empty = |row: &&Line<'_>| row.1.trim().is_empty();
+            let blank = below.iter().take_while(is_empty).count();
+            let units = below.get(blank).filter(|row| !is_row(row));
+            let start = blank + usize::from(units.is_some());
+            let count = start + below[start..].iter().take_while(is_row).count();
             parts.push(TextPart {
                 name: format!("{INDENTATION} {}", parts.len() + 1),
                 facts: std::mem::take(&mut facts),
-                head: Some(Head { names: names.0, units: Some(units.0) }),
-                lines: rest[..count + 2].to_vec(),
+                head: Some(Head { names: names.0, units: units.map(|row| row.0) }),
+                lines: rest[..=count].to_vec(),
                 ..TextPart::default()
             });
             rest = &below[count..];
