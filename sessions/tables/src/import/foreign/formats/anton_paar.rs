@@ -62,7 +62,9 @@ fn cut<'a>(lines: &[Line<'a>], delimiter: Delimiter) -> Result<Vec<TextPart<'a>>
             });
             rest = &below[count..];
         } else if facts.len() < FACTS_MAX {
-            let pair = line.1.split_once(" = ").and_then(|(key, value)| fact(key, value));
+            let pair = line.1.split_once('=').and_then(|(key, value)| {
+                fact(key, &value.split_whitespace().collect::<Vec<_>>().join(" "))
+            });
             facts.extend(pair.or_else(|| parse_fact(line.1)));
         }
     }
