@@ -19,6 +19,7 @@ use thiserror::Error;
 /// A modulus of an unloading and all it rests on.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnloadingReport {
+    pub property: &'static str,
     pub source: PathBuf,
     pub indenter: Indenter,
     pub specimen: Specimen,
@@ -103,6 +104,7 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     let standard_uncertainty_mpa = variance.sqrt();
     let half = fit.coverage_factor(variance) * standard_uncertainty_mpa;
     Ok(UnloadingReport {
+        property: "unloading",
         source: request.source.clone(),
         indenter: *indenter,
         specimen,
@@ -132,8 +134,11 @@ fn samples(read: &FitSource, shift: f64) -> Vec<LoadingSample> {
         .map(|one| LoadingSample { depth_mm: one.depth.0 - shift, force_newtons: one.force.0 })
         .collect();
     let deepest = all.iter().map(|one| one.depth_mm).fold(f64::NEG_INFINITY, f64::max);
-    let top = all.iter().rposition(|one| one.depth_mm >= END_SHARE * deepest);
-    all[top.unwrap_or(0)..].to_vec()
+    let near = all.iter().rposition(|one| one.depth_mm >= END_SHARE * deepest).unwrap_or(0);
+    // Up from there to where the way back began.
+    let is_higher = |at: &usize| all[at - 1].depth_mm > all[*at].depth_mm;
+    let top = (1..=near).rev().take_while(is_higher).last().map_or(near, |at| at - 1);
+    all[top..].to_vec()
 }
 
 /// Root mean square in N of what the tare measured.
