@@ -10,7 +10,7 @@ mod variations;
 #[cfg(test)]
 mod tests;
 
-use super::residuals::{FittedSamples, coverage_factor};
+use super::residuals::{FittedSamples, ModulusNoise, coverage_factor};
 use crate::document::{Indenter, Specimen};
 use crate::load_curve::LoadCurve;
 use crate::validity::{ContactError, ContactLaw, Validity};
@@ -131,6 +131,9 @@ pub enum LoadingFitError {
 
 /// A record that begins far above the specimen is a hundred thousand times as long as the part that the law describes.
 const SHORTER_MAX: usize = 40;
+/// Rounds until the weight of the samples stays to a hundredth, which is little beside how well it is known.
+const ROUNDS_MAX: usize = 10;
+const WEIGHT_CHANGE: f64 = 0.01;
 /// Fewer in contact give no residual to judge by, and fewer before it no force out of contact.
 const SAMPLES_MIN: usize = 5;
 /// Of a standard uncertainty of contact or zero: beyond, it or the law is wrong.
@@ -155,17 +158,24 @@ pub fn fit_loading(
     };
     let mut deepest = depth_max;
     let mut variance = knowledge.noise_newtons.map_or(0.0, |noise| noise * noise);
-    // The first round gives the depth behind the contact as fitted and, where the noise is not known, its size.
-    for _ in 0..2 {
+    let mut weight = variance;
+    // Every round gives the depth behind the contact as fitted, the noise where it is not known, and what residuals that last
+    // count for beside what was known before.
+    for round in 0..ROUNDS_MAX {
         let curve = curve_of_any(law, indenter, specimen, deepest)?;
-        let found = search.solve(curve, variance, &starts)?.1;
-        if knowledge.noise_newtons.is_none() {
-            variance = found.squares / search.freedom();
-        }
+        let (problem, found) = search.solve(curve, weight, &starts)?;
         deepest = depth_max - found.at[SHIFT];
         starts = vec![found.at[SHIFT]];
         if !(deepest > 0.0 && found.at[MODULUS] > 0.0) {
             return Err(LoadingFitError::NoContact);
+        }
+        if knowledge.noise_newtons.is_none() {
+            variance = found.squares / search.freedom();
+        }
+        let last = weight;
+        weight = search.weight(&problem, &found, variance);
+        if round > 0 && (weight - last).abs() <= WEIGHT_CHANGE * weight {
+            break;
         }
     }
     let curve =
@@ -176,29 +186,20 @@ pub fn fit_loading(
             }
             reason => reason.into(),
         })?;
-    let (problem, found) = search.solve(curve, variance, &starts)?;
+    let (problem, found) = search.solve(curve, weight, &starts)?;
     search.check(&found)?;
     let mut terms = search.terms_of_the_known(&problem, &found);
-    let freedom = knowledge.noise_newtons.map_or(search.freedom(), |_| f64::INFINITY);
-    let (residuals, influence) = (problem.residuals(&found), problem.influence(&found));
-    let forces: Vec<f64> = samples.iter().map(|one| one.force_newtons).collect();
-    let columns = problem.columns(&found);
-    let fitted = FittedSamples {
-        forces: &forces,
-        residuals: &residuals,
-        columns: &columns,
-        influence: &influence,
-    };
-    let noise = fitted.modulus_noise((variance, freedom));
+    let noise = search.noise(&problem, &found, variance);
     terms.insert(ModulusTerm::Noise, noise.mpa);
     for (term, [low, high]) in varied(indenter, specimen) {
         let modulus = |(indenter, specimen): (Indenter, Specimen)| {
             let curve = curve_of_any(law, &indenter, &specimen, deepest)?;
-            Ok::<_, LoadingFitError>(search.solve(curve, variance, &starts)?.1.at[MODULUS])
+            Ok::<_, LoadingFitError>(search.solve(curve, weight, &starts)?.1.at[MODULUS])
         };
         let half = 0.5 * (modulus(high)? - modulus(low)?);
         terms.insert(term, half.abs());
     }
+    let residuals = problem.residuals(&found);
     let squares = residuals.iter().map(|one| one * one).sum::<f64>();
     Ok(LoadingFit {
         modulus_mpa: found.at[MODULUS],
@@ -209,7 +210,7 @@ pub fn fit_loading(
         terms,
         noise_freedom: noise.freedom,
         validity: law.validity(indenter, specimen, deepest)?,
-        influence,
+        influence: problem.influence(&found),
     })
 }
 
@@ -225,9 +226,37 @@ impl<'a> Search<'a> {
         [true, contact_error_mm != Some(0.0), zero_error_newtons != Some(0.0)]
     }
 
+    /// Whether contact or zero is known, but not exactly.
+    fn is_any_known(&self) -> bool {
+        let LoadingKnowledge { contact_error_mm, zero_error_newtons, .. } = self.knowledge;
+        [contact_error_mm, zero_error_newtons].iter().flatten().any(|error| *error > 0.0)
+    }
+
     fn freedom(&self) -> f64 {
         let unknowns = self.is_free().into_iter().filter(|is_free| *is_free).count();
         (self.samples.len() - unknowns) as f64
+    }
+
+    /// What samples count for beside what was known before: the variance of independent noise that would make the modulus as
+    /// uncertain as the residuals do. Without it thousands of samples of a law that is wrong would overrule a measured contact.
+    fn weight(&self, problem: &LoadingProblem<'_>, found: &Found, variance: f64) -> f64 {
+        if !self.is_any_known() {
+            return variance;
+        }
+        let influence: f64 = problem.influence(found).iter().map(|one| one * one).sum();
+        self.noise(problem, found, variance).mpa.powi(2) / influence
+    }
+
+    fn noise(&self, problem: &LoadingProblem<'_>, found: &Found, variance: f64) -> ModulusNoise {
+        let forces: Vec<f64> = self.samples.iter().map(|one| one.force_newtons).collect();
+        let fitted = FittedSamples {
+            forces: &forces,
+            residuals: &problem.residuals(found),
+            columns: &problem.columns(found),
+            influence: &problem.influence(found),
+        };
+        let freedom = self.knowledge.noise_newtons.map_or(self.freedom(), |_| f64::INFINITY);
+        fitted.modulus_noise((variance, freedom))
     }
 
     fn solve(

@@ -124,6 +124,7 @@ fn intervals_hold_the_modulus_of_drawn_records() {
         (sphere, thick, zero_known, 0.0, 1000),
         (sphere, thick, NOTHING_KNOWN, 0.0, 1000),
         (sphere, thick, NOTHING_KNOWN, 0.9, 1000),
+        (sphere, thick, all_known, 0.9, 1000),
         (punch, thin, all_known, 0.0, 300),
     ];
     let mut draws = Draws(0x9e37_79b9_7f4a_7c15);
