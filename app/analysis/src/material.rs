@@ -320,7 +320,9 @@ impl Loading {
         let shift = read.signal.as_ref().map_or(0.0, |signal| signal.contact_shift_mm);
         let depths = read.samples.iter().map(|one| one.depth.0 - shift);
         let deepest = depths.fold(f64::NEG_INFINITY, f64::max);
-        let end = depth_max_mm.map_or(END_SHARE * deepest, |max| max.min(END_SHARE * deepest));
+        // Depths of a table may begin far above the contact, of which a share says nothing: there the peak alone ends the loading.
+        let share = if read.signal.is_some() { END_SHARE } else { 1.0 };
+        let end = depth_max_mm.map_or(share * deepest, |max| max.min(share * deepest));
         let count = read.samples.iter().position(|one| one.depth.0 - shift > end);
         let taken = &read.samples[..count.unwrap_or(read.samples.len())];
         // Where a soft cantilever holds the probe, the tissue relaxes and the depth still grows: the ramp ended at the peak.
@@ -405,7 +407,7 @@ fn too_deep(
     }
     // In four decimals, so that the depth given is within.
     let depth_max_mm = ((low + contact_shift_mm) * 1e4).floor() * 1e-4;
-    match low > 0.0 && depth_max_mm > 0.0 {
+    match low > 0.0 && depth_max_mm > contact_shift_mm.max(0.0) {
         true => MaterialError::TooDeep { reason, depth_max_mm },
         false => reason.into(),
     }
@@ -419,6 +421,9 @@ fn lack_of_fit(
 ) -> Option<LoadingLackOfFit> {
     let noise = loading.noise.unwrap_or_else(|| loading.white_noise());
     let residual_over_noise = fit.residual_newtons / noise;
+    if !residual_over_noise.is_finite() {
+        return None;
+    }
     let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / loading.samples.len() as f64).sqrt();
     if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
         return None;

@@ -57,6 +57,10 @@ pub enum UnloadingError {
     Press(#[from] MaterialError),
     #[error(transparent)]
     Fit(#[from] UnloadingFitError),
+    #[error(
+        "the area of the contact follows from the depth, and an unloading does not show where depth zero is; give the standard uncertainty of depth zero as contact, 0 for exact"
+    )]
+    ContactFree,
 }
 
 /// The modulus of the unloading of a session or a table. The law of the request is not used: the method stands on a half-space.
@@ -68,9 +72,10 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     let shift = signal.map_or(0.0, |signal| signal.contact_shift_mm);
     let samples = samples(&read, shift);
     let noise_n = signal.map(|_| noise(&read));
+    let contact_error_mm = request.contact.or_recorded(signal.map(|one| one.contact_error_mm));
     let knowledge = LoadingKnowledge {
         noise_newtons: noise_n,
-        contact_error_mm: request.contact.or_recorded(signal.map(|one| one.contact_error_mm)),
+        contact_error_mm: Some(contact_error_mm.ok_or(UnloadingError::ContactFree)?),
         zero_error_newtons: request.force_zero.or_recorded(zero_scatter(&read)),
     };
     let fit_of = |samples: &[LoadingSample]| fit_unloading(indenter, &specimen, samples, knowledge);
@@ -78,12 +83,8 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     let mut terms: Vec<(&'static str, f64)> =
         fit.terms.iter().map(|(term, mpa)| (term.name(), *mpa)).collect();
     let mut not_included = Vec::new();
-    for (name, known) in
-        [("contact", knowledge.contact_error_mm), ("force zero", knowledge.zero_error_newtons)]
-    {
-        if known.is_none() {
-            not_included.push(name);
-        }
+    if knowledge.zero_error_newtons.is_none() {
+        not_included.push("force zero");
     }
     match calibration_mpa(&read, &fit, &samples, fit_of)? {
         Some(mpa) => terms.push(("calibration", mpa)),

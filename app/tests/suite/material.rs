@@ -248,13 +248,15 @@ fn the_modulus_of_an_elastic_way_back_is_the_one_that_made_it() {
         let _ = writeln!(text, "{},{depth},{force}", 0.01 * f64::from(index));
     }
     std::fs::write(at.path().join("back.csv"), text).unwrap();
-    let line = "material back.csv --property unloading --indenter cone --half-angle 75 --poisson 0.45±0.01 --thickness 500";
+    let line = "material back.csv --property unloading --indenter cone --half-angle 75 --poisson 0.45±0.01 --thickness 500 --contact-error 0";
     let found = json(&typed(at.path(), &format!("{line} --json")));
     assert!((number(&found, "/modulus_mpa") / 0.0125 - 1.0).abs() < 1e-5, "{found}");
     assert!((number(&found, "/exponent") - 2.0).abs() < 1e-5, "{found}");
-    let missing = ["contact", "force zero", "calibration", "machine compliance"];
+    let missing = ["force zero", "calibration", "machine compliance"];
     assert_eq!(found["not_included"], serde_json::json!(missing));
     assert!(stdout(&typed(at.path(), line)).contains("Oliver and Pharr (1992)"));
+    let free = typed(at.path(), &line.replace("error 0", "error free"));
+    assert_refused(&free, 2, "does not show where depth zero is");
     let with_law = typed(at.path(), &format!("{line} --law layer"));
     assert_refused(&with_law, 2, "--law belongs to what is no unloading");
     hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.05]);

@@ -120,7 +120,7 @@ pub enum DynamicError {
     )]
     Amplitude { frequency_hz: f64, share: f64 },
     #[error(
-        "at {frequency_hz} Hz the machine gives way by more than probe and specimen together; correct with the compliance of the rig that recorded it"
+        "at {frequency_hz} Hz no specimen is left once machine compliance and moving mass are taken away; check both, and that the compliance is that of the rig that recorded it"
     )]
     TooCompliant { frequency_hz: f64 },
 }

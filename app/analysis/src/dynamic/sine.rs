@@ -64,13 +64,13 @@ impl SineContact {
 
     fn moduli_over(&self, slope: f64) -> Result<Moduli, DynamicError> {
         let [storage, loss] = inverse(self.stiffness_n_per_mm);
-        let [storage, loss] = [storage - self.compliance_mm_per_n, loss];
-        if storage <= 0.0 {
-            return Err(DynamicError::TooCompliant { frequency_hz: self.frequency_hz });
-        }
-        let [storage, loss] = inverse([storage, loss]);
+        let [storage, loss] = inverse([storage - self.compliance_mm_per_n, loss]);
         // g/s² is 1e-6 N/mm.
         let inertia = 1e-6 * self.moving_mass_g * (TAU * self.frequency_hz).powi(2);
+        // A cell that accelerates a mass may well feel a negative stiffness, a specimen has none.
+        if storage + inertia <= 0.0 {
+            return Err(DynamicError::TooCompliant { frequency_hz: self.frequency_hz });
+        }
         let [storage, loss] = [(storage + inertia) / slope, loss / slope];
         let shear = 0.5 / (1.0 + self.specimen.poisson_ratio.value);
         Ok([storage, loss, shear * storage, shear * loss, loss / storage])

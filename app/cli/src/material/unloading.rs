@@ -17,6 +17,7 @@ pub(super) fn run(press: &MaterialRequest, output: &Output) -> Result<(), Failur
 fn failure(err: UnloadingError) -> Failure {
     match err {
         UnloadingError::Press(err) => super::failure(err),
+        UnloadingError::ContactFree => Failure::usage(format!("{err} (--contact-error MM)")),
         UnloadingError::Fit(err @ UnloadingFitError::Contact(_)) => Failure::usage(err),
         // The record has no answer, whatever is given.
         UnloadingError::Fit(err) => Failure::failed(err),

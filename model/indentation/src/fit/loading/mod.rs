@@ -156,7 +156,10 @@ pub fn fit_loading(
         Some(_) => vec![0.0],
         None => (0..24).map(|i| lowest + (depth_max - lowest) * f64::from(i) / 25.0).collect(),
     };
-    let mut deepest = depth_max;
+    let mut deepest = match knowledge.contact_error_mm {
+        Some(_) => depth_max,
+        None => depth_max - lowest,
+    };
     let mut variance = knowledge.noise_newtons.map_or(0.0, |noise| noise * noise);
     let mut weight = variance;
     // Every round gives the depth behind the contact as fitted, the noise where it is not known, and what residuals that last
@@ -328,8 +331,9 @@ fn curve_of_any(
     let mut depth = depth_max;
     for _ in 0..SHORTER_MAX {
         match LoadCurve::new(law, indenter, specimen, depth) {
-            Err(ContactError::Outside { .. }) => depth *= 0.75,
-            other => return other.map_err(LoadingFitError::from),
+            Ok(curve) => return Ok(curve),
+            // Outside of the range, or beyond the end of the shape or of what is solved.
+            Err(_) => depth *= 0.75,
         }
     }
     LoadCurve::new(law, indenter, specimen, depth_max).map_err(LoadingFitError::from)

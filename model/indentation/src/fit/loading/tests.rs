@@ -253,3 +253,21 @@ fn contact_behind_a_long_approach_is_found() {
         assert!((fit.contact_shift_mm - 10.0).abs() < 1e-5, "{law:?}");
     }
 }
+
+/// Depths below zero, a radius known to more than half of itself, and an approach of twenty radii of a small sphere.
+#[test]
+fn unusual_but_possible_presses_are_fitted() {
+    let thick = specimen(known(500.0, 0.0), known(0.1, 0.06));
+    let sphere = Indenter::Sphere { radius_mm: known(1.0, 0.6) };
+    for depths_mm in [[-0.2, -0.05], [0.0, 20.1]] {
+        let shift_mm = depths_mm[1] - 0.1;
+        let press = Press { depths_mm, shift_mm, count: 9000, ..PRESS };
+        let samples = press.loading(ContactLaw::Sneddon, (&sphere, &thick), || 0.0);
+        for law in [ContactLaw::Sneddon, ContactLaw::Layer] {
+            let fit = fit_loading(law, &sphere, &thick, &samples, NOTHING_KNOWN).unwrap();
+            assert!((fit.modulus_mpa / 0.02 - 1.0).abs() < 2e-3, "{law:?} {fit:?}");
+            assert!(fit.terms[&ModulusTerm::Radius] > 0.1 * fit.modulus_mpa, "{law:?}");
+            assert!(fit.terms[&ModulusTerm::Poisson] > 0.0, "{law:?}");
+        }
+    }
+}

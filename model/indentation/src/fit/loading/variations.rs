@@ -3,6 +3,9 @@
 use super::ModulusTerm;
 use crate::document::{Indenter, Quantity, Specimen};
 
+/// In degrees, short of a plane.
+const HALF_ANGLE_MAX: f64 = 89.99;
+
 pub(in crate::fit) type Varied = (ModulusTerm, [(Indenter, Specimen); 2]);
 
 /// Indenter and specimen with each uncertain number one standard uncertainty lower and higher.
@@ -17,13 +20,14 @@ pub(in crate::fit) fn varied(indenter: &Indenter, specimen: &Specimen) -> Vec<Va
             (_, true) => (low, (low + 2.0 * error).min(range[1])),
             _ => (low, high),
         };
-        [low, high].map(|value| Quantity { value, ..quantity })
+        [low, high].map(|value| Quantity { value, standard_uncertainty: 0.0 })
     };
     let mut found: Vec<Varied> = Vec::new();
     let all = [0.0, f64::INFINITY];
     for (term, size, with_size) in sizes(*indenter) {
         if size.standard_uncertainty > 0.0 {
-            found.push((term, ends(size, all).map(|size| (with_size(size), *specimen))));
+            let range = if term == ModulusTerm::HalfAngle { [0.0, HALF_ANGLE_MAX] } else { all };
+            found.push((term, ends(size, range).map(|size| (with_size(size), *specimen))));
         }
     }
     if specimen.thickness_mm.standard_uncertainty > 0.0 {

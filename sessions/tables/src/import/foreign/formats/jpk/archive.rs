@@ -6,6 +6,8 @@ use zip::ZipArchive;
 
 /// Largest unpacked size of one list of properties; a real one with shared data has 127 kB.
 const PROPERTIES_BYTES_MAX: u64 = 1 << 20;
+/// Most values that one list of properties takes from the shared ones; a real one takes some hundred.
+const RESOLVED_MAX: usize = 10_000;
 /// Largest number of files; a curve has three, and some ten for each segment.
 const FILES_MAX: usize = 4096;
 
@@ -90,7 +92,8 @@ impl Properties {
                 continue;
             };
             let from = format!("{list}.{number}.");
-            let found = shared.with_prefix(&from);
+            // A damaged file may refer to everything from everywhere.
+            let found = shared.with_prefix(&from).take(RESOLVED_MAX - added.len());
             added.extend(found.map(|(rest, value)| (format!("{owner}.{rest}"), value.to_owned())));
         }
         for (key, value) in added {
