@@ -261,5 +261,5 @@ fn the_modulus_of_an_elastic_way_back_is_the_one_that_made_it() {
     assert_refused(&with_law, 2, "--law belongs to what is no unloading");
     hertz_table(at.path(), "press.csv", [0.0125, 8.0, 0.45, 0.05]);
     let only_in = typed(at.path(), &line.replace("back", "press"));
-    assert_refused(&only_in, 1, "record the way back");
+    assert_refused(&only_in, 1, "record the unloading too");
 }

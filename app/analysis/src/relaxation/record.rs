@@ -2,6 +2,7 @@
 
 use super::RelaxationError;
 use crate::compliance::ComplianceCorrection;
+use crate::material::zero_scatter;
 use crate::source::FitSource;
 use palpate_indentation::{
     ContactLaw, Indenter, LoadHistoryError, RELATIVE_ERROR_MAX, RelaxationFit, RelaxationFitError,
@@ -177,6 +178,8 @@ impl Record {
             };
             sources.push(Source { name: term.name(), errors: vec![errors] });
         }
+        let zero = zero_scatter(read).map(|error| vec![error; self.forces.len()]);
+        sources.push(Source { name: "force zero", errors: zero.into_iter().collect() });
         sources.push(Source { name: "calibration", errors: self.calibration_errors(read) });
         let bent =
             compliance.map(|one| moved(&|index| -one.std_error_mm_per_n * self.forces[index]));

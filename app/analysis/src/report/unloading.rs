@@ -4,7 +4,7 @@ use super::material::{force, indenter_words, kpa, length, specimen_words};
 use crate::unloading::UnloadingReport;
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 
-const HALF_SPACE: &str = "elastic: the way back must be faster than the tissue relaxes, and the specimen much thicker than the contact is wide";
+const HALF_SPACE: &str = "elastic: the unloading must be faster than the tissue relaxes, and the specimen much thicker than the contact is wide";
 
 #[must_use]
 pub fn unloading_text(report: &UnloadingReport) -> String {

@@ -117,7 +117,7 @@ enum Property {
 
 const PROPERTIES: &[Choice<Property>] = &[
     ("modulus", Property::Modulus, "Young's modulus of the loading"),
-    ("unloading", Property::Unloading, "Young's modulus of the way back, by Oliver and Pharr"),
+    ("unloading", Property::Unloading, "Young's modulus of the unloading, by Oliver and Pharr"),
     ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
     ("dynamic", Property::Dynamic, "storage and loss modulus of sines"),
 ];

@@ -41,7 +41,7 @@ pub enum UnloadingFitError {
     #[error(transparent)]
     Contact(#[from] ContactError),
     #[error(
-        "the unloading has {count} samples between {} and {} % of its greatest force; give at least {SAMPLES_MIN}: record the way back, slower",
+        "the unloading has {count} samples between {} and {} % of its greatest force; give at least {SAMPLES_MIN}: record the unloading too, and slower",
         100.0 * SHARES[0],
         100.0 * SHARES[1]
     )]

@@ -32,10 +32,9 @@ fn unloading(top_newtons: f64, [top_mm, left_mm, exponent]: [f64; 3]) -> Vec<Loa
     (0..=200).map(sample).collect()
 }
 
-/// The maker's own numbers of a Bioindenter's press into cartilage with a sphere of 0.5 mm (artorg-unibe-ch/
-/// CartilageIndentationAnalysis, commit 675d19e, "20260609 Crosslinking# 1.TXT"): 996.25 uN at 15.65 um, a slope of 201.5652
-/// uN/um with the exponent 2.8617 give a contact of 12.06 um, an area of 37420.07 um^2 and, for a Poisson's ratio of 0.3,
-/// 840.33 kPa.
+/// The maker's own numbers of a Bioindenter's press into cartilage with a sphere of 0.5 mm, "20260609 Crosslinking# 1.TXT" of
+/// `artorg-unibe-ch/CartilageIndentationAnalysis`, commit 675d19e: 996.25 uN at 15.65 um, a slope of 201.5652 uN/um with the
+/// exponent 2.8617 give a contact of 12.06 um, an area of 37420.07 um^2 and, for a Poisson's ratio of 0.3, 840.33 kPa.
 #[test]
 fn a_maker_s_numbers_are_those_of_the_method() {
     let (force, stiffness, exponent) = (996.25e-6, 0.201_565_2, 2.8617);
@@ -93,7 +92,7 @@ fn what_is_no_unloading_is_refused_in_one_sentence() {
     };
     assert!(refusal(&[]).contains("0 samples"));
     let good = unloading(0.1, [0.4, 0.1, 1.6]);
-    assert!(refusal(&good[..8]).contains("record the way back"), "{}", refusal(&good[..8]));
+    assert!(refusal(&good[..8]).contains("record the unloading too"), "{}", refusal(&good[..8]));
     let mut rising = good.clone();
     rising.iter_mut().for_each(|one| one.depth_mm = -one.depth_mm);
     assert!(refusal(&rising).contains("no power of the depth"), "{}", refusal(&rising));

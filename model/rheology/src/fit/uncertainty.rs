@@ -24,7 +24,7 @@ pub(super) const DIFFERENCE: f64 = 1e-6;
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
-    /// BlockedResiduals, memory, and variance of the weighted residuals.
+    /// Blocks, memory, and variance of the weighted residuals.
     records: Vec<(BlockedResiduals, Option<Memory>, f64)>,
     block_factor: Factor,
     /// The joint triangle with drift of a larger variance, and how well that variance is known; where signals are fitted.
