@@ -9,15 +9,16 @@ use std::fmt::Write;
 use std::path::Path;
 
 const MODULUS_MPA: f64 = 0.0125;
+const CONTACT_MM: f64 = 0.02;
 
-/// Hertz's law, `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`, of a sphere of 8 mm to 0.3 mm, with noise that is the same everywhere.
+/// Hertz's law, `F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5`, of a sphere of 8 mm to 0.3 mm, with an approach and noise that is the same everywhere.
 fn hertz_table(path: &Path) {
     let mut text = String::from("t_s,depth_mm,force_N\n");
     for index in 0..=200 {
         let t = 0.005 * f64::from(index);
         let depth = 0.3 * t;
         let plane = MODULUS_MPA / (1.0 - 0.45 * 0.45);
-        let force = 4.0 / 3.0 * plane * 8.0f64.sqrt() * depth.powf(1.5);
+        let force = 4.0 / 3.0 * plane * 8.0f64.sqrt() * (depth - CONTACT_MM).max(0.0).powf(1.5);
         let noise = 1e-5 * (f64::from(index) * 12.9898).sin();
         writeln!(text, "{t},{depth},{}", force + noise).unwrap();
     }
