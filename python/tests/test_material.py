@@ -24,9 +24,9 @@ def test_modulus_of_a_session_is_that_of_the_command(command, recorded):
 
 def test_every_option_is_the_one_of_the_command(command, tmp_path):
     table = tmp_path / "press.csv"
-    depth = np.linspace(0, 0.3, 200)
-    force = 0.0125 / (1 - 0.45**2) * 4 / 3 * np.sqrt(8.0) * depth**1.5 + 1e-5 * np.sin(12.9898 * np.arange(200))
-    rows = (f"{t!r},{x!r},{f!r}" for t, x, f in zip((depth / 0.3).tolist(), depth.tolist(), force.tolist()))
+    depth = np.linspace(-0.05, 0.3, 200)
+    force = 0.0125 / (1 - 0.45**2) * 4 / 3 * np.sqrt(8.0) * np.clip(depth, 0, None)**1.5 + 1e-5 * np.sin(12.9898 * np.arange(200))
+    rows = (f"{t!r},{x!r},{f!r}" for t, x, f in zip((depth + 0.05).tolist(), depth.tolist(), force.tolist()))
     table.write_text("\n".join(["t_s,depth_mm,force_N", *rows, ""]))
     sphere = {"radius": 8, "thickness": 500, "poisson": 0.45}
     words = ["--indenter", "sphere", "--radius", 8, "--thickness", 500, "--poisson", 0.45]
@@ -34,7 +34,8 @@ def test_every_option_is_the_one_of_the_command(command, tmp_path):
     assert palpate.material(table, "sphere", law="hertz", **sphere).modulus_kpa == pytest.approx(12.5, rel=5e-3)
     for options, flags in [
         ({"law": "hertz", "contact_error": 0}, ["--law", "hertz", "--contact-error", 0]),
-        ({"law": "sneddon", "contact_error": "free"}, ["--law", "sneddon", "--contact-error", "free"]),
+        ({"law": "sneddon", "contact_error": "free", "zero_error": 1e-4},
+         ["--law", "sneddon", "--contact-error", "free", "--zero-error", 1e-4]),
         ({"base": "frictionless", "poisson_measured": True}, ["--base", "frictionless", "--poisson-measured"]),
     ]:
         found = palpate.material(table, "sphere", **sphere, **options)
