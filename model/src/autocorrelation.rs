@@ -27,8 +27,8 @@ const LOGIT_MAX: f64 = 7.0;
 const SHARES: [f64; 5] = [0.02, 0.1, 0.3, 0.65, 1.0];
 /// Variance of the logarithm of the long-run variance when next to nothing is known of it.
 const UNCERTAINTY_MAX: f64 = 0.5;
-/// Columns at most, the residual included: a record has eight parameters.
-const COLUMNS_MAX: usize = 9;
+/// Columns at most, the residual included: a relaxation modulus of five terms has eleven numbers.
+const COLUMNS_MAX: usize = 12;
 
 /// Residuals of one record in blocks, each over the root of its count: `residuals[b]` and, for
 /// every unknown, its column.
@@ -41,6 +41,35 @@ pub struct BlockedResiduals {
     pub places: Vec<usize>,
     /// Samples of a block.
     pub length: f64,
+}
+
+/// About the largest number of blocks in which autocorrelation is estimated.
+pub const BLOCKS_MAX: usize = 400;
+
+impl BlockedResiduals {
+    /// Of residuals at even times, one for each sample, and how what is fitted rises there with each unknown.
+    #[must_use]
+    pub fn of(residuals: &[f64], columns: &[Vec<f64>]) -> Self {
+        let length = block_length(residuals.len());
+        let residuals = block_sums(residuals);
+        Self {
+            places: (0..residuals.len()).collect(),
+            columns: columns.iter().map(|column| block_sums(column)).collect(),
+            residuals,
+            length: length as f64,
+        }
+    }
+}
+
+fn block_length(samples: usize) -> usize {
+    samples.div_ceil(BLOCKS_MAX).max(1)
+}
+
+/// Sums over blocks, each over the root of its count.
+#[must_use]
+pub fn block_sums(values: &[f64]) -> Vec<f64> {
+    let sum = |block: &[f64]| block.iter().sum::<f64>() / (block.len() as f64).sqrt();
+    values.chunks(block_length(values.len())).map(sum).collect()
 }
 
 /// Second-order description of blocks of noise: variance `level`, covariance

@@ -197,16 +197,21 @@ pub struct SessionFitOptions {
     reason: String,
 }
 
+/// The machine compliance of this name, as the command line takes it; none without a name.
+pub fn corrections(name: Option<&str>) -> PyResult<ComplianceCorrections> {
+    let library = library_folder();
+    match name {
+        None => Ok(ComplianceCorrections::none(library.ok().as_deref())),
+        Some(name) => {
+            let library = library.map_err(refused)?;
+            ComplianceCorrections::named(name, Some(&library)).map_err(refused)
+        }
+    }
+}
+
 impl SessionFitOptions {
     fn recipe(&self, options: FitOptions) -> PyResult<FitRecipe> {
-        let library = library_folder();
-        let corrections = match &self.compliance {
-            None => ComplianceCorrections::none(library.ok().as_deref()),
-            Some(name) => {
-                let library = library.map_err(refused)?;
-                ComplianceCorrections::named(name, Some(&library)).map_err(refused)?
-            }
-        };
+        let corrections = corrections(self.compliance.as_deref())?;
         let selection = SourceSelection {
             stretch: RecordStretch::with_unload(self.unload),
             is_rejected_included: self.include_rejected,

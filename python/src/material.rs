@@ -1,14 +1,13 @@
 //! The modulus of a press, with the report of `palpate material --json`.
 
 use crate::error::refused;
+use crate::fit::corrections;
 use numpy::{IntoPyArray, PyArray1};
-use palpate_analysis::compliance::ComplianceCorrections;
 use palpate_analysis::edits::author;
 use palpate_analysis::material::{ErrorSource, LoadingPoint, MaterialRequest, material};
 use palpate_analysis::report::material::material_text;
 use palpate_analysis::session_actions::{Attribution, MaterialToStore};
 use palpate_indentation::PoissonBasis;
-use palpate_sessions::library_folder;
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
@@ -49,14 +48,7 @@ fn error_source(text: Option<&str>) -> PyResult<ErrorSource> {
 
 impl MaterialOptions {
     fn request(&self, source: PathBuf) -> PyResult<MaterialRequest> {
-        let library = library_folder();
-        let corrections = match &self.compliance {
-            None => ComplianceCorrections::none(library.ok().as_deref()),
-            Some(name) => {
-                let library = library.map_err(refused)?;
-                ComplianceCorrections::named(name, Some(&library)).map_err(refused)?
-            }
-        };
+        let corrections = corrections(self.compliance.as_deref())?;
         Ok(MaterialRequest {
             source,
             columns: None,

@@ -154,8 +154,8 @@ pub enum MaterialError {
 
 /// A mean square of residuals is no chance where it is above the noise's by so many of its standard deviations, `sqrt(2 / n)`
 /// of it for `n` samples, and by more than a fifth, as the noise is known to a tenth.
-pub(crate) const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
-pub(crate) const LACK_OF_FIT_SHARE: f64 = 0.2;
+const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
+const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
 pub(crate) const END_SHARE: f64 = 0.998;
 /// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
@@ -335,13 +335,9 @@ impl Loading {
             depth_mm: one.depth.0 - shift,
             force_newtons: one.force.0,
         };
-        let squares: f64 = known().map(|one| one.sigma.0 * one.sigma.0).sum();
-        let noise = (squares / known().count().max(1) as f64).sqrt();
         let first = taken.iter().find(|one| one.depth.0 > shift);
         let secs = first.zip(taken.last()).map_or(0.0, |(first, last)| last.t.0 - first.t.0);
-        // Only a session's forces have an uncertainty of their own.
-        let noise = read.signal.as_ref().map(|_| noise);
-        Self { samples: known().map(sample).collect(), noise, secs }
+        Self { samples: known().map(sample).collect(), noise: read.noise(), secs }
     }
 
     /// Standard deviation in N of what changes from sample to sample, from second differences: a curve has nearly none.
@@ -413,6 +409,14 @@ fn too_deep(
     }
 }
 
+/// Residuals over the noise, where they are larger than by chance.
+pub(crate) fn above_noise(residual: f64, noise: f64, samples: usize) -> Option<f64> {
+    let over_noise = residual / noise;
+    let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / samples as f64).sqrt();
+    let is_chance = over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE);
+    (over_noise.is_finite() && !is_chance).then_some(over_noise)
+}
+
 fn lack_of_fit(
     fit: &LoadingFit,
     law: ContactLaw,
@@ -420,14 +424,7 @@ fn lack_of_fit(
     loading: &Loading,
 ) -> Option<LoadingLackOfFit> {
     let noise = loading.noise.unwrap_or_else(|| loading.white_noise());
-    let residual_over_noise = fit.residual_newtons / noise;
-    if !residual_over_noise.is_finite() {
-        return None;
-    }
-    let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / loading.samples.len() as f64).sqrt();
-    if residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE) {
-        return None;
-    }
+    let residual_over_noise = above_noise(fit.residual_newtons, noise, loading.samples.len())?;
     let samples = loading.behind_contact(fit, 0.0);
     let middle = 0.5 * (loading.deepest() - fit.contact_shift_mm);
     let (deep, shallow): (Vec<_>, Vec<_>) =

@@ -71,7 +71,7 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     let signal = read.signal.as_ref();
     let shift = signal.map_or(0.0, |signal| signal.contact_shift_mm);
     let samples = samples(&read, shift);
-    let noise_n = signal.map(|_| noise(&read));
+    let noise_n = read.noise();
     let contact_error_mm = request.contact.or_recorded(signal.map(|one| one.contact_error_mm));
     let knowledge = LoadingKnowledge {
         noise_newtons: noise_n,
@@ -140,13 +140,6 @@ fn samples(read: &FitSource, shift: f64) -> Vec<LoadingSample> {
     let is_higher = |at: &usize| all[at - 1].depth_mm > all[*at].depth_mm;
     let top = (1..=near).rev().take_while(is_higher).last().map_or(near, |at| at - 1);
     all[top..].to_vec()
-}
-
-/// Root mean square in N of what the tare measured.
-fn noise(read: &FitSource) -> f64 {
-    let known = || read.samples.iter().filter(|one| one.is_measured());
-    let squares: f64 = known().map(|one| one.sigma.0 * one.sigma.0).sum();
-    (squares / known().count().max(1) as f64).sqrt()
 }
 
 /// What errors of the calibration do to the modulus; `None` where nothing is stated of them.

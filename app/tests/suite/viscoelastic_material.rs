@@ -76,7 +76,8 @@ fn three_terms_come_back_from_ramps_short_and_long() {
         assert_eq!(found["not_included"][0], "contact");
     }
     println!("off: {worst:e}");
-    assert!(worst < 0.01, "{worst}");
+    // What the guide states of it.
+    assert!(worst < 3e-4, "{worst}");
 }
 
 /// At late times `J` is one over the equilibrium less what still creeps, and the product with `G` stays below one (Ferry,
@@ -144,7 +145,8 @@ fn budget_of_a_relaxation_modulus_is_that_of_its_law() {
     let missing = ["force zero", "calibration", "machine compliance"];
     assert_eq!(found["not_included"], serde_json::json!(missing));
     let text = stdout(&typed(at.path(), line));
-    for words in ["G at once", "Poisson's ratio is the same at all times", "a second radius"] {
+    for words in ["G instantaneous", "Poisson's ratio is the same at all times", "a second radius"]
+    {
         assert!(text.contains(words), "{words}: {text}");
     }
 }

@@ -12,8 +12,8 @@ pub use choice::{TermCandidate, TermChoice};
 
 use crate::compliance::ComplianceCorrection;
 use crate::material::{
-    COVERAGE, ErrorSource, LACK_OF_FIT_DEVIATIONS, LACK_OF_FIT_SHARE, MaterialError,
-    MaterialRequest, PressRecord, ValidityRow, read_press, validity_rows,
+    COVERAGE, ErrorSource, MaterialError, MaterialRequest, PressRecord, ValidityRow, above_noise,
+    read_press, validity_rows,
 };
 use crate::source::RecordStretch;
 use numbers::Numbers;
@@ -233,14 +233,16 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
         contact_error_mm,
         residual_n: fit.residual_newtons,
         noise_n: record.noise,
-        lack_of_fit: lack_of_fit(fit, &record),
+        lack_of_fit: record
+            .noise
+            .and_then(|noise| above_noise(fit.residual_newtons, noise, record.forces.len())),
         validity,
         compliance,
         notes: read.notes,
     })
 }
 
-/// The first two numbers are the moduli at once and at last.
+/// The first two numbers are the instantaneous and the equilibrium modulus.
 fn budget(sources: &[(&'static str, Vec<f64>)]) -> Vec<RelaxationBudgetRow> {
     let row = |(source, errors): &(&'static str, Vec<f64>)| RelaxationBudgetRow {
         source,
@@ -250,11 +252,4 @@ fn budget(sources: &[(&'static str, Vec<f64>)]) -> Vec<RelaxationBudgetRow> {
     let mut rows: Vec<RelaxationBudgetRow> = sources.iter().map(row).collect();
     rows.sort_by(|a, b| b.equilibrium_mpa.total_cmp(&a.equilibrium_mpa));
     rows
-}
-
-fn lack_of_fit(fit: &RelaxationFit, record: &Record) -> Option<f64> {
-    let residual_over_noise = fit.residual_newtons / record.noise?;
-    let chance = LACK_OF_FIT_DEVIATIONS * (2.0 / record.forces.len() as f64).sqrt();
-    let is_chance = residual_over_noise.powi(2) <= 1.0 + chance.max(LACK_OF_FIT_SHARE);
-    (!is_chance).then_some(residual_over_noise)
 }

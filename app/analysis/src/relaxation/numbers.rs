@@ -6,7 +6,8 @@ use super::{
 };
 use palpate_indentation::{CreepTerm, PronySeries, RelaxationFit};
 
-/// Moduli at once and at last, the terms, the modulus at the times; the compliance at once, its terms, the compliance at the times.
+/// Instantaneous and equilibrium modulus, the terms, the modulus at the times; the instantaneous compliance, its terms, the
+/// compliance at the times.
 pub(super) struct Numbers<'a> {
     times: &'a [f64],
     values: Vec<f64>,

@@ -91,15 +91,12 @@ impl Record {
         let taken: Vec<&FitSample> =
             all[first..].iter().take_while(is_held).filter(|one| one.is_measured()).collect();
         let start = taken.first().ok_or(RelaxationError::NoPress)?.t.0;
-        let squares: f64 = taken.iter().map(|one| one.sigma.0 * one.sigma.0).sum();
-        let noise = (squares / taken.len() as f64).sqrt();
         Ok(Self {
             times: taken.iter().map(|one| one.t.0 - start).collect(),
             // The slider trembles about the contact too.
             depths: taken.iter().map(|one| depth(one).max(0.0)).collect(),
             forces: taken.iter().map(|one| one.force.0).collect(),
-            // Only a session's forces have an uncertainty of their own.
-            noise: read.signal.as_ref().map(|_| noise),
+            noise: read.noise(),
         })
     }
 

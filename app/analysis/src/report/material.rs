@@ -159,7 +159,7 @@ pub(super) fn specimen_words(specimen: &Specimen) -> String {
 /// A length in mm, or in um where it is small.
 pub(super) fn length(mm: f64) -> String {
     match mm.abs() < 0.1 {
-        true => format!("{} um", significant(1e3 * mm, 4)),
+        true => format!("{} µm", significant(1e3 * mm, 4)),
         false => format!("{} mm", significant(mm, 4)),
     }
 }
@@ -167,7 +167,7 @@ pub(super) fn length(mm: f64) -> String {
 /// A force in N, in mN or uN where it is small.
 pub(super) fn force(newtons: f64) -> String {
     match newtons.abs() {
-        n if n < 1e-4 => format!("{} uN", significant(1e6 * newtons, 3)),
+        n if n < 1e-4 => format!("{} µN", significant(1e6 * newtons, 3)),
         n if n < 0.1 => format!("{} mN", significant(1e3 * newtons, 3)),
         _ => format!("{} N", significant(newtons, 3)),
     }
@@ -192,7 +192,7 @@ fn contact_words(report: &MaterialReport) -> String {
     match report.contact_error_mm {
         Some(0.0) => "at depth zero, taken as exact".into(),
         Some(error) => format!(
-            "{moved}, which is {} times the standard uncertainty of {} um",
+            "{moved}, which is {} times the standard uncertainty of {} µm",
             significant(shift.abs() / error, 2),
             error_alone(1e3 * error),
         ),

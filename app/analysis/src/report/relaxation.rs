@@ -11,8 +11,8 @@ const FLOW: &str = "one record cannot tell: a fluid that flows out of the specim
 #[must_use]
 pub fn relaxation_text(report: &RelaxationReport) -> String {
     let mut lines = vec![
-        modulus_line("G at once", report.instantaneous_mpa),
-        modulus_line("G at last", report.equilibrium_mpa),
+        modulus_line("G instantaneous", report.instantaneous_mpa),
+        modulus_line("G equilibrium", report.equilibrium_mpa),
     ];
     for (number, term) in report.terms.iter().enumerate() {
         lines.push(format!(
@@ -23,7 +23,7 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
         ));
     }
     lines.push(format!(
-        "seen from        {} s on: what relaxes faster is in no number, and G at once is the sum of the terms",
+        "seen from        {} s on: what relaxes faster is in no number, and the instantaneous G is the sum of the terms",
         significant(report.seen_from_s, 2)
     ));
     let both = report.modulus.iter().zip(&report.creep.compliance);
@@ -54,7 +54,7 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
     }
     for row in &report.budget {
         lines.push(format!(
-            "uncertainty      {:<18} at once {:>8} kPa, at last {:>8} kPa",
+            "uncertainty      {:<18} instantaneous {:>8} kPa, equilibrium {:>8} kPa",
             row.source,
             error_alone(kpa(row.instantaneous_mpa)),
             error_alone(kpa(row.equilibrium_mpa)),

@@ -48,6 +48,16 @@ pub struct FitSource {
     pub thickness_mm: Option<[f64; 2]>,
 }
 
+impl FitSource {
+    /// Root mean square of the standard deviations of the forces in N; `None` of a table, whose noise is not known.
+    #[must_use]
+    pub(crate) fn noise(&self) -> Option<f64> {
+        let known = || self.samples.iter().filter(|one| one.is_measured());
+        let squares: f64 = known().map(|one| one.sigma.0 * one.sigma.0).sum();
+        self.signal.as_ref().map(|_| (squares / known().count().max(1) as f64).sqrt())
+    }
+}
+
 /// Part of an indentation that is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RecordStretch {

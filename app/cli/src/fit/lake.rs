@@ -66,8 +66,9 @@ pub(crate) fn fit_each(
     object["lake"] = json!(lake);
     object["failed"] = json!(failed);
     output.answer(command, &object, || {
+        let made = if command == "fit" { "fits" } else { "moduli" };
         format!(
-            "{} fits made, {} already present, {} sessions rejected, {} not fitted",
+            "{} {made} made, {} already present, {} sessions rejected, {} not fitted",
             tally.made,
             tally.were_there,
             tally.rejected,

@@ -4,11 +4,9 @@
 //! textbook's error say of it. The residuals are described as white noise and a part that is forgotten over some time, as
 //! those of every fit of palpate are.
 
-use palpate_model::autocorrelation::{BlockedResiduals, memory};
+use palpate_model::autocorrelation::{BlockedResiduals, block_sums, memory};
 use palpate_model::estimate::student_t975;
 
-/// About the largest number of blocks in which the residuals are summed.
-const BLOCKS: usize = 400;
 /// Mean square of residuals over that of the forces that is rounding: 1e-12 of a force.
 const ROUNDING: f64 = 1e-24;
 
@@ -39,23 +37,12 @@ impl FittedSamples<'_> {
         if square_sum(self.residuals) <= ROUNDING * square_sum(self.forces) {
             return white;
         }
-        let count = self.residuals.len();
-        let length = count.div_ceil(BLOCKS);
-        let over_root = 1.0 / (length as f64).sqrt();
-        let sums = |values: &[f64]| -> Vec<f64> {
-            values.chunks_exact(length).map(|block| over_root * block.iter().sum::<f64>()).collect()
-        };
-        let residuals = sums(self.residuals);
-        let blocks = BlockedResiduals {
-            places: (0..residuals.len()).collect(),
-            residuals,
-            columns: self.columns.iter().map(|column| sums(column)).collect(),
-            length: length as f64,
-        };
+        let blocks = BlockedResiduals::of(self.residuals, self.columns);
         let alone = vec![true; self.columns.len()];
-        match memory(&blocks, &alone, square_sum(self.residuals) / count as f64) {
+        let mean_square = square_sum(self.residuals) / self.residuals.len() as f64;
+        match memory(&blocks, &alone, mean_square) {
             Some(memory) if memory.neighbour > 0.0 => {
-                let lasting = memory.quadratic(&sums(self.influence), &blocks.places);
+                let lasting = memory.quadratic(&block_sums(self.influence), &blocks.places);
                 if lasting <= independent {
                     return white;
                 }

@@ -1,6 +1,5 @@
 //! Autocorrelation of the residuals of a fit that another crate made.
 
-use super::block_sums::NOISE_BLOCKS;
 use super::inflation::{inflation, triangle};
 use palpate_model::autocorrelation::{BlockedResiduals, Memory, memory};
 
@@ -22,18 +21,7 @@ impl ResidualAutocorrelation {
         let samples = residuals.len();
         let spare = samples.checked_sub(tangents.len()).filter(|spare| *spare > 0)?;
         let white = residuals.iter().map(|one| one * one).sum::<f64>() / spare as f64;
-        let length = samples.div_ceil(NOISE_BLOCKS);
-        let sums = |values: &[f64]| {
-            let sum = |block: &[f64]| block.iter().sum::<f64>() / (block.len() as f64).sqrt();
-            values.chunks(length).map(sum).collect::<Vec<f64>>()
-        };
-        let residuals = sums(residuals);
-        let blocks = BlockedResiduals {
-            places: (0..residuals.len()).collect(),
-            columns: tangents.iter().map(|tangent| sums(tangent)).collect(),
-            residuals,
-            length: length as f64,
-        };
+        let blocks = BlockedResiduals::of(residuals, tangents);
         let memory = memory(&blocks, &vec![true; tangents.len()], white);
         let memory = memory.unwrap_or_else(|| Memory::none(white));
         Some(Self { blocks, memory, white, samples })

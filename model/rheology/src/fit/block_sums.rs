@@ -2,9 +2,7 @@
 
 use super::design::{LANES, Lane};
 use super::sample::FitSample;
-
-/// About the largest number of blocks in which autocorrelation is estimated.
-pub(super) const NOISE_BLOCKS: usize = 400;
+use palpate_model::autocorrelation::BLOCKS_MAX;
 
 /// Sums over one block of samples of all columns of a record's triangle, times their weights.
 #[derive(Clone, Debug)]
@@ -29,7 +27,7 @@ pub(super) struct NoiseSums {
 
 impl NoiseSums {
     pub fn new(samples: usize, width: usize) -> Self {
-        let wanted = samples.div_ceil(NOISE_BLOCKS);
+        let wanted = samples.div_ceil(BLOCKS_MAX);
         let length = if wanted <= LANES {
             wanted.next_power_of_two()
         } else {

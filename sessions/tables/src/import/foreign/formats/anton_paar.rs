@@ -47,11 +47,9 @@ fn cut<'a>(lines: &[Line<'a>], delimiter: Delimiter) -> Result<Vec<TextPart<'a>>
                 let cells = delimiter.cells(row.1, row.0).unwrap_or_default();
                 cells.iter().find(|cell| !cell.is_empty()).is_some_and(Cell::is_number)
             };
-            // Bioindenters write units behind the names and leave a line empty.
-            let is_empty = |row: &&Line<'_>| row.1.trim().is_empty();
-            let blank = below.iter().take_while(is_empty).count();
-            let units = below.get(blank).filter(|row| !is_row(row));
-            let start = blank + usize::from(units.is_some());
+            // Bioindenters write units behind the names.
+            let units = below.first().filter(|row| !is_row(row));
+            let start = usize::from(units.is_some());
             let count = start + below[start..].iter().take_while(is_row).count();
             parts.push(TextPart {
                 name: format!("{INDENTATION} {}", parts.len() + 1),

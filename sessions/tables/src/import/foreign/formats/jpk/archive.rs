@@ -11,8 +11,13 @@ const RESOLVED_MAX: usize = 10_000;
 /// Largest number of files; a curve has three, and some ten for each segment.
 const FILES_MAX: usize = 4096;
 
+/// Largest size of all lists of properties together, as of some hundred segments.
+const PROPERTIES_BYTES_ALL: u64 = 4 << 20;
+
 pub(super) struct Archive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
+    /// What is left of it.
+    properties_bytes: u64,
 }
 
 fn damaged(err: impl std::fmt::Display) -> String {
@@ -28,7 +33,7 @@ impl<'a> Archive<'a> {
                 zip.len()
             ));
         }
-        Ok(Self { zip })
+        Ok(Self { zip, properties_bytes: PROPERTIES_BYTES_ALL })
     }
 
     pub fn contains(&self, name: &str) -> bool {
@@ -50,7 +55,8 @@ impl<'a> Archive<'a> {
     }
 
     pub fn properties(&mut self, name: &str) -> Result<Properties, String> {
-        let bytes = self.read(name, PROPERTIES_BYTES_MAX)?;
+        let bytes = self.read(name, PROPERTIES_BYTES_MAX.min(self.properties_bytes))?;
+        self.properties_bytes -= bytes.len() as u64;
         Ok(Properties::of_bytes(&bytes))
     }
 }
