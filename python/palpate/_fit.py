@@ -3,11 +3,11 @@ from __future__ import annotations
 
 import json
 import numbers
-from collections.abc import Mapping as _Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from ._native import PalpateError, fit_arrays
+from ._report import Report
 
 if TYPE_CHECKING:
     import numpy as np
@@ -90,7 +90,7 @@ class Curve:
         return f"Curve of {len(self.t)} samples"
 
 
-class Fit(_Mapping):  # type: ignore[type-arg]
+class Fit(Report):
     """The report of a fit: a mapping with the content of ``palpate fit --json``, and shortcuts to what is used most.
 
     >>> fit = palpate.open("demo").fit()
@@ -114,15 +114,6 @@ class Fit(_Mapping):  # type: ignore[type-arg]
         self.notes: List[str] = list(notes)
         #: Name of the analysis in the session, or of the record in a joint fit.
         self.name = name
-
-    def __getitem__(self, key: str) -> Any:
-        return self._report[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._report)
-
-    def __len__(self) -> int:
-        return len(self._report)
 
     @property
     def parameters(self) -> Dict[str, Parameter]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 import json
 import numbers
 import os
-from collections.abc import Mapping as _Mapping
-from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
 
 from ._native import PalpateError, fit_material
+from ._report import Report
 
 if TYPE_CHECKING:
     import numpy as np
@@ -26,7 +26,7 @@ _INDENTERS: Dict[str, Dict[str, str]] = {
 _WORDS = {"law": ("hertz", "sneddon", "layer"), "base": ("bonded", "frictionless")}
 
 
-class Material(_Mapping):  # type: ignore[type-arg]
+class Material(Report):
     """A modulus with all it rests on: a mapping with the content of ``palpate material --json``.
 
     >>> known = {"thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "contact_error": "free"}
@@ -51,15 +51,6 @@ class Material(_Mapping):  # type: ignore[type-arg]
         self.depth, self.force, self.law_force = curve
         #: Remarks on the data.
         self.notes: List[str] = list(notes)
-
-    def __getitem__(self, key: str) -> Any:
-        return self._report[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._report)
-
-    def __len__(self) -> int:
-        return len(self._report)
 
     @property
     def modulus_kpa(self) -> float:

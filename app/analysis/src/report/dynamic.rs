@@ -1,6 +1,8 @@
 //! Dynamic moduli as people read them: a table over the frequency first, and every assumption under it.
 
-use super::material::{indenter_words, kpa, law_words, length, specimen_words};
+use super::material::{
+    indenter_words, kpa, law_words, length, not_included_line, specimen_words, validity_line,
+};
 use crate::dynamic::{DynamicBudgetRow, DynamicModuli, DynamicReport};
 use crate::relaxation::UncertainNumber;
 use palpate_figures::uncertain::{error_alone, significant, with_error};
@@ -31,14 +33,9 @@ pub fn dynamic_text(report: &DynamicReport) -> String {
             significant(sine.distortion_percent, 2),
         ));
     }
-    for row in &report.validity {
-        let value = significant(row.value, 3);
-        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
-    }
+    lines.extend(report.validity.iter().map(validity_line));
     lines.extend(report.sines.iter().flat_map(budget_words));
-    if !report.not_included.is_empty() {
-        lines.push(format!("not included     {}", report.not_included.join(", ")));
-    }
+    lines.extend(not_included_line(&report.not_included));
     lines.push(POISSON.into());
     lines.join("\n")
 }

@@ -1,6 +1,6 @@
 //! A modulus as people read it: the number first, and every assumption under it.
 
-use crate::material::{LoadingLackOfFit, MaterialBudgetRow, MaterialReport};
+use crate::material::{LoadingLackOfFit, MaterialBudgetRow, MaterialReport, ValidityRow};
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 use palpate_indentation::{
     Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
@@ -18,20 +18,25 @@ pub fn material_text(report: &MaterialReport) -> String {
     )];
     lines.extend(report.lack_of_fit.map(|lack| line("lack of fit", &lack_words(lack))));
     lines.extend(assumptions(report).iter().map(|(name, words)| line(name, words)));
-    for row in &report.validity {
-        let value = significant(row.value, 3);
-        lines.push(line("valid", &format!("{} {value}, at most {}", row.ratio, row.max)));
-    }
-    for row in &report.budget {
-        let words =
-            format!("{:<18} {:>8} kPa  {:>3.0} %", row.source, budget_kpa(row), row.percent);
-        lines.push(line("uncertainty", &words));
-    }
-    if !report.not_included.is_empty() {
-        lines.push(line("not included", &report.not_included.join(", ")));
-    }
+    lines.extend(report.validity.iter().map(validity_line));
+    lines.extend(report.budget.iter().map(budget_line));
+    lines.extend(not_included_line(&report.not_included));
     lines.push(RELAXES.into());
     lines.join("\n")
+}
+
+pub(super) fn validity_line(row: &ValidityRow) -> String {
+    format!("valid            {} {}, at most {}", row.ratio, significant(row.value, 3), row.max)
+}
+
+pub(super) fn budget_line(row: &MaterialBudgetRow) -> String {
+    let MaterialBudgetRow { source, percent, .. } = row;
+    format!("uncertainty      {source:<18} {:>8} kPa  {percent:>3.0} %", budget_kpa(row))
+}
+
+/// Nothing where the budget has everything.
+pub(super) fn not_included_line(names: &[&str]) -> Option<String> {
+    (!names.is_empty()).then(|| format!("not included     {}", names.join(", ")))
 }
 
 /// The modulus with its standard uncertainty.

@@ -1,6 +1,8 @@
 //! A relaxation modulus as people read it: the numbers first, and every assumption under them.
 
-use super::material::{force, indenter_words, kpa, law_words, length, specimen_words};
+use super::material::{
+    force, indenter_words, kpa, law_words, length, not_included_line, specimen_words, validity_line,
+};
 use crate::relaxation::{RelaxationReport, TermCandidate, TermChoice, UncertainNumber};
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 
@@ -48,10 +50,7 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
     lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
     lines.push(format!("specimen         {}", specimen_words(&report.specimen)));
     lines.push(format!("record           {}", record_words(report)));
-    for row in &report.validity {
-        let value = significant(row.value, 3);
-        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
-    }
+    lines.extend(report.validity.iter().map(validity_line));
     for row in &report.budget {
         lines.push(format!(
             "uncertainty      {:<18} instantaneous {:>8} kPa, equilibrium {:>8} kPa",
@@ -60,9 +59,7 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
             error_alone(kpa(row.equilibrium_mpa)),
         ));
     }
-    if !report.not_included.is_empty() {
-        lines.push(format!("not included     {}", report.not_included.join(", ")));
-    }
+    lines.extend(not_included_line(&report.not_included));
     lines.extend([POISSON, FLOW].map(String::from));
     lines.join("\n")
 }

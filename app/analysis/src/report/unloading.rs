@@ -1,8 +1,11 @@
 //! The modulus of an unloading as people read it.
 
-use super::material::{force, indenter_words, kpa, length, specimen_words};
+use super::material::{
+    budget_line, force, indenter_words, kpa, length, not_included_line, specimen_words,
+    validity_line,
+};
 use crate::unloading::UnloadingReport;
-use palpate_figures::uncertain::{error_alone, significant, with_error};
+use palpate_figures::uncertain::{significant, with_error};
 
 const HALF_SPACE: &str = "elastic: the unloading must be faster than the tissue relaxes, and the specimen much thicker than the contact is wide";
 
@@ -32,21 +35,9 @@ pub fn unloading_text(report: &UnloadingReport) -> String {
             significant(report.contact_area_mm2, 4),
         ),
     ];
-    for row in &report.validity {
-        let value = significant(row.value, 3);
-        lines.push(format!("valid            {} {value}, at most {}", row.ratio, row.max));
-    }
-    for row in &report.budget {
-        lines.push(format!(
-            "uncertainty      {:<18} {:>8} kPa  {:>3.0} %",
-            row.source,
-            error_alone(kpa(row.mpa)),
-            row.percent
-        ));
-    }
-    if !report.not_included.is_empty() {
-        lines.push(format!("not included     {}", report.not_included.join(", ")));
-    }
+    lines.extend(report.validity.iter().map(validity_line));
+    lines.extend(report.budget.iter().map(budget_line));
+    lines.extend(not_included_line(&report.not_included));
     lines.push(HALF_SPACE.into());
     lines.join("\n")
 }
