@@ -17,9 +17,7 @@ use crate::material::{
 };
 use crate::source::RecordStretch;
 use numbers::Numbers;
-use palpate_indentation::{
-    ContactLaw, Indenter, LoadHistoryError, RelaxationFit, RelaxationFitError, Specimen,
-};
+use palpate_indentation::{ContactLaw, Indenter, LoadHistoryError, RelaxationFitError, Specimen};
 use record::{Record, Source};
 use serde::Serialize;
 use std::path::PathBuf;
