@@ -337,7 +337,7 @@ impl Loading {
         };
         let first = taken.iter().find(|one| one.depth.0 > shift);
         let secs = first.zip(taken.last()).map_or(0.0, |(first, last)| last.t.0 - first.t.0);
-        Self { samples: known().map(sample).collect(), noise: read.noise(), secs }
+        Self { samples: known().map(sample).collect(), noise: read.noise_of(taken), secs }
     }
 
     /// Standard deviation in N of what changes from sample to sample, from second differences: a curve has nearly none.

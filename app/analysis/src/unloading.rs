@@ -71,7 +71,7 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     let signal = read.signal.as_ref();
     let shift = signal.map_or(0.0, |signal| signal.contact_shift_mm);
     let samples = samples(&read, shift);
-    let noise_n = read.noise();
+    let noise_n = read.noise_of(&read.samples);
     let contact_error_mm = request.contact.or_recorded(signal.map(|one| one.contact_error_mm));
     let knowledge = LoadingKnowledge {
         noise_newtons: noise_n,

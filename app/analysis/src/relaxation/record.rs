@@ -96,7 +96,7 @@ impl Record {
             // The slider trembles about the contact too.
             depths: taken.iter().map(|one| depth(one).max(0.0)).collect(),
             forces: taken.iter().map(|one| one.force.0).collect(),
-            noise: read.noise(),
+            noise: read.noise_of(taken),
         })
     }
 

@@ -49,12 +49,18 @@ pub struct FitSource {
 }
 
 impl FitSource {
-    /// Root mean square of the standard deviations of the forces in N; `None` of a table, whose noise is not known.
+    /// Root mean square in N of the standard deviations of these forces, which grow with the force; `None` of a table, whose
+    /// noise is not known.
     #[must_use]
-    pub(crate) fn noise(&self) -> Option<f64> {
-        let known = || self.samples.iter().filter(|one| one.is_measured());
-        let squares: f64 = known().map(|one| one.sigma.0 * one.sigma.0).sum();
-        self.signal.as_ref().map(|_| (squares / known().count().max(1) as f64).sqrt())
+    pub(crate) fn noise_of<'s>(
+        &self,
+        samples: impl IntoIterator<Item = &'s FitSample>,
+    ) -> Option<f64> {
+        let known = samples.into_iter().filter(|one| one.is_measured());
+        let (squares, count) = known.fold((0.0, 0usize), |(squares, count), one| {
+            (squares + one.sigma.0 * one.sigma.0, count + 1)
+        });
+        self.signal.as_ref().map(|_| (squares / count.max(1) as f64).sqrt())
     }
 }
 
