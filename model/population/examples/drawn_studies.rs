@@ -1,0 +1,126 @@
+//! How often the intervals of a drawn population hold the truth: `drawn_studies STUDIES` prints a line for each number of
+//! animals, each with three sites of two repeats, half of the animals treated.
+//!
+//! With `heavy` animals scatter by Student's t with three degrees of freedom, with `one-bad` one specimen in each study is
+//! far off.
+
+use palpate_model::random::SplitMix;
+use palpate_population::{
+    Evidence, PopulationFit, PopulationOptions, Study, StudySession, SymmetricMatrix,
+    fit_population,
+};
+
+const ANIMALS: [usize; 3] = [4, 6, 12];
+const SITES: usize = 3;
+const REPEATS: usize = 2;
+/// Standard deviations of logarithms from animal to animal, from site to site, from repeat to repeat, and of one fit.
+const SPREADS: [f64; 3] = [0.25, 0.15, 0.1];
+const NOISE: f64 = 0.05;
+const MEAN: f64 = 1.5;
+const EFFECT: f64 = 0.3;
+
+#[derive(Clone, Copy, PartialEq)]
+enum Trouble {
+    None,
+    HeavyTails,
+    OneBad,
+}
+
+fn study(animals: usize, effect: f64, trouble: Trouble, random: &mut SplitMix) -> Study {
+    let mut study = Study {
+        parameters: vec!["stiffness".into()],
+        effects: vec!["mean".into(), "treated".into()],
+        levels: ["animal", "site", "repeat"].map(String::from).to_vec(),
+        sessions: Vec::new(),
+    };
+    for animal in 0..animals {
+        let treated = (animal % 2) as f64;
+        let mut shift = SPREADS[0] * random.normal();
+        if trouble == Trouble::HeavyTails {
+            let squares: f64 = (0..3).map(|_| random.normal().powi(2)).sum();
+            // Student's t of three degrees of freedom has a variance of three.
+            shift /= squares.sqrt();
+        }
+        for site in 0..SITES {
+            let mut at = shift + SPREADS[1] * random.normal();
+            if trouble == Trouble::OneBad && animal == 0 && site == 0 {
+                at += 6.0 * SPREADS[1];
+            }
+            for _ in 0..REPEATS {
+                let noise = SPREADS[2] * random.normal() + NOISE * random.normal();
+                study.sessions.push(StudySession {
+                    groups: vec![format!("animal {animal}"), format!("site {site}")],
+                    design: vec![1.0, treated],
+                    values: vec![MEAN + effect * treated + at + noise],
+                    evidence: Evidence::Information(SymmetricMatrix::from_element(
+                        1,
+                        1,
+                        NOISE.powi(-2),
+                    )),
+                });
+            }
+        }
+    }
+    study
+}
+
+#[derive(Default)]
+struct Tally {
+    mean: usize,
+    effect: usize,
+    spreads: [usize; 3],
+    widths: [f64; 2],
+    zeros: [usize; 3],
+}
+
+impl Tally {
+    fn count(&mut self, fit: &PopulationFit, effect: f64) {
+        let holds = |[low, high]: [f64; 2], truth: f64| usize::from(low <= truth && truth <= high);
+        let [mean, treated] = [0, 1].map(|k| &fit.effects[k]);
+        self.mean += holds(mean.interval, MEAN);
+        self.effect += holds(treated.interval, effect);
+        self.widths[0] += mean.interval[1] - mean.interval[0];
+        self.widths[1] += treated.interval[1] - treated.interval[0];
+        for (k, spread) in fit.spreads.iter().enumerate() {
+            let [low, high] = spread.interval;
+            let ends = [low.unwrap_or(0.0), high.unwrap_or(f64::INFINITY)];
+            self.spreads[k] += holds(ends, SPREADS[k]);
+            self.zeros[k] += usize::from(spread.is_zero);
+        }
+    }
+}
+
+#[expect(clippy::print_stdout, reason = "an example prints its result")]
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let studies: usize = arguments.next().map_or(Ok(1000), |text| text.parse())?;
+    let trouble = match arguments.next().as_deref() {
+        Some("heavy") => Trouble::HeavyTails,
+        Some("one-bad") => Trouble::OneBad,
+        _ => Trouble::None,
+    };
+    let options = PopulationOptions { is_correlated: false, has_spread_intervals: true };
+    for animals in ANIMALS {
+        let mut random = SplitMix::seeded(animals as u64);
+        let (mut tally, mut false_positives) = (Tally::default(), 0);
+        for _ in 0..studies {
+            let fit = fit_population(&study(animals, EFFECT, trouble, &mut random), options)?;
+            tally.count(&fit, EFFECT);
+            let plain = PopulationOptions::default();
+            let none = fit_population(&study(animals, 0.0, trouble, &mut random), plain)?;
+            false_positives += usize::from(none.effects[1].p_value < 0.05);
+        }
+        let share = |count: usize| 100.0 * count as f64 / studies as f64;
+        let [animal, site, repeat] = tally.spreads.map(share);
+        println!(
+            "{animals:2} animals: mean {:.1} %, effect {:.1} %, spreads of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; zero {:?}; widths {:.3} {:.3}",
+            share(tally.mean),
+            share(tally.effect),
+            share(false_positives),
+            tally.zeros,
+            tally.widths[0] / studies as f64,
+            tally.widths[1] / studies as f64,
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,20 @@
+//! From the bodies of single sessions to the population that they come from.
+//!
+//! A body of one session is a vector of logarithms of parameters with an uncertainty. Bodies scatter from animal to animal,
+//! within an animal from specimen to specimen, and so on down to the repeat; [`fit_population`] finds how far, and the means
+//! and effects of covariates, from all sessions together. It never reads a file, a port or a clock and starts no thread.
+//!
+//! Start at [`Study`].
+#![cfg_attr(not(test), warn(clippy::too_many_lines))]
+
+mod fit;
+mod likelihood;
+mod search;
+mod study;
+
+pub use fit::{
+    COVERAGE, EffectEstimate, GroupShift, PopulationFit, PopulationOptions, Spread, fit_population,
+};
+/// A symmetric matrix of one row for each parameter.
+pub use nalgebra::DMatrix as SymmetricMatrix;
+pub use study::{Evidence, Study, StudyError, StudySession};

@@ -1,0 +1,89 @@
+# Designs of nested studies with the answers of lme4, nlme and metafor, as JSON: public data of lme4 and nlme, and drawn
+# studies that are unbalanced. `population-oracle` compares them with the crate.
+suppressMessages({library(lme4); library(nlme); library(metafor); library(jsonlite)})
+options(contrasts = c("contr.treatment", "contr.treatment"))
+
+from_nlme <- c("Oats", "Machines", "Rail", "ergoStool", "Alfalfa", "Orthodont")
+data(list = from_nlme, package = "nlme")
+data(list = c("Pastes", "Dyestuff", "Dyestuff2", "cake", "sleepstudy"), package = "lme4")
+
+# Values of lme4 are searched until its own derivative-free optimiser moves by less than a millionth of the answer.
+tight <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhoend = 1e-10, maxfun = 1e6),
+                     check.conv.singular = "ignore")
+lme_tight <- lmeControl(tolerance = 1e-12, msTol = 1e-12, msMaxIter = 1000, maxIter = 1000, opt = "nlminb")
+
+design <- function(name, data, response, fixed, groups) {
+    data <- as.data.frame(data)
+    for (group in groups) data[[group]] <- as.character(data[[group]])
+    # lme4 and nlme nest by names of their own.
+    nest <- paste(groups, collapse = "/")
+    lmer_fit <- lmer(as.formula(paste(response, "~", fixed, "+ (1 |", nest, ")")), data, control = tight)
+    lme_fit <- tryCatch(lme(as.formula(paste(response, "~", fixed)), data,
+                            random = as.formula(paste("~ 1 |", nest)), control = lme_tight),
+                        error = function(why) NULL)
+    x <- model.matrix(as.formula(paste("~", fixed)), data)
+    spreads <- as.data.frame(VarCorr(lmer_fit))$sdcor
+    # lme4 lists the innermost group first and the residual last.
+    count <- length(groups)
+    spreads <- c(rev(spreads[seq_len(count)]), spreads[count + 1])
+    list(name = name, levels = c(groups, "residual"), effects = colnames(x),
+         groups = unname(as.matrix(data[groups])), design = unname(x), values = data[[response]],
+         lme4 = list(effects = unname(fixef(lmer_fit)), errors = unname(sqrt(diag(as.matrix(vcov(lmer_fit))))),
+                     spreads = spreads),
+         nlme = if (is.null(lme_fit)) NULL else
+             list(effects = unname(fixef(lme_fit)), errors = unname(sqrt(diag(lme_fit$varFix))),
+                  spreads = unname(nlme_spreads(lme_fit))))
+}
+
+# Standard deviations, the outermost level first, then the residual.
+nlme_spreads <- function(fit) {
+    levels <- lapply(fit$modelStruct$reStruct, function(one) sqrt(diag(as.matrix(one))) * fit$sigma)
+    c(rev(unlist(levels)), fit$sigma)
+}
+
+set.seed(20)
+drawn <- function(animals, sites_max, repeats_max, spreads) {
+    rows <- list()
+    for (a in seq_len(animals)) {
+        shift_a <- rnorm(1, 0, spreads[1])
+        for (s in seq_len(sample(sites_max, 1))) {
+            shift_s <- shift_a + rnorm(1, 0, spreads[2])
+            for (r in seq_len(sample(repeats_max, 1)))
+                rows[[length(rows) + 1]] <- data.frame(
+                    animal = paste0("a", a), site = paste0("s", s), treated = a %% 2, age = 1 + (a * 7) %% 5,
+                    depth = s * 0.5, value = 2 + 0.3 * (a %% 2) + shift_s + rnorm(1, 0, spreads[3]))
+        }
+    }
+    do.call(rbind, rows)
+}
+
+known <- function(name, data, fixed) {
+    variance <- runif(nrow(data), 0.001, 0.2)
+    data$value <- data$value + rnorm(nrow(data), 0, sqrt(variance))
+    data$row <- seq_len(nrow(data))
+    fit <- rma.mv(value, variance, mods = as.formula(paste("~", fixed)), random = ~ 1 | animal/site/row, data = data,
+                  control = list(optimizer = "nlminb", rel.tol = 1e-10, iter.max = 1000, eval.max = 10000))
+    x <- model.matrix(as.formula(paste("~", fixed)), data)
+    list(name = name, levels = c("animal", "site", "residual"), effects = colnames(x),
+         groups = unname(as.matrix(data[c("animal", "site")])), design = unname(x), values = data$value,
+         variances = variance,
+         metafor = list(effects = unname(c(coef(fit))), errors = unname(fit$se), spreads = sqrt(fit$sigma2)))
+}
+
+designs <- list(
+    design("Oats", Oats, "yield", "nitro", c("Block", "Variety")),
+    design("Machines, every seventh row left out", as.data.frame(Machines)[-seq(1, 54, 7), ], "score", "Machine", c("Worker")),
+    design("Machines", Machines, "score", "1", c("Machine", "Worker")),
+    design("Rail", Rail, "travel", "1", "Rail"),
+    design("ergoStool", ergoStool, "effort", "Type", "Subject"),
+    design("Alfalfa", Alfalfa, "Yield", "Date", c("Block", "Variety")),
+    design("Orthodont", Orthodont, "distance", "age * Sex", "Subject"),
+    design("Pastes", Pastes, "strength", "1", c("batch", "cask")),
+    design("Dyestuff2, a spread of zero", Dyestuff2, "Yield", "1", "Batch"),
+    design("cake", cake, "angle", "recipe + temp", c("replicate")),
+    design("sleepstudy", sleepstudy, "Reaction", "Days", "Subject"),
+    design("drawn, unbalanced", drawn(9, 4, 5, c(0.3, 0.2, 0.1)), "value", "treated + depth", c("animal", "site")),
+    design("drawn, animals far apart", drawn(6, 5, 3, c(3, 0.2, 0.05)), "value", "treated + age", c("animal", "site")),
+    known("drawn, known errors", drawn(10, 4, 4, c(0.3, 0.2, 0.1)), "treated"),
+    known("drawn, known errors and two effects", drawn(14, 4, 4, c(0.5, 0.3, 0.2)), "treated + depth"))
+cat(toJSON(designs, digits = NA, auto_unbox = FALSE))
