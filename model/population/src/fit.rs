@@ -22,7 +22,8 @@ pub struct EffectEstimate {
     /// In logarithms of the parameter.
     pub value: f64,
     pub std_error: f64,
-    /// Degrees of freedom by Satterthwaite.
+    /// Degrees of freedom by Satterthwaite (Biometrics Bulletin 2 (1946) 110-114), or those of the groups among which it is
+    /// seen (Pinheiro & Bates, section 2.4.2) where these show no spread.
     pub freedom: f64,
     /// Ends of the 95 % interval.
     pub interval: [f64; 2],
@@ -135,6 +136,10 @@ impl Fitter<'_> {
         let evaluation = &optimum.evaluation;
         let by_spread = self.covariance_slopes(&optimum.at)?;
         let spread_covariance = inverse_of_the_known(&optimum.curvature) * 2.0;
+        let factors = self.coordinates().factors(&optimum.at);
+        let is_zero = |level: usize, k: usize| {
+            factors[level].row(k).norm() < ZERO * self.coordinates().scales[k]
+        };
         let mut found = Vec::new();
         for (j, effect) in self.study.effects.iter().enumerate() {
             for (k, parameter) in self.study.parameters.iter().enumerate() {
@@ -144,8 +149,12 @@ impl Fitter<'_> {
                 let slopes = by_spread.iter().map(|slope| slope[(index, index)]);
                 let slopes = DVector::from_iterator(by_spread.len(), slopes);
                 let uncertainty = (&spread_covariance * &slopes).dot(&slopes);
-                let freedom = 2.0 * variance * variance / uncertainty;
-                let freedom = freedom.clamp(1.0, 1e9);
+                let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, 1e9);
+                let freedom = match self.nested.level_of(j) {
+                    // No uncertainty of a spread of zero is known, although its groups are few: theirs is the least.
+                    (level, own) if is_zero(level, k) => freedom.min(own),
+                    _ => freedom,
+                };
                 let std_error = variance.sqrt();
                 let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
                 let half = student.inverse_cdf(0.5 + 0.5 * COVERAGE) * std_error;

@@ -7,11 +7,15 @@
 //! Start at [`Study`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+mod curves;
 mod fit;
 mod likelihood;
 mod search;
 mod study;
+#[cfg(test)]
+mod tests;
 
+pub use curves::{CurveEvidence, CurvePopulation, fit_curves};
 pub use fit::{
     COVERAGE, EffectEstimate, GroupShift, PopulationFit, PopulationOptions, Spread, fit_population,
 };

@@ -3,6 +3,7 @@
 
 mod abilities;
 mod coverage;
+mod curve_likelihood;
 mod cycles;
 mod expected;
 #[cfg(feature = "extremes")]
