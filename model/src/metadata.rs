@@ -1,7 +1,10 @@
-//! What a record says about a session apart from its samples: specimen, probe, place in a series.
+//! What a record says about a session apart from its samples: animal, specimen, probe, place in a series.
 //!
 //! [`METADATA_KEYS`] is the one list of possible entries. The command line, protocol files that ask before a start
 //! and the manifest all use it.
+//!
+//! The entries nest as sessions of a study do: `animal.name`, then `specimen`, `specimen.site` and `series.repeat`. Every
+//! `animal.` entry is the same in all sessions of an animal; any other may differ from session to session.
 
 use crate::typed_number::plain_text;
 use serde::{Deserialize, Serialize};
@@ -23,6 +26,8 @@ pub enum MetadataKind {
     },
     /// A whole number from 1.
     Count,
+    /// One of these words, because sessions are grouped by it: `f` and `female` would be two groups.
+    Choice(&'static [&'static str]),
 }
 
 /// One possible entry.
@@ -58,7 +63,21 @@ pub const METADATA_KEYS: &[MetadataKey] = &[
     text("operator", "who runs the test"),
     text("specimen", "name of the specimen that is indented"),
     text("indenter", "description of the probe"),
+    text("animal.name", "name of the animal, donor or batch that the specimen comes from"),
+    text("animal.species", "species, and breed or strain where they matter"),
+    MetadataKey {
+        name: "animal.age_days",
+        meaning: "age in days at death, or at the first test of a living animal",
+        kind: MetadataKind::Number { unit: "days", above: 0.0, is_limit_allowed: true },
+    },
+    MetadataKey {
+        name: "animal.sex",
+        meaning: "female, male, or mixed for a batch of several animals; without an entry unknown",
+        kind: MetadataKind::Choice(&["female", "male", "mixed"]),
+    },
+    text("animal.treatment", "treatment or group of the animal, such as control"),
     text("specimen.source", "animal or material, organ and supplier"),
+    text("specimen.site", "place on the specimen that is indented, such as left lobe"),
     MetadataKey {
         name: "specimen.time_since_death_h",
         meaning: "hours from death to the test",
@@ -86,7 +105,15 @@ pub const METADATA_KEYS: &[MetadataKey] = &[
     count("series.specimen", "number of the specimen in the series"),
     count("series.repeat", "number of the repeat on this specimen, from 1"),
     count("series.repeats", "number of repeats that are planned"),
+    count("series.order", "number of the test in the order of testing, from 1"),
 ];
+
+/// The entry that names the animal, and the beginning of all that describe it.
+pub const ANIMAL: &str = "animal.name";
+pub const ANIMAL_PREFIX: &str = "animal.";
+/// The entry that names the specimen, and the beginning of all that describe it.
+pub const SPECIMEN: &str = "specimen";
+pub const SPECIMEN_PREFIX: &str = "specimen.";
 
 /// An entry is not possible.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -140,6 +167,10 @@ impl MetadataKey {
                 Ok(count) if count > 0 => Ok(count.into()),
                 _ => Err(refused("a whole number from 1".into())),
             },
+            MetadataKind::Choice(words) => match words.iter().find(|word| **word == value) {
+                Some(word) => Ok((*word).into()),
+                None => Err(refused(words.join(", "))),
+            },
             MetadataKind::Number { unit, above, is_limit_allowed } => {
                 let plain = plain_text(value).map_err(|err| refused(err.to_string()))?;
                 match plain.parse::<f64>() {
@@ -175,15 +206,43 @@ impl SessionMetadata {
         self.values.get(key)
     }
 
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.values.iter().map(|(name, value)| (name.as_str(), value))
+    }
+
+    /// Sets one entry; an earlier value is replaced.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), MetadataError> {
+        let key = find_key(name.trim())?;
+        self.put(key.name, key.parse(value)?);
+        Ok(())
+    }
+
+    /// Sets an entry that was checked before.
+    pub fn put(&mut self, name: &str, value: Value) {
+        self.values.insert(name.to_owned(), value);
+    }
+
     /// All entries in the order of [`METADATA_KEYS`], then those that this version does not know. Text without quotes.
     pub fn lines(&self) -> Vec<(&str, String)> {
         let place = |name: &str| METADATA_KEYS.iter().position(|key| key.name == name);
         let mut entries: Vec<(&str, &Value)> =
             self.values.iter().map(|(k, v)| (k.as_str(), v)).collect();
         entries.sort_by_key(|(name, _)| (place(name).unwrap_or(METADATA_KEYS.len()), *name));
-        let plain = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        entries.into_iter().map(|(name, value)| (name, plain(value))).collect()
+        entries.into_iter().map(|(name, value)| (name, plain_value(value))).collect()
     }
+
+    /// All entries as `KEY=VALUE`, in the order of [`lines`](Self::lines), with commas between them.
+    pub fn pairs(&self) -> String {
+        let lines = self.lines().into_iter();
+        let pairs: Vec<String> = lines.map(|(name, value)| format!("{name}={value}")).collect();
+        pairs.join(", ")
+    }
+}
+
+/// A value as text without quotes.
+#[must_use]
+pub fn plain_value(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// Operator, specimen and other labels of a session.
@@ -200,17 +259,34 @@ impl SessionLabels {
     /// Sets one entry; an earlier value is replaced.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), MetadataError> {
         let key = find_key(name.trim())?;
-        let value = key.parse(value)?;
-        let words = || value.as_str().unwrap_or_default().to_owned();
-        match key.name {
-            "operator" => self.operator = words(),
-            "specimen" => self.specimen = words(),
-            "indenter" => self.indenter = words(),
-            name => {
-                self.about.values.insert(name.to_owned(), value);
-            }
-        }
+        self.put(key.name, key.parse(value)?);
         Ok(())
+    }
+
+    fn put(&mut self, name: &str, value: Value) {
+        let words = || value.as_str().unwrap_or_default().to_owned();
+        match name {
+            "operator" => self.operator = words(),
+            SPECIMEN => self.specimen = words(),
+            "indenter" => self.indenter = words(),
+            name => self.about.put(name, value),
+        }
+    }
+
+    /// Takes over entries that were checked before; operator, specimen and indenter may be among them.
+    pub fn take(&mut self, entries: &SessionMetadata) {
+        entries.iter().for_each(|(name, value)| self.put(name, value.clone()));
+    }
+
+    /// The value of an entry of [`METADATA_KEYS`].
+    pub fn value(&self, name: &str) -> Option<Value> {
+        let words = |text: &str| (!text.trim().is_empty()).then(|| text.into());
+        match name {
+            "operator" => words(&self.operator),
+            SPECIMEN => words(&self.specimen),
+            "indenter" => words(&self.indenter),
+            name => self.about.get(name).cloned(),
+        }
     }
 
     /// Sets the entry of a `KEY=VALUE`.
@@ -221,13 +297,7 @@ impl SessionLabels {
 
     /// Whether an entry of [`METADATA_KEYS`] has a value.
     pub fn is_set(&self, name: &str) -> bool {
-        let is_there = |text: &str| !text.trim().is_empty();
-        match name {
-            "operator" => is_there(&self.operator),
-            "specimen" => is_there(&self.specimen),
-            "indenter" => is_there(&self.indenter),
-            name => self.about.get(name).is_some(),
-        }
+        self.value(name).is_some()
     }
 
     /// Refuses entries that contradict each other.
@@ -256,6 +326,8 @@ mod tests {
             "operator=Ada",
             "specimen.temperature_c=-4.5",
             "specimen.time_since_death_h=0",
+            "animal.sex=female",
+            "animal.age_days=180",
         ] {
             labels.set_pair(pair).unwrap();
         }
@@ -263,6 +335,8 @@ mod tests {
         assert!(labels.is_set("operator") && !labels.is_set("specimen"));
         let lines = labels.about.lines();
         let expected = [
+            ("animal.age_days", "180.0"),
+            ("animal.sex", "female"),
             ("specimen.source", "pig stomach = fundus"),
             ("specimen.time_since_death_h", "0.0"),
             ("specimen.temperature_c", "-4.5"),
@@ -287,6 +361,8 @@ mod tests {
             ("series.repeat=0", "a whole number from 1"),
             ("series.repeat=1.5", "a whole number from 1"),
             ("operator= ", "some words"),
+            ("animal.sex=f", "give female, male, mixed"),
+            ("animal.age_days=-1", "a number of days from 0"),
         ] {
             let mut labels = SessionLabels::default();
             let refusal = labels.set_pair(pair).unwrap_err().to_string();

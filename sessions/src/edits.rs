@@ -1,12 +1,13 @@
-//! Edits of a finished session, by people or by the program at the end of a run: data quality, corrected contacts, tags,
-//! notes and reviews. The log stays unchanged; every edit stays in `edits.jsonl` beside it. The last verdict, and the last
-//! correction of each contact, counts.
+//! Edits of a finished session, by people or by the program at the end of a run: data quality, corrected contacts, metadata
+//! entries, tags, notes and reviews. The log stays unchanged; every edit stays in `edits.jsonl` beside it. The last verdict,
+//! and the last correction of each contact and entry, counts.
 
 use crate::analyses::AnalysisInput;
 use crate::chain::{self, ChainError, ChainHead};
 use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
 use chrono::{DateTime, Utc};
+use palpate_model::metadata::{SessionLabels, SessionMetadata};
 use palpate_model::units::Position;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -75,6 +76,10 @@ pub enum EditChange {
         position_mm: Position,
         /// Position in the recording.
         was_mm: Position,
+    },
+    /// Metadata entries that were not known at the start, or were wrong.
+    About {
+        entries: SessionMetadata,
     },
     Tags {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -161,6 +166,23 @@ impl Edits {
                 Some((position_mm, edit))
             }
             _ => None,
+        })
+    }
+
+    /// Replaces labels by those that edits give.
+    pub fn apply_to_labels(&self, labels: &mut SessionLabels) {
+        for edit in &self.all {
+            if let EditChange::About { entries } = &edit.change {
+                labels.take(entries);
+            }
+        }
+    }
+
+    /// The last edit that gives a metadata entry.
+    pub fn about(&self, name: &str) -> Option<&Edit> {
+        self.all.iter().rev().find(|edit| match &edit.change {
+            EditChange::About { entries } => entries.get(name).is_some(),
+            _ => false,
         })
     }
 

@@ -3,7 +3,7 @@
 use crate::import_origin::ImportOrigin;
 use crate::recover::RecoveryOrigin;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_model::metadata::SessionMetadata;
+use palpate_model::metadata::{SessionLabels, SessionMetadata};
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
@@ -36,7 +36,7 @@ pub struct Manifest {
     pub specimen: String,
     /// Shape and size of the probe, in words.
     pub indenter: String,
-    /// Further facts about specimen, probe and series; see [`palpate_model::metadata::KEYS`].
+    /// Further facts about specimen, probe and series; see [`palpate_model::metadata::METADATA_KEYS`].
     #[serde(default, skip_serializing_if = "SessionMetadata::is_empty")]
     pub about: SessionMetadata,
     /// `None` in sessions of old versions.
@@ -75,6 +75,27 @@ impl Manifest {
             Some(rig) => ticks as f64 * rig.tick().0,
             None => ticks as f64 / IMPORTED_TICKS_PER_S,
         })
+    }
+
+    pub fn labels(&self) -> SessionLabels {
+        SessionLabels {
+            operator: self.operator.clone(),
+            specimen: self.specimen.clone(),
+            indenter: self.indenter.clone(),
+            about: self.about.clone(),
+        }
+    }
+
+    /// Takes over labels; that of the signal's filter counts for the signal too.
+    pub fn set_labels(&mut self, labels: SessionLabels) {
+        let filter = labels.about.get("signal.filter").and_then(serde_json::Value::as_str);
+        if let (Some(signal), Some(filter)) = (&mut self.signal, filter) {
+            signal.filter = filter.into();
+        }
+        self.operator = labels.operator;
+        self.specimen = labels.specimen;
+        self.indenter = labels.indenter;
+        self.about = labels.about;
     }
 
     /// RFC 3339 in UTC, to the millisecond.

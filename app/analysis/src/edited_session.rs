@@ -1,14 +1,16 @@
 //! A session as its edits leave it: the way every reader but replay opens one.
 //!
 //! A corrected contact moves every depth that was counted from it by the difference, and stands in the
-//! decision that found it. The log itself stays as it is.
+//! decision that found it. Metadata entries of an edit replace those of the manifest. The log itself stays as it is.
 
 use crate::source::SourceError;
+use palpate_model::metadata::{METADATA_KEYS, MetadataKey, plain_value};
 use palpate_model::units::Depth;
 pub use palpate_sessions::contacts::{FoundContact, contacts};
 use palpate_sessions::contacts::{contact_position, is_record};
 use palpate_sessions::{
-    DataQuality, Edits, LogEntry, ReadError, SampleBlock, SampleRow, Session, SessionOutline,
+    DataQuality, Edits, LogEntry, Manifest, ReadError, SampleBlock, SampleRow, Session,
+    SessionOutline,
 };
 use std::ops::Range;
 use std::path::Path;
@@ -35,6 +37,7 @@ pub fn open(path: &Path) -> Result<EditedSession, SourceError> {
     let mut session = Session::open(path)?;
     let edits = Edits::read(path, &session.manifest.session_id)?;
     correct(&mut session, &edits);
+    session.notes.extend(correct_labels(&mut session.manifest, &edits));
     session.notes.extend(doubts(&edits));
     Ok(EditedSession { session, edits })
 }
@@ -74,6 +77,7 @@ pub fn of_outline(
     let edits = Edits::read(path, &outline.manifest.session_id)?;
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
     outline.notes.extend(notes);
+    outline.notes.extend(correct_labels(&mut outline.manifest, &edits));
     outline.notes.extend(doubts(&edits));
     Ok(StreamedSession { outline, edits, shifts })
 }
@@ -130,6 +134,23 @@ fn correct(session: &mut Session, edits: &Edits) {
         }
     }
     session.notes.extend(notes);
+}
+
+/// Takes over the entries of edits; a sentence on each that was recorded otherwise.
+fn correct_labels(manifest: &mut Manifest, edits: &Edits) -> Vec<String> {
+    let recorded = manifest.labels();
+    let mut labels = recorded.clone();
+    edits.apply_to_labels(&mut labels);
+    let note = |key: &MetadataKey| {
+        let (was, now) = (recorded.value(key.name)?, labels.value(key.name)?);
+        let edit = edits.about(key.name).filter(|_| was != now)?;
+        let (was, now) = (plain_value(&was), plain_value(&now));
+        let (name, by, reason) = (key.name, &edit.by, &edit.reason);
+        Some(format!("{name} was corrected from '{was}' to '{now}' by {by} ({reason})"))
+    };
+    let notes = METADATA_KEYS.iter().filter_map(note).collect();
+    manifest.set_labels(labels);
+    notes
 }
 
 /// Corrects contacts among the entries; what that does to the depths, and a sentence on each.

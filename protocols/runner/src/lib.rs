@@ -23,6 +23,7 @@ mod run_log;
 mod snapshot;
 mod start;
 mod started_run;
+pub mod study;
 #[cfg(test)]
 mod tests;
 mod watch;

@@ -3,6 +3,7 @@
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
 use super::leading::SharedLeadSource;
+use super::study::complete_labels;
 use super::watch::HostWatch;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
@@ -91,7 +92,11 @@ pub(super) fn start(
     if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
         return Err(refused(format!("{first}; acknowledge this to continue")));
     }
-    request.labels.check().map_err(|err| refused(err.to_string()))?;
+    let mut labels = request.labels.clone();
+    if let Ok(library) = library_folder() {
+        complete_labels(&mut labels, &library).map_err(|err| refused(err.to_string()))?;
+    }
+    labels.check().map_err(|err| refused(err.to_string()))?;
 
     let started_at = wall_now();
     let session_id = new_session_id(started_at.into());
@@ -105,7 +110,8 @@ pub(super) fn start(
     check_free_space(&path, preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
 
-    let manifest = manifest(request, &context, &preview, session_id.clone(), started_at)?;
+    let mut manifest = manifest(request, &context, &preview, session_id.clone(), started_at)?;
+    manifest.set_labels(labels);
     let pace = if context.is_virtual { RecordingPace::Virtual } else { RecordingPace::Real };
     let writer = SessionWriter::start(folder, spare_folder().as_deref(), &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
@@ -134,29 +140,19 @@ fn manifest(
         acknowledgements.extend_from_slice(&preview.acknowledgements);
         acknowledgements.extend_from_slice(&request.to_acknowledge);
     }
-    let mut signal = context.rig.signal();
-    if let Some(filter) = request.labels.about.get("signal.filter") {
-        signal.filter = filter.as_str().unwrap_or_default().into();
-    }
-    let labels = request.labels.clone();
     Ok(Manifest {
         record_version: RECORD_VERSION,
         session_id,
         software_version: env!("CARGO_PKG_VERSION").into(),
         engine_version: ENGINE_VERSION,
         started_at: started_at.into(),
-        operator: labels.operator,
-        specimen: labels.specimen,
-        indenter: labels.indenter,
-        about: labels.about,
-        signal: Some(signal),
-        imported: None,
+        signal: Some(context.rig.signal()),
         rig: Some(context.rig.as_ref().clone()),
         limits: Some(request.limits),
         calibration: json("calibration", serde_json::to_value(&request.calibration))?,
         plan: json("plan", serde_json::to_value(&request.plan))?,
         settings: serde_json::json!({ "is_homed_at_start": context.is_homed }),
         acknowledgements,
-        recovered: None,
+        ..Manifest::default()
     })
 }

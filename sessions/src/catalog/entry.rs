@@ -8,6 +8,7 @@ use crate::edits::{DataQuality, EditError, Edits, Review};
 use crate::log::{ReadError, SessionSummary};
 use crate::manifest::Manifest;
 use chrono::{DateTime, Utc};
+use palpate_model::metadata::SessionLabels;
 use palpate_model::quantity::{base_unit, in_base_unit, split};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -136,13 +137,16 @@ impl CatalogEntry {
     /// Reads a session. `trouble` says why one cannot be read, or which known lines are missing.
     pub(super) fn read(session: &LibrarySession, known: &KnownHeads) -> Self {
         let mut entry = Self { folder: session.name.clone(), ..Self::default() };
-        match SessionSummary::read(&session.path) {
-            Ok(summary) => entry.take_summary(&summary),
+        let mut labels = match SessionSummary::read(&session.path) {
+            Ok(summary) => {
+                entry.take_summary(&summary);
+                summary.manifest.labels()
+            }
             Err(err) => {
                 let is_newer = matches!(err, ReadError::Newer { .. });
                 return Self { trouble: Some(err.to_string()), is_newer, ..entry };
             }
-        }
+        };
         let id = &entry.session_id;
         let heads = known.of_session(&session.name, id);
         entry.heads = heads;
@@ -156,12 +160,16 @@ impl CatalogEntry {
         });
         entry.heads.analyses = analyses.head;
         match edits {
-            Ok(edits) => entry.take_edits(&edits, &analyses),
+            Ok(edits) => {
+                edits.apply_to_labels(&mut labels);
+                entry.take_edits(&edits, &analyses);
+            }
             Err(err) => {
                 entry.is_newer |= matches!(&err, EditError::Chain(err) if err.is_newer());
                 trouble.push(err.to_string());
             }
         }
+        entry.take_labels(labels);
         entry.take_analyses(&analyses);
         entry.trouble = (!trouble.is_empty()).then(|| trouble.join("; "));
         entry
@@ -181,9 +189,6 @@ impl CatalogEntry {
     fn take_manifest(&mut self, manifest: &Manifest) {
         self.session_id.clone_from(&manifest.session_id);
         self.started_at = manifest.started_at_text();
-        self.operator.clone_from(&manifest.operator);
-        self.specimen.clone_from(&manifest.specimen);
-        self.indenter.clone_from(&manifest.indenter);
         self.software_version.clone_from(&manifest.software_version);
         if let Some(rig) = &manifest.rig {
             self.rig.clone_from(&rig.name);
@@ -221,14 +226,20 @@ impl CatalogEntry {
             let name = step["step"].as_str().unwrap_or("step");
             collect_leaves(name, step, &mut named);
         }
-        for (name, text) in manifest.about.lines() {
-            let number = manifest.about.get(name).and_then(Value::as_f64);
-            named.push(NamedValue::new(NamedValueSource::About, name, (number, ""), text));
-        }
         // Repeated steps have the same values.
         let mut seen = BTreeSet::new();
         named.retain(|one| seen.insert((one.source, one.name.clone(), one.text.clone())));
         self.named = named;
+    }
+
+    fn take_labels(&mut self, labels: SessionLabels) {
+        for (name, text) in labels.about.lines() {
+            let number = labels.about.get(name).and_then(Value::as_f64);
+            self.named.push(NamedValue::new(NamedValueSource::About, name, (number, ""), text));
+        }
+        self.operator = labels.operator;
+        self.specimen = labels.specimen;
+        self.indenter = labels.indenter;
     }
 
     fn take_edits(&mut self, edits: &Edits, analyses: &Analyses) {

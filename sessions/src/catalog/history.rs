@@ -25,7 +25,7 @@ pub enum HistorySubject {
 pub struct HistoryEvent {
     /// UTC, RFC 3339 to the millisecond; empty if unknown.
     pub at: String,
-    /// `session`, `verdict`, `contact`, `tags`, `note`, `review`, `fit`, `recalibration`, `mask`,
+    /// `session`, `verdict`, `contact`, `about`, `tags`, `note`, `review`, `fit`, `recalibration`, `mask`,
     /// `calibration`, `compliance` or `check`.
     pub what: String,
     /// Folder of the session below the library; empty for an event outside sessions.
@@ -136,6 +136,7 @@ impl HistoryEvent {
                 };
                 ("tags", [signs("+", add), signs("-", remove)].concat().join(" "))
             }
+            EditChange::About { entries } => ("about", entries.pairs()),
             EditChange::Review { decision, .. } => ("review", decision.name().to_owned()),
             EditChange::Note => ("note", String::new()),
         };

@@ -7,7 +7,7 @@ use std::error::Error;
 /// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and their content. An older catalog is replaced; only the table `head` is kept.
-pub const VERSION: i64 = 9;
+pub const VERSION: i64 = 10;
 
 /// `entry` is the whole entry as JSON, with a checksum because SQLite has none; the other columns are for search. `head`
 /// has the recorded heads of JSON-lines files, each row with its checksum. `words` has all text of an entry in `text`, and

@@ -14,6 +14,7 @@ pub fn describe_edit(change: &EditChange) -> String {
     match change {
         EditChange::Verdict { verdict } => verdict.to_string(),
         EditChange::Note => "note".to_owned(),
+        EditChange::About { entries } => entries.pairs(),
         EditChange::Tags { add, remove } => tags(add, remove),
         EditChange::Review { decision, .. } => format!("review, {}", decision.name()),
         EditChange::Contact { number, position_mm, was_mm } => {

@@ -2,17 +2,14 @@
 //! override both.
 
 use super::document::Programme;
-use palpate_model::metadata::{MetadataError, SessionLabels};
+use palpate_model::metadata::{MetadataError, SPECIMEN, SessionLabels};
 use palpate_protocols::file::ProtocolProblem;
 use palpate_protocols::file::problem::Problems;
 use palpate_protocols::file::tree::{DocumentEntry, DocumentTable, DocumentValue};
 use std::collections::BTreeMap;
 
-/// A key of [`palpate_model::metadata::KEYS`] with its value.
+/// A key of [`palpate_model::metadata::METADATA_KEYS`] with its value.
 type Pair = (String, String);
-
-/// The label that says what is indented.
-const SPECIMEN: &str = "specimen";
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct LabelSettings {
@@ -144,12 +141,14 @@ impl Programme {
                 all => format!("{all}, specimen {number}"),
             };
         }
-        let task = &self.tasks[task];
+        let (index, task) = (task, &self.tasks[task]);
         labels.set("series.id", &format!("{}/{}", self.name, task.name))?;
         // The simulated rig counts its own specimen as 0.
         if let Some(number) = number.filter(|number| *number > 0) {
             labels.set("series.specimen", &number.to_string())?;
         }
+        let before: u32 = self.tasks[..index].iter().map(|task| task.repeats).sum();
+        labels.set("series.order", &(before + repeat).to_string())?;
         labels.set("series.repeat", &repeat.to_string())?;
         labels.set("series.repeats", &task.repeats.to_string())?;
         Ok(labels)
