@@ -57,8 +57,10 @@ const fn length(name: &'static str, meaning: &'static str) -> MetadataKey {
     }
 }
 
-/// Every possible entry, in the order it is shown. The first three are fields of their own in the
-/// manifest.
+/// The entries that are fields of their own in the manifest.
+pub const MANIFEST_FIELDS: [&str; 3] = ["operator", SPECIMEN, "indenter"];
+
+/// Every possible entry, in the order it is shown.
 pub const METADATA_KEYS: &[MetadataKey] = &[
     text("operator", "who runs the test"),
     text("specimen", "name of the specimen that is indented"),
@@ -152,6 +154,14 @@ pub fn split_pair(pair: &str) -> Result<(&str, &str), MetadataError> {
 }
 
 impl MetadataKey {
+    /// Whether it describes the specimen, its animal or its place in a series: another specimen has another value, and a
+    /// blinded operator must not see it.
+    #[must_use]
+    pub fn describes_specimen(&self) -> bool {
+        let prefixes = [ANIMAL_PREFIX, SPECIMEN_PREFIX, "series."];
+        prefixes.iter().any(|prefix| self.name.starts_with(prefix))
+    }
+
     /// The value of a text, or what is wrong with it.
     pub fn parse(&self, value: &str) -> Result<Value, MetadataError> {
         let value = value.trim();

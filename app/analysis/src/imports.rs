@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use palpate_model::metadata::SessionLabels;
+use palpate_runner::study::{StudyError, complete_labels};
 use palpate_runner::wall_now;
 use palpate_sessions::{
     FolderError, ImportOrigin, library_folder, new_session_folder, new_session_id,
@@ -25,6 +26,8 @@ pub enum ImportFailure {
     Library(#[from] FolderError),
     #[error("{} exists already, or two parts of the import would be stored in it; choose another folder", .0.display())]
     Taken(PathBuf),
+    #[error(transparent)]
+    Study(#[from] StudyError),
     #[error("cancelled")]
     Cancelled,
 }
@@ -70,6 +73,7 @@ pub fn import(
 ) -> Result<Vec<ImportedFile>, ImportFailure> {
     let read = |path: &PathBuf| open_foreign(path, &request.layout).map_err(ImportFailure::Foreign);
     // Every file is read before the first session is made: a refusal leaves nothing behind.
+    let labels = labels_with_study(request)?;
     let of = request.files.len() * if request.is_dry_run { 1 } else { 2 };
     let (mut taken, mut reports) = (BTreeSet::new(), Vec::new());
     for (done, path) in request.files.iter().enumerate() {
@@ -87,11 +91,20 @@ pub fn import(
             let _ = progress.report(request.files.len() + done, of, &name);
             let foreign = read(path)?;
             for (part, report) in foreign.parts.iter().zip(&mut file.parts) {
-                report.session = Some(make(part, &foreign.bytes, request)?);
+                report.session = Some(make(part, &foreign.bytes, request, &labels)?);
             }
         }
     }
     Ok(reports)
+}
+
+/// The labels of the request, with those of the library's study.
+fn labels_with_study(request: &ImportRequest) -> Result<SessionLabels, ImportFailure> {
+    let mut labels = request.labels.clone();
+    if let Some(library) = request.library.clone().or_else(|| library_folder().ok()) {
+        complete_labels(&mut labels, &library)?;
+    }
+    Ok(labels)
 }
 
 /// Refuses folders that are there already or would be made twice.
@@ -114,6 +127,7 @@ fn make(
     part: &ForeignPart,
     original: &[u8],
     request: &ImportRequest,
+    labels: &SessionLabels,
 ) -> Result<PathBuf, ImportFailure> {
     let at = wall_now().into();
     let session_id = new_session_id(at);
@@ -131,7 +145,7 @@ fn make(
         session_id,
         at,
         software_version: env!("CARGO_PKG_VERSION"),
-        labels: request.labels.clone(),
+        labels: labels.clone(),
     };
     store_import(part, target).map_err(ImportFailure::Keep)?;
     Ok(folder)

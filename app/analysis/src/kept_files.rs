@@ -7,6 +7,7 @@ use crate::window_requests::{SETTINGS_FILE, SETTINGS_VERSION};
 use palpate_model::calibration::CALIBRATION_FORMAT;
 use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
 use palpate_rheology::trade::TRADE_FORMAT;
+use palpate_runner::study::{STUDY_FILE, STUDY_VERSION};
 use palpate_sessions::catalog::{CATALOG_FILE, CATALOG_VERSION};
 use palpate_sessions::document_store::Document;
 use palpate_sessions::locked_protocols::{LOCKED_PROTOCOL_FORMAT, LockedProtocol};
@@ -67,6 +68,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             format!("JSON lines, queue version {QUEUE_VERSION}"),
             "'palpate queue' and the window",
             "move the folder elsewhere",
+        ),
+        (
+            "study",
+            STUDY_FILE,
+            format!("TOML, palpate-study {STUDY_VERSION}"),
+            "you",
+            "delete the file; sessions keep what they copied from it",
         ),
         (
             "calibrations",

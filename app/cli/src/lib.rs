@@ -4,6 +4,7 @@
 //! object. This crate has no window: a program with one passes it to [`main`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+mod about;
 mod analyse;
 mod arguments;
 mod calibration;
@@ -51,6 +52,7 @@ mod scene;
 mod select;
 #[cfg(feature = "haptics")]
 mod slave;
+mod study;
 mod support_bundle;
 mod tag;
 mod terminal;
@@ -134,12 +136,14 @@ commands! { windows;
     Export(export::ExportArgs) => export::run;
     Find(find::FindArgs) => find::run;
     History(history::HistoryArgs) => history::run;
+    Study(study::StudyArgs) => study::run;
     #[command(subcommand)] Catalog(catalog::CatalogCommand) => catalog::run;
     Info(info::InfoArgs) => info::run;
     Report(report::ReportArgs) => report::run;
     Quality(quality::QualityArgs) => quality::run;
     Verdict(verdict::VerdictArgs) => verdict::run;
     CorrectContact(correct_contact::CorrectArgs) => correct_contact::run;
+    About(about::AboutArgs) => about::run;
     Tag(tag::TagArgs) => tag::run;
     Note(note::NoteArgs) => note::run;
     Review(review::ReviewArgs) => review::run;

@@ -27,6 +27,7 @@ mod records;
 mod report;
 mod scene;
 mod select;
+mod study;
 mod support;
 mod support_bundle;
 mod trade;

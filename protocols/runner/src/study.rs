@@ -18,7 +18,7 @@ use thiserror::Error;
 pub const STUDY_FILE: &str = "study.toml";
 
 /// Version of the file that is read.
-const LANGUAGE: &str = "1";
+pub const STUDY_VERSION: u32 = 1;
 
 const KEYS: [&str; 3] = ["palpate-study", "animal", "specimen"];
 
@@ -145,10 +145,10 @@ struct Reader {
 impl Reader {
     fn root(&mut self, root: &DocumentTable) {
         let is_known = root.get(KEYS[0]).map(|node| &node.value);
-        if is_known != Some(&DocumentValue::Number(LANGUAGE.into())) {
+        if is_known != Some(&DocumentValue::Number(STUDY_VERSION.to_string())) {
             self.problems.error(
                 root.get(KEYS[0]).map_or(1, |node| node.line),
-                format!("a study file says palpate-study = {LANGUAGE} on its first line; add that, or use a palpate that reads its version"),
+                format!("a study file says palpate-study = {STUDY_VERSION} on its first line; add that, or use a palpate that reads its version"),
             );
         }
         for entry in &root.entries {

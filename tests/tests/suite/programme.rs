@@ -9,6 +9,7 @@ use palpate_runner::programme::{
     Programme, ProgrammeEntry, ProgrammeError, ProgrammeEvent, ProgrammeResult, ProgrammeRunError,
     ProgrammeSetup, run_programme,
 };
+use palpate_runner::study::Study;
 use palpate_runner::{PromptResponder, Runner, TimeScale};
 use palpate_sessions::journal::JOURNAL_FILE;
 use palpate_sessions::text::checksum;
@@ -386,7 +387,7 @@ fn the_day_in_the_laboratory_is_a_programme() {
     let text = std::fs::read_to_string(workspace().join("examples/day-in-the-lab.toml")).unwrap();
     assert!(Programme::is_programme_text(&text));
     assert_eq!(programme(&text).session_count(), 10);
-    assert_eq!(programme(&text).open_questions(), []);
+    assert_eq!(programme(&text).open_questions(&Study::default()).unwrap(), []);
 }
 
 const LABELLED: &str = r#"
@@ -434,7 +435,7 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
     let text = LABELLED.replace("specimen-source = \"x\"\n", "");
     let mut whole = programme(&text);
     // Without a source the two protocols that ask for it say so, each at its line.
-    let asked = whole.open_questions();
+    let asked = whole.open_questions(&Study::default()).unwrap();
     assert_eq!(asked.len(), 3, "{asked:?}");
     assert_eq!((asked[0].line, asked[0].severity), (24, ProblemSeverity::Warning));
     for (question, task) in asked.iter().zip(["'first'", "'second'"]) {
@@ -442,7 +443,7 @@ fn labels_of_a_programme_reach_the_right_sessions_and_missing_ones_are_asked_for
         assert!(message.contains(task) && message.contains("specimen.source"), "{asked:?}");
     }
     whole.set_label("specimen.source", "pig").unwrap();
-    assert_eq!(whole.open_questions(), []);
+    assert_eq!(whole.open_questions(&Study::default()).unwrap(), []);
     let labels = |task, repeat| whole.labels(task, repeat).unwrap();
     // The scale has weights on it; then there is the specimen that is there, then each by its number.
     let names: Vec<String> = (0..5).map(|task| labels(task, 1).specimen).collect();

@@ -208,7 +208,7 @@ pub(super) fn head(names: &str) -> Vec<String> {
 }
 
 /// A table in columns under its head.
-pub(super) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
+pub(crate) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     in_columns(&std::iter::once(head(names)).chain(rows).collect::<Vec<_>>())
 }
 

@@ -8,6 +8,8 @@ use palpate_analysis::report::text::in_columns;
 use palpate_model::metadata::split_pair;
 use palpate_protocols::file::ProtocolProblem;
 use palpate_runner::programme::{Programme, ProgrammeError, ProgrammeForecast, forecast_programme};
+use palpate_runner::study::Study;
+use palpate_sessions::library_folder;
 use palpate_sessions::text::read;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -72,9 +74,15 @@ pub(super) fn apply_labels(
     Ok(())
 }
 
+/// Labels that neither the programme nor the study of the library sets.
+fn open_questions(programme: &Programme) -> Result<Vec<ProtocolProblem>, Failure> {
+    let study = library_folder().map_or(Ok(Study::default()), |at| Study::of_library(&at));
+    study.and_then(|study| programme.open_questions(&study)).map_err(Failure::usage)
+}
+
 /// Refuses while labels that protocols ask for are missing.
 pub(super) fn require_labels(file: &Path, programme: &Programme) -> Result<(), Failure> {
-    let questions = programme.open_questions();
+    let questions = open_questions(programme)?;
     if questions.is_empty() {
         return Ok(());
     }
@@ -105,7 +113,7 @@ pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> 
     if let Err(err) = with_settings(&RigArgs::default(), &programme.simulated) {
         report.problems.push(ProtocolProblem::error(0, err.sentence()));
     }
-    let questions = programme.open_questions().into_iter();
+    let questions = open_questions(&programme)?.into_iter();
     report.problems.extend(questions.map(|question| {
         ProtocolProblem::warning(question.line, format!("{}; {SUPPLY_HINT}", question.message))
     }));

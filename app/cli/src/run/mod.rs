@@ -21,6 +21,7 @@ use palpate_model::metadata::SessionMetadata;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
+use palpate_runner::study::complete_labels;
 use palpate_runner::{
     AfterStop, PromptResponder, RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot,
     SharedLeadSource, StartError, StartedRun, TimeScale, wall_now,
@@ -163,7 +164,11 @@ fn read(
     }
     let bench = super::rig::open(&options.rig)?;
     let (protocol, written, _) = super::protocol::load_checked(name, values, &bench, output)?;
-    let labels = labels(options)?;
+    let mut labels = labels(options)?;
+    if let Ok(library) = library_folder() {
+        // Whoever measures may be blinded, so what is added is not shown.
+        complete_labels(&mut labels, &library).map_err(Failure::usage)?;
+    }
     if written.plan.name == DAILY_CHECK {
         output.note(&format!(
             "this run does not count as the daily check; only '{DAILY_CHECK_COMMAND}' evaluates and saves a daily check"

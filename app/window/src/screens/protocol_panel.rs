@@ -135,7 +135,7 @@ fn is_shown(field: &LabelField) -> bool {
 
 /// Whether a label would tell a blinded operator which group a specimen is of.
 fn is_hidden(field: &LabelField, is_blinded: bool) -> bool {
-    is_blinded && (field.key.name.starts_with("specimen.") || field.key.name.starts_with("series."))
+    is_blinded && field.key.describes_specimen()
 }
 
 /// The other labels, folded away.

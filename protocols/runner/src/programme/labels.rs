@@ -2,7 +2,8 @@
 //! override both.
 
 use super::document::Programme;
-use palpate_model::metadata::{MetadataError, SPECIMEN, SessionLabels};
+use crate::study::{Study, StudyError};
+use palpate_model::metadata::{ANIMAL_PREFIX, MetadataError, SPECIMEN, SessionLabels};
 use palpate_protocols::file::ProtocolProblem;
 use palpate_protocols::file::problem::Problems;
 use palpate_protocols::file::tree::{DocumentEntry, DocumentTable, DocumentValue};
@@ -128,7 +129,9 @@ impl Programme {
             self.label_settings.general.iter().chain(own).chain(&self.label_settings.overrides);
         // Weights are no specimen.
         let is_weighed = self.tasks[task].calibrates;
-        for (key, value) in pairs.filter(|(key, _)| !(is_weighed && key.starts_with(SPECIMEN))) {
+        let is_of_specimen =
+            |key: &str| key.starts_with(SPECIMEN) || key.starts_with(ANIMAL_PREFIX);
+        for (key, value) in pairs.filter(|(key, _)| !(is_weighed && is_of_specimen(key))) {
             labels.set(key, value)?;
         }
         let names = |pairs: &[Pair]| pairs.iter().any(|(key, _)| key == SPECIMEN);
@@ -154,13 +157,15 @@ impl Programme {
         Ok(labels)
     }
 
-    /// Labels that protocols ask for and that are not set: a sentence for each task. The meaning of a label is given once.
-    pub fn open_questions(&self) -> Vec<ProtocolProblem> {
+    /// Labels that protocols ask for and that neither programme nor study sets: a sentence for each task. The meaning of
+    /// a label is given once.
+    pub fn open_questions(&self, study: &Study) -> Result<Vec<ProtocolProblem>, StudyError> {
         let mut explained: Vec<&str> = Vec::new();
         let mut questions = Vec::new();
         for (index, task) in self.tasks.iter().enumerate() {
             // Labels were checked when they were set.
-            let labels = self.labels(index, 1).unwrap_or_default();
+            let mut labels = self.labels(index, 1).unwrap_or_default();
+            study.complete(&mut labels)?;
             let open = task.protocol.open_questions(&labels);
             let words: Vec<String> = open
                 .iter()
@@ -179,6 +184,6 @@ impl Programme {
                 ));
             }
         }
-        questions
+        Ok(questions)
     }
 }

@@ -65,23 +65,43 @@ pub fn list_sessions(lake: &Path) -> Result<Vec<LakeSession>, LakeError> {
     Ok(found)
 }
 
+/// The manifest of a session as it was added, with its edits applied; and the reason if it was rejected.
+pub fn read_manifest(
+    lake: &Path,
+    one: &LakeSession,
+) -> Result<(Manifest, Option<String>), LakeError> {
+    let checksums = Checksums::read(lake, &one.partition, &one.id)?;
+    let (manifest, _, rejection) = read_outline(lake, one, &checksums)?;
+    Ok((manifest, rejection))
+}
+
+fn path_of(lake: &Path, one: &LakeSession, part: LakePart) -> PathBuf {
+    part_folder(lake, part).join(&one.partition).join(format!("{}.parquet", one.id))
+}
+
+fn read_outline(
+    lake: &Path,
+    one: &LakeSession,
+    checksums: &Checksums,
+) -> Result<(Manifest, StoredOutline, Option<String>), LakeError> {
+    let path = path_of(lake, one, LakePart::Sessions);
+    let sum = checksums.of_part(LakePart::Sessions);
+    let outline = read_table(&path, sum, session_of)?;
+    let version = outline.0.record_version;
+    match version > RECORD_VERSION {
+        true => Err(LakeError::Newer { path, version }),
+        false => Ok(outline),
+    }
+}
+
 /// A session as it was added, with its edits applied; and the reason if it was rejected.
 pub fn read_session(
     lake: &Path,
     one: &LakeSession,
 ) -> Result<(Session, Option<String>), LakeError> {
-    let path = |of| {
-        let folder = part_folder(lake, of).join(&one.partition);
-        folder.join(format!("{}.parquet", one.id))
-    };
     let checksums = Checksums::read(lake, &one.partition, &one.id)?;
-    let about = path(LakePart::Sessions);
-    let sum = checksums.of_part(LakePart::Sessions);
-    let (manifest, mut session, rejection) = read_table(&about, sum, session_of)?;
-    if manifest.record_version > RECORD_VERSION {
-        return Err(LakeError::Newer { path: about, version: manifest.record_version });
-    }
-    let samples = path(LakePart::Samples);
+    let (manifest, mut session, rejection) = read_outline(lake, one, &checksums)?;
+    let samples = path_of(lake, one, LakePart::Samples);
     let sum = checksums.of_part(LakePart::Samples);
     let rows = read_table(&samples, sum, rows)?;
     if rows.len() as u64 != session.samples {
@@ -91,7 +111,7 @@ pub fn read_session(
         });
     }
     let sum = checksums.of_part(LakePart::Events);
-    let entries = read_table(&path(LakePart::Events), sum, entries)?;
+    let entries = read_table(&path_of(lake, one, LakePart::Events), sum, entries)?;
     let session = Session {
         path: samples,
         manifest,

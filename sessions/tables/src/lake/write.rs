@@ -8,12 +8,15 @@ use crate::export::{
     Encoder, ExportError, ExtraColumns, RowFeed, SampleSelection, TableExport, TableFormat,
     WriteOutcome,
 };
+use palpate_model::metadata::{
+    MANIFEST_FIELDS, METADATA_KEYS, MetadataKey, MetadataKind, SessionMetadata,
+};
 use palpate_sessions::edits::DataQuality;
 use palpate_sessions::log::SessionOutline;
 use palpate_sessions::record::{EntryKind, LogEntry};
 use palpate_sessions::text::sha256;
 use polars_core::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -131,7 +134,7 @@ fn session(outline: &SessionOutline, quality: LakeQuality) -> PolarsResult<DataF
     let end = outline.end.as_ref();
     let ended = end.map(|end| end.ended_at.seconds().0);
     let verdict = quality.quality.map(|(verdict, _)| verdict.to_string());
-    let columns = vec![
+    let mut columns = vec![
         text("session_id", &manifest.session_id),
         text("started_at", &manifest.started_at_text()),
         text("operator", &manifest.operator),
@@ -154,5 +157,56 @@ fn session(outline: &SessionOutline, quality: LakeQuality) -> PolarsResult<DataF
         text("manifest", &json!(manifest).to_string()),
         text("end", &json!(outline.end).to_string()),
     ];
+    columns.extend(METADATA_KEYS.iter().filter_map(|key| entry(key, &manifest.about)));
     DataFrame::new(1, columns)
+}
+
+/// The column of a metadata entry, empty where the session lacks it; `None` of those with a field of their own.
+fn entry(key: &MetadataKey, about: &SessionMetadata) -> Option<Column> {
+    let (name, value) = (key.name.into(), about.get(key.name));
+    let series = match key.kind {
+        _ if MANIFEST_FIELDS.contains(&key.name) => return None,
+        MetadataKind::Text | MetadataKind::Choice(_) => {
+            Series::new(name, [value.and_then(Value::as_str)])
+        }
+        MetadataKind::Number { .. } => Series::new(name, [value.and_then(Value::as_f64)]),
+        MetadataKind::Count => Series::new(name, [value.and_then(Value::as_u64)]),
+    };
+    Some(series.into_column())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use polars_core::prelude::{AnyValue, DataType};
+
+    #[test]
+    fn every_metadata_entry_is_a_typed_column_also_where_it_is_missing() {
+        let mut about = SessionMetadata::default();
+        let empty = about.clone();
+        for key in METADATA_KEYS {
+            let text = match key.kind {
+                MetadataKind::Text => "words",
+                MetadataKind::Choice(words) => words[0],
+                MetadataKind::Number { .. } | MetadataKind::Count => "3",
+            };
+            about.set(key.name, text).unwrap();
+        }
+        let mut columns = 0;
+        for key in METADATA_KEYS {
+            let Some(full) = entry(key, &about) else { continue };
+            let missing = entry(key, &empty).unwrap();
+            let (kind, value) = match key.kind {
+                MetadataKind::Text => (DataType::String, AnyValue::String("words")),
+                MetadataKind::Choice(words) => (DataType::String, AnyValue::String(words[0])),
+                MetadataKind::Number { .. } => (DataType::Float64, AnyValue::Float64(3.0)),
+                MetadataKind::Count => (DataType::UInt64, AnyValue::UInt64(3)),
+            };
+            assert_eq!((full.name().as_str(), full.dtype()), (key.name, &kind));
+            assert_eq!(full.get(0).unwrap(), value, "{}", key.name);
+            assert_eq!((missing.dtype(), missing.null_count()), (&kind, 1), "{}", key.name);
+            columns += 1;
+        }
+        assert_eq!(columns, METADATA_KEYS.len() - MANIFEST_FIELDS.len());
+    }
 }

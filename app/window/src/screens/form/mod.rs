@@ -264,7 +264,7 @@ impl ProtocolForm {
                 field.text.clone_from(&wanted.specimen);
             } else if let Some(text) = wanted.labels.get(name) {
                 field.text.clone_from(text);
-            } else if name.starts_with("specimen.") || name.starts_with("series.") {
+            } else if field.key.describes_specimen() {
                 field.text.clear();
             }
         }

@@ -225,3 +225,27 @@ fn a_chosen_folder_gets_numbered_sessions() {
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(second, folder.join("session-0002"));
 }
+
+#[test]
+fn the_next_specimen_has_no_label_of_the_one_before() {
+    let own = [
+        ("specimen.site", "left lobe"),
+        ("series.order", "2"),
+        ("animal.name", "pig-3"),
+        ("animal.treatment", "control"),
+    ];
+    let (mut form, _) = form_with(&own);
+    type_into(&mut form, &[("operator", "Ada"), ("indenter.diameter_mm", "12")]);
+    let wanted = QueuedSpecimen {
+        specimen: "liver 2".into(),
+        protocol: FIRST.into(),
+        labels: [("animal.name".to_owned(), "pig-4".to_owned())].into(),
+    };
+    form.take_labels(&wanted, false);
+    assert_eq!((form.specimen(), form.label_text("animal.name")), ("liver 2", "pig-4"));
+    for name in ["specimen.site", "series.order", "animal.treatment"] {
+        assert_eq!(form.label_text(name), "", "{name}");
+    }
+    assert_eq!(form.label_text("operator"), "Ada");
+    assert_eq!(form.label_text("indenter.diameter_mm"), "12");
+}
