@@ -38,6 +38,7 @@ pub mod material;
 pub mod material_lake;
 pub mod plan;
 pub mod pool;
+pub mod population;
 pub mod progress;
 pub mod protocol_sources;
 pub mod recordings;

@@ -47,7 +47,8 @@ pub fn fit_curves(
             let Some(factor) = Cholesky::new(told.covariance.clone()) else { continue };
             let deviations = told.covariance.diagonal().map(f64::sqrt);
             let pairs = told.centre.iter().zip(&session.values).zip(&deviations);
-            largest = pairs.fold(largest, |most, ((new, old), sd)| most.max((new - old).abs() / sd));
+            largest =
+                pairs.fold(largest, |most, ((new, old), sd)| most.max((new - old).abs() / sd));
             session.values = told.centre;
             session.evidence = Evidence::Information(factor.inverse());
         }

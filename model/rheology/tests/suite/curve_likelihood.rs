@@ -34,8 +34,9 @@ fn at_the_best_fit_it_is_the_fit() {
         let found = likelihood.expand(&best).unwrap();
         for (k, name) in NAMES.iter().enumerate() {
             let own = report.parameter(name).unwrap();
-            assert!((found.centre[k] - own.value.ln()).abs() < 1e-6, "{found:?}");
             let error = own.std_error.unwrap() / own.value;
+            // What the last steps of both leave.
+            assert!((found.centre[k] - own.value.ln()).abs() < 1e-3 * error, "{found:?}");
             assert!((found.covariance[k][k].sqrt() / error - 1.0).abs() < 1e-3, "{error}");
         }
     }

@@ -1,0 +1,214 @@
+//! Which groups and which effects the sessions of a study have.
+
+use crate::study_table::{COVARIATES, StudyProblem, StudyRow, StudyTable};
+use palpate_model::metadata::plain_value;
+use serde_json::Value;
+use std::collections::BTreeSet;
+use thiserror::Error;
+
+/// Levels of the nesting, the outermost first, above the session itself.
+pub const LEVELS: [&str; 3] = ["animal", "specimen", "site"];
+/// The innermost level: what is left between two presses on one place.
+const SESSION: &str = "session";
+/// The effect that all sessions have.
+const MEAN: &str = "mean";
+
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum DesignError {
+    #[error("there is no level '{name}'; choose from {}", LEVELS.join(", "))]
+    UnknownLevel { name: String },
+    #[error("the levels are {given}; give them from the outermost: {}", LEVELS.join(", "))]
+    LevelOrder { given: String },
+    #[error("there is no entry '{name}' that may be an effect; choose from {}", COVARIATES.join(", "))]
+    UnknownEffect { name: String },
+    #[error("{0}")]
+    Problem(Box<StudyProblem>),
+    #[error("{} of {of} sessions lack {entry}, the first is {first}; add it to them, or leave out {entry}", .lacking)]
+    Missing { entry: String, lacking: usize, of: usize, first: String },
+    #[error("{entry} is '{value}' in all sessions; leave it out of the effects")]
+    Constant { entry: String, value: String },
+    #[error("{entry} is a number in some sessions and a text in others; correct them")]
+    Mixed { entry: String },
+}
+
+/// One column of the design.
+#[derive(Clone, Debug, PartialEq)]
+enum Column {
+    Mean,
+    /// Whether an entry has a value, against the first of its values.
+    Is {
+        entry: &'static str,
+        value: String,
+    },
+    /// An entry, from its mean over the sessions.
+    From {
+        entry: &'static str,
+        mean: f64,
+    },
+}
+
+/// Levels and columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    levels: Vec<&'static str>,
+    columns: Vec<Column>,
+    /// What was left out and why, and where the mean is.
+    pub notes: Vec<String>,
+}
+
+impl Design {
+    /// Of a study: levels without names are those that the sessions tell apart.
+    pub fn of(
+        table: &StudyTable,
+        levels: &[String],
+        effects: &[String],
+    ) -> Result<Self, DesignError> {
+        if let Some(problem) = table.problems.iter().find(|one| one.is_contradiction()) {
+            return Err(DesignError::Problem(Box::new(problem.clone())));
+        }
+        let mut design =
+            Self { levels: Vec::new(), columns: vec![Column::Mean], notes: Vec::new() };
+        design.choose_levels(table, levels)?;
+        for name in effects {
+            design.add_effect(table, name)?;
+        }
+        Ok(design)
+    }
+
+    fn choose_levels(&mut self, table: &StudyTable, wanted: &[String]) -> Result<(), DesignError> {
+        let mut places = Vec::new();
+        for name in wanted {
+            let place = LEVELS.iter().position(|level| level == name);
+            places.push(place.ok_or_else(|| DesignError::UnknownLevel { name: name.clone() })?);
+        }
+        if !places.is_sorted_by(|a, b| a < b) {
+            return Err(DesignError::LevelOrder { given: wanted.join(", ") });
+        }
+        if wanted.is_empty() {
+            // Sites are only told where they are named.
+            places = (0..LEVELS.len())
+                .filter(|&k| k < 2 || table.rows.iter().any(|row| name_of(row, k).is_some()))
+                .collect();
+        }
+        for &place in &places {
+            let lacking: Vec<&StudyRow> =
+                table.rows.iter().filter(|row| name_of(row, place).is_none()).collect();
+            if let Some(first) = lacking.first() {
+                return Err(DesignError::Missing {
+                    entry: entry_of(place).to_owned(),
+                    lacking: lacking.len(),
+                    of: table.rows.len(),
+                    first: first.session.clone(),
+                });
+            }
+        }
+        if wanted.is_empty() {
+            self.drop_empty(table, &mut places);
+        }
+        self.levels = places.into_iter().map(|place| LEVELS[place]).collect();
+        Ok(())
+    }
+
+    /// Leaves out levels whose groups have one member each.
+    fn drop_empty(&mut self, table: &StudyTable, places: &mut Vec<usize>) {
+        let mut members = table.rows.len();
+        let mut inner = SESSION;
+        for index in (0..places.len()).rev() {
+            let path = |row: &StudyRow| -> Vec<Option<String>> {
+                places[..=index].iter().map(|&place| name_of(row, place).cloned()).collect()
+            };
+            let groups = table.rows.iter().map(path).collect::<BTreeSet<_>>().len();
+            let level = LEVELS[places[index]];
+            if groups == members {
+                self.notes.push(format!(
+                    "each {level} has one {inner}, so differences between {level}s are part of those between {inner}s"
+                ));
+                places.remove(index);
+            } else {
+                (members, inner) = (groups, level);
+            }
+        }
+    }
+
+    fn add_effect(&mut self, table: &StudyTable, name: &str) -> Result<(), DesignError> {
+        let entry = COVARIATES.into_iter().find(|entry| *entry == name);
+        let entry = entry.ok_or_else(|| DesignError::UnknownEffect { name: name.to_owned() })?;
+        let values: Vec<(&StudyRow, &Value)> =
+            table.rows.iter().map(|row| (row, &row.covariates[entry])).collect();
+        let lacking: Vec<_> = values.iter().filter(|(_, value)| value.is_null()).collect();
+        if let Some((first, _)) = lacking.first() {
+            return Err(DesignError::Missing {
+                entry: entry.to_owned(),
+                lacking: lacking.len(),
+                of: values.len(),
+                first: first.session.clone(),
+            });
+        }
+        let words: BTreeSet<String> = values.iter().map(|(_, value)| plain_value(value)).collect();
+        if let (1, Some(value)) = (words.len(), words.first()) {
+            return Err(DesignError::Constant { entry: entry.to_owned(), value: value.clone() });
+        }
+        let numbers: Vec<f64> = values.iter().filter_map(|(_, value)| value.as_f64()).collect();
+        if numbers.len() == values.len() {
+            let mean = numbers.iter().sum::<f64>() / numbers.len() as f64;
+            self.notes.push(format!("the mean is at {entry} = {mean:.4}"));
+            self.columns.push(Column::From { entry, mean });
+            return Ok(());
+        }
+        if !numbers.is_empty() {
+            return Err(DesignError::Mixed { entry: entry.to_owned() });
+        }
+        let mut words = words.into_iter();
+        if let Some(first) = words.next() {
+            self.notes.push(format!("the mean is at {entry} = {first}"));
+        }
+        self.columns.extend(words.map(|value| Column::Is { entry, value }));
+        Ok(())
+    }
+
+    /// Levels, the outermost first, then the session.
+    #[must_use]
+    pub fn levels(&self) -> Vec<String> {
+        self.levels.iter().copied().chain([SESSION]).map(str::to_owned).collect()
+    }
+
+    /// Names of the columns.
+    #[must_use]
+    pub fn effects(&self) -> Vec<String> {
+        let name = |column: &Column| match column {
+            Column::Mean => MEAN.to_owned(),
+            Column::Is { entry, value } => format!("{entry} = {value}"),
+            Column::From { entry, .. } => (*entry).to_owned(),
+        };
+        self.columns.iter().map(name).collect()
+    }
+
+    /// Names of the groups of a session.
+    #[must_use]
+    pub fn groups(&self, row: &StudyRow) -> Vec<String> {
+        let place = |level: &&str| LEVELS.iter().position(|one| one == level).unwrap_or(0);
+        let names = self.levels.iter().map(|level| name_of(row, place(level)));
+        names.map(|name| name.cloned().unwrap_or_default()).collect()
+    }
+
+    /// The value of each column for a session.
+    #[must_use]
+    pub fn columns(&self, row: &StudyRow) -> Vec<f64> {
+        let value = |column: &Column| match column {
+            Column::Mean => 1.0,
+            Column::Is { entry, value } => {
+                f64::from(u8::from(plain_value(&row.covariates[entry]) == *value))
+            }
+            Column::From { entry, mean } => row.covariates[entry].as_f64().unwrap_or(*mean) - mean,
+        };
+        self.columns.iter().map(value).collect()
+    }
+}
+
+fn entry_of(level: usize) -> &'static str {
+    ["animal.name", "specimen", "specimen.site"][level]
+}
+
+fn name_of(row: &StudyRow, level: usize) -> Option<&String> {
+    [&row.animal, &row.specimen, &row.site][level].as_ref()
+}

@@ -1,0 +1,80 @@
+//! `palpate population`: means, effects and spreads of the bodies of a study.
+
+use super::fit::jobs;
+use super::output::Output;
+use super::{Failure, compliance};
+use clap::Args;
+use palpate_analysis::fit::{FitChoice, FitRecipe};
+use palpate_analysis::population::{
+    PopulationError, PopulationMethod, PopulationRequest, population,
+};
+use palpate_analysis::source::{RecordStretch, SourceSelection};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Estimate the population that the specimens of a study come from: medians, effects and spreads by level
+#[derive(Debug, Args)]
+pub struct PopulationArgs {
+    /// Session folders and folders of sessions, or one lake
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<PathBuf>,
+    /// Model family of the bodies; without it the modified Kelvin model
+    #[arg(long, value_name = "KEY")]
+    family: Option<String>,
+    /// Parameters of the population, as in tau_eps,mu1; without it all of the body
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    parameters: Vec<String>,
+    /// Levels of groups from the outermost, as in animal,specimen,site; without it all that the sessions tell apart
+    #[arg(long, value_name = "LEVELS", value_delimiter = ',')]
+    by: Vec<String>,
+    /// An entry of the sessions that may move the mean, such as animal.treatment; may be repeated
+    #[arg(long, value_name = "ENTRY")]
+    effect: Vec<String>,
+    /// Let parameters of a group be correlated
+    #[arg(long)]
+    correlated: bool,
+    /// Take each session's best values and their covariance instead of its curve
+    #[arg(long)]
+    two_stage: bool,
+    /// Correct depths for machine compliance: last for the compliance in force for each
+    /// session's rig, a file, or an id of the library
+    #[arg(long, value_name = "FILE|last")]
+    compliance: Option<String>,
+    /// Number of sessions fitted at a time; without it the number of processors
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+}
+
+pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
+    let choice = FitChoice { family: args.family.clone(), fixed: Vec::new(), free: Vec::new() };
+    let wanted =
+        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
+    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
+    recipe.is_systematic = false;
+    recipe.corrections = compliance::corrections(args.compliance.as_deref())?;
+    let request = PopulationRequest {
+        paths: &args.sources,
+        recipe: &recipe,
+        parameters: &args.parameters,
+        levels: &args.by,
+        effects: &args.effect,
+        is_correlated: args.correlated,
+        method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
+        jobs: jobs(args.jobs),
+    };
+    let bar = output.count_bar(0);
+    let found = population(&request, &bar).map_err(failure);
+    drop(bar);
+    let found = found?;
+    output.answer("population", &found, || found.text());
+    Ok(())
+}
+
+fn failure(err: PopulationError) -> Failure {
+    match err {
+        PopulationError::Design(_) | PopulationError::Parameter(_) | PopulationError::Read(_) => {
+            Failure::usage(err)
+        }
+        err => Failure::failed(err),
+    }
+}
