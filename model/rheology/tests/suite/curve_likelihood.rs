@@ -35,8 +35,8 @@ fn at_the_best_fit_it_is_the_fit() {
         for (k, name) in NAMES.iter().enumerate() {
             let own = report.parameter(name).unwrap();
             let error = own.std_error.unwrap() / own.value;
-            // What the last steps of both leave.
-            assert!((found.centre[k] - own.value.ln()).abs() < 1e-3 * error, "{found:?}");
+            // A hundredth of a standard error: what the last step of a fit may leave of its square.
+            assert!((found.centre[k] - own.value.ln()).abs() < 1e-2 * error, "{found:?}");
             assert!((found.covariance[k][k].sqrt() / error - 1.0).abs() < 1e-3, "{error}");
         }
     }
