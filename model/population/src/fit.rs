@@ -9,6 +9,10 @@ use std::cell::RefCell;
 
 /// A spread below this share of the scatter of the values is zero.
 const ZERO: f64 = 1e-4;
+/// Share of a coordinate's scale over which the covariance of the effects is differenced.
+const SLOPE_STEP: f64 = 1e-5;
+/// More degrees of freedom are as good as a normal distribution.
+const FREEDOM_MAX: f64 = 1e9;
 /// Coverage of every interval.
 pub const COVERAGE: f64 = 0.95;
 /// How far out an end of an interval is looked for, in widths of what the curvature says.
@@ -21,9 +25,9 @@ pub struct EffectEstimate {
     pub parameter: String,
     /// In logarithms of the parameter.
     pub value: f64,
+    /// With spreads of zero or more; the interval takes that without this bound, where a spread is zero.
     pub std_error: f64,
-    /// Degrees of freedom by Satterthwaite (Biometrics Bulletin 2 (1946) 110-114), or those of the groups among which it is
-    /// seen (Pinheiro & Bates, section 2.4.2) where these show no spread.
+    /// Degrees of freedom by Satterthwaite (Biometrics Bulletin 2 (1946) 110-114).
     pub freedom: f64,
     /// Ends of the 95 % interval.
     pub interval: [f64; 2],
@@ -99,6 +103,33 @@ pub fn fit_population(
     fitter.fit(options)
 }
 
+/// The covariance of the effects and how it changes with the spreads.
+struct Judgement {
+    covariance: DMatrix<f64>,
+    /// By each coordinate of the spreads.
+    slopes: Vec<DMatrix<f64>>,
+    /// Covariance of these coordinates.
+    spread_covariance: DMatrix<f64>,
+}
+
+impl Judgement {
+    fn of(criterion: &Criterion<'_>, optimum: &Optimum) -> Option<Self> {
+        let slope = |k: usize| {
+            let shifted = |by: f64| {
+                let mut other = optimum.at.clone();
+                other[k] += by;
+                Some(criterion.evaluate(&other)?.covariance)
+            };
+            Some((shifted(SLOPE_STEP)? - shifted(-SLOPE_STEP)?) / (2.0 * SLOPE_STEP))
+        };
+        Some(Self {
+            covariance: optimum.evaluation.covariance.clone(),
+            slopes: (0..optimum.at.len()).map(slope).collect::<Option<_>>()?,
+            spread_covariance: inverse_of_the_known(&optimum.curvature) * 2.0,
+        })
+    }
+}
+
 struct Fitter<'a> {
     study: &'a Study,
     nested: &'a NestedStudy,
@@ -128,67 +159,55 @@ impl Fitter<'_> {
             criterion: optimum.evaluation.criterion,
             groups: self.groups(&shifts),
             modes: modes.collect(),
-            factors,
+            factors: factors.into_iter().map(|factor| factor.root).collect(),
         })
     }
 
     fn effects(&self, optimum: &Optimum) -> Option<Vec<EffectEstimate>> {
-        let evaluation = &optimum.evaluation;
-        let by_spread = self.covariance_slopes(&optimum.at)?;
-        let spread_covariance = inverse_of_the_known(&optimum.curvature) * 2.0;
-        let factors = self.coordinates().factors(&optimum.at);
-        let is_zero = |level: usize, k: usize| {
-            factors[level].row(k).norm() < ZERO * self.coordinates().scales[k]
-        };
+        let judged = self.judge(optimum)?;
         let mut found = Vec::new();
         for (j, effect) in self.study.effects.iter().enumerate() {
             for (k, parameter) in self.study.parameters.iter().enumerate() {
                 let index = j * self.study.parameters.len() + k;
-                let value = evaluation.effects[index];
-                let variance = evaluation.covariance[(index, index)];
-                let slopes = by_spread.iter().map(|slope| slope[(index, index)]);
-                let slopes = DVector::from_iterator(by_spread.len(), slopes);
-                let uncertainty = (&spread_covariance * &slopes).dot(&slopes);
-                let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, 1e9);
-                let freedom = match self.nested.level_of(j) {
-                    // No uncertainty of a spread of zero is known, although its groups are few: theirs is the least.
-                    (level, own) if is_zero(level, k) => freedom.min(own),
-                    _ => freedom,
-                };
-                let std_error = variance.sqrt();
+                let value = optimum.evaluation.effects[index];
+                let variance = judged.covariance[(index, index)];
+                let slopes = judged.slopes.iter().map(|slope| slope[(index, index)]);
+                let slopes = DVector::from_iterator(judged.slopes.len(), slopes);
+                let uncertainty = (&judged.spread_covariance * &slopes).dot(&slopes);
+                let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, FREEDOM_MAX);
                 let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
-                let half = student.inverse_cdf(0.5 + 0.5 * COVERAGE) * std_error;
+                let half = student.inverse_cdf(0.5 + 0.5 * COVERAGE) * variance.sqrt();
                 found.push(EffectEstimate {
                     effect: effect.clone(),
                     parameter: parameter.clone(),
                     value,
-                    std_error,
+                    std_error: optimum.evaluation.covariance[(index, index)].sqrt(),
                     freedom,
                     interval: [value - half, value + half],
-                    p_value: 2.0 * student.cdf(-(value / std_error).abs()),
+                    p_value: 2.0 * student.cdf(-(value / variance.sqrt()).abs()),
                 });
             }
         }
         Some(found)
     }
 
-    /// Slopes of the covariance of the effects by each coordinate.
-    fn covariance_slopes(&self, at: &[f64]) -> Option<Vec<DMatrix<f64>>> {
-        const STEP: f64 = 1e-4;
-        let slope = |k: usize| {
-            let shifted = |by: f64| {
-                let mut other = at.to_vec();
-                other[k] += by;
-                Some(self.criterion.evaluate(&other)?.covariance)
-            };
-            Some((shifted(STEP)? - shifted(-STEP)?) / (2.0 * STEP))
-        };
-        (0..at.len()).map(slope).collect()
+    /// By what intervals of means and effects are judged: where a spread is zero, by variances that may be below zero. A bound
+    /// would make them too narrow or too wide by turns (Stroup & Littell, Conference on Applied Statistics in Agriculture, 2002).
+    fn judge(&self, optimum: &Optimum) -> Option<Judgement> {
+        let has_zero = optimum.at.iter().any(|value| value.abs() < ZERO);
+        let free = has_zero.then(|| self.without_bounds(optimum)).flatten();
+        free.or_else(|| Judgement::of(&self.criterion, optimum))
+    }
+
+    fn without_bounds(&self, optimum: &Optimum) -> Option<Judgement> {
+        let (coordinates, start) = self.coordinates().signed(&optimum.at)?;
+        let criterion = Criterion { study: self.nested, coordinates: &coordinates };
+        Judgement::of(&criterion, &criterion.minimum(&start)?)
     }
 
     fn spreads(&self, optimum: &Optimum, has_intervals: bool) -> Vec<Spread> {
         let factors = self.coordinates().factors(&optimum.at);
-        let variance = |level: usize, k: usize| factors[level].row(k).norm_squared();
+        let variance = |level: usize, k: usize| factors[level].root.row(k).norm_squared();
         let mut spreads = Vec::new();
         for (level, name) in self.study.levels.iter().enumerate() {
             for (k, parameter) in self.study.parameters.iter().enumerate() {

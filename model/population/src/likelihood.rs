@@ -7,10 +7,29 @@
 //! any other. The gradient follows the same steps backwards.
 
 use crate::study::{Evidence, NestedStudy};
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, LU};
 
 /// Quadratic forms of one group's members, or their adjoints: of its shift, the effects and one.
 type Form = DMatrix<f64>;
+
+/// The covariance of the shifts of a level: a factor times signs times its transpose.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct SpreadFactor {
+    pub root: DMatrix<f64>,
+    /// One, or minus one where a variance is below zero: no spread, but what judges means without a bound in its way.
+    pub signs: DVector<f64>,
+}
+
+impl SpreadFactor {
+    pub fn of(root: DMatrix<f64>) -> Self {
+        let signs = DVector::from_element(root.ncols(), 1.0);
+        Self { root, signs }
+    }
+
+    pub fn covariance(&self) -> DMatrix<f64> {
+        &self.root * DMatrix::from_diagonal(&self.signs) * self.root.transpose()
+    }
+}
 
 /// A shift that is integrated out of a form.
 struct Integration {
@@ -18,55 +37,55 @@ struct Integration {
     columns: DMatrix<f64>,
     /// Those times the inverse of `scaled`.
     weights: DMatrix<f64>,
-    /// One and the form of the shift in units of its spread.
-    scaled: Cholesky<f64, nalgebra::Dyn>,
+    /// The inverse of the signs and the form of the shift in units of its spread.
+    inverse: DMatrix<f64>,
+    log_determinant: f64,
 }
 
 impl Integration {
-    fn of(form: &Form, factor: &DMatrix<f64>) -> Option<Self> {
-        let count = factor.nrows();
-        let columns = form.columns(0, count) * factor;
-        let mut scaled = factor.tr_mul(&columns.rows(0, count));
-        (0..count).for_each(|k| scaled[(k, k)] += 1.0);
-        let scaled = Cholesky::new(scaled)?;
-        let weights = scaled.solve(&columns.transpose()).transpose();
-        Some(Self { columns, weights, scaled })
+    /// `None` where a variance below zero outweighs what the form says.
+    fn of(form: &Form, factor: &SpreadFactor) -> Option<Self> {
+        let count = factor.signs.len();
+        let columns = form.columns(0, count) * &factor.root;
+        let mut scaled = factor.root.tr_mul(&columns.rows(0, count));
+        (0..count).for_each(|k| scaled[(k, k)] += factor.signs[k]);
+        let scaled = LU::new(scaled);
+        let determinant = scaled.determinant() * factor.signs.product();
+        let inverse = scaled.try_inverse().filter(|_| determinant > 0.0)?;
+        let weights = &columns * &inverse;
+        Some(Self { columns, weights, inverse, log_determinant: determinant.ln() })
     }
 
     fn form(&self, form: &Form) -> Form {
         form - &self.weights * self.columns.transpose()
     }
 
-    fn log_determinant(&self) -> f64 {
-        log_determinant(&self.scaled)
-    }
-
     /// The adjoint of the form from that of what is left of it; adds to that of the factor.
     fn adjoint(
         &self,
         form: &Form,
-        factor: &DMatrix<f64>,
+        root: &DMatrix<f64>,
         after: &Form,
-        of_factor: &mut DMatrix<f64>,
+        of_root: &mut DMatrix<f64>,
     ) -> Form {
-        let count = factor.nrows();
+        let count = root.nrows();
         let of_columns = after * &self.weights * -2.0;
-        let of_scaled = self.weights.tr_mul(&(after * &self.weights)) + self.scaled.inverse();
-        *of_factor += form.columns(0, count).tr_mul(&of_columns)
-            + form.view((0, 0), (count, count)) * factor * &of_scaled * 2.0;
+        let of_scaled = self.weights.tr_mul(&(after * &self.weights)) + &self.inverse;
+        *of_root += form.columns(0, count).tr_mul(&of_columns)
+            + form.view((0, 0), (count, count)) * root * &of_scaled * 2.0;
         let mut before = after.clone();
-        let half = of_columns * factor.transpose() * 0.5;
+        let half = of_columns * root.transpose() * 0.5;
         let mut columns = before.columns_mut(0, count);
         columns += &half;
         let mut rows = before.rows_mut(0, count);
         rows += half.transpose();
         let mut own = before.view_mut((0, 0), (count, count));
-        own += factor * of_scaled * factor.transpose();
+        own += root * of_scaled * root.transpose();
         before
     }
 }
 
-fn log_determinant(factor: &Cholesky<f64, nalgebra::Dyn>) -> f64 {
+fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
 }
 
@@ -100,14 +119,14 @@ impl NestedStudy {
 
     /// Restricted likelihood and means; `None` where a spread of zero leaves a session impossible, or effects cannot be told
     /// apart.
-    pub fn evaluate(&self, factors: &[DMatrix<f64>]) -> Option<Evaluation> {
+    pub fn evaluate(&self, factors: &[SpreadFactor]) -> Option<Evaluation> {
         self.means(&self.sums(factors)?)
     }
 
     /// Those with the gradient of the criterion by the factor of each level, the outermost first.
     pub fn evaluate_with_gradient(
         &self,
-        factors: &[DMatrix<f64>],
+        factors: &[SpreadFactor],
     ) -> Option<(Evaluation, Vec<DMatrix<f64>>)> {
         let sums = self.sums(factors)?;
         let evaluation = self.means(&sums)?;
@@ -143,14 +162,14 @@ impl NestedStudy {
         extended
     }
 
-    fn sums(&self, factors: &[DMatrix<f64>]) -> Option<Sums> {
+    fn sums(&self, factors: &[SpreadFactor]) -> Option<Sums> {
         let zero = || DMatrix::zeros(self.width(), self.width());
         let mut groups: Vec<Vec<Form>> =
             self.parents.iter().map(|parents| vec![zero(); parents.len()]).collect();
         let mut root = zero();
         let mut logarithm = 0.0;
         let innermost = &factors[self.parents.len()];
-        let exact = innermost.clone() * innermost.transpose();
+        let exact = innermost.covariance();
         for (index, session) in self.sessions.iter().enumerate() {
             let weight = match &session.evidence {
                 Evidence::Exact => {
@@ -160,7 +179,7 @@ impl NestedStudy {
                 }
                 Evidence::Information(information) => {
                     let step = Integration::of(information, innermost)?;
-                    logarithm += step.log_determinant();
+                    logarithm += step.log_determinant;
                     step.form(information)
                 }
             };
@@ -174,7 +193,7 @@ impl NestedStudy {
             let (outer, own) = groups.split_at_mut(level);
             for (form, parent) in own[0].iter().zip(&self.parents[level]) {
                 let step = Integration::of(form, &factors[level])?;
-                logarithm += step.log_determinant();
+                logarithm += step.log_determinant;
                 let sum = match outer.last_mut() {
                     Some(outer) => &mut outer[*parent],
                     None => &mut root,
@@ -229,7 +248,7 @@ impl NestedStudy {
     fn gradient(
         &self,
         sums: &Sums,
-        factors: &[DMatrix<f64>],
+        factors: &[SpreadFactor],
         root: &Form,
     ) -> Option<Vec<DMatrix<f64>>> {
         let count = self.parameters;
@@ -239,7 +258,7 @@ impl NestedStudy {
             let own = forms.iter().zip(&self.parents[level]).map(|(form, parent)| {
                 let step = Integration::of(form, &factors[level])?;
                 let sum = &mut gradient[level];
-                Some(step.adjoint(form, &factors[level], &above[*parent], sum))
+                Some(step.adjoint(form, &factors[level].root, &above[*parent], sum))
             });
             above = own.collect::<Option<_>>()?;
         }
@@ -249,13 +268,16 @@ impl NestedStudy {
             let adjoint = self.weight_adjoint(&above[self.owner[index]], index);
             match &session.evidence {
                 Evidence::Exact => {
-                    let inverse = (innermost * innermost.transpose()).try_inverse()?;
+                    let inverse = innermost.covariance().try_inverse()?;
                     let covariance = &inverse - &inverse * adjoint * &inverse;
-                    *sum += covariance * innermost * 2.0;
+                    *sum += covariance
+                        * &innermost.root
+                        * DMatrix::from_diagonal(&innermost.signs)
+                        * 2.0;
                 }
                 Evidence::Information(information) => {
                     let step = Integration::of(information, innermost)?;
-                    step.adjoint(information, innermost, &adjoint, sum);
+                    step.adjoint(information, &innermost.root, &adjoint, sum);
                 }
             }
         }
@@ -266,7 +288,7 @@ impl NestedStudy {
     /// spreads and the effects; of each level, then of the sessions.
     pub fn shifts(
         &self,
-        factors: &[DMatrix<f64>],
+        factors: &[SpreadFactor],
         effects: &DVector<f64>,
     ) -> Option<Vec<Vec<(DVector<f64>, DMatrix<f64>)>>> {
         let sums = self.sums(factors)?;
@@ -316,15 +338,15 @@ impl NestedStudy {
 /// the change that the form asks for.
 fn member(
     form: &Form,
-    factor: &DMatrix<f64>,
+    factor: &SpreadFactor,
     extended: &DVector<f64>,
     above: &DMatrix<f64>,
 ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-    let count = factor.nrows();
+    let (root, count) = (&factor.root, factor.signs.len());
     let step = Integration::of(form, factor)?;
-    let change = factor * step.weights.tr_mul(extended);
+    let change = root * step.weights.tr_mul(extended);
     let shift = extended.rows(0, count) - change;
-    let own = factor * step.scaled.inverse() * factor.transpose();
-    let keeps = DMatrix::identity(count, count) - factor * step.weights.rows(0, count).transpose();
+    let own = root * &step.inverse * root.transpose();
+    let keeps = DMatrix::identity(count, count) - root * step.weights.rows(0, count).transpose();
     Some((shift, own + &keeps * above * keeps.transpose()))
 }

@@ -1,6 +1,6 @@
 //! The spreads that explain the sessions best.
 
-use crate::likelihood::Evaluation;
+use crate::likelihood::{Evaluation, SpreadFactor};
 use crate::study::NestedStudy;
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -33,7 +33,12 @@ pub(crate) struct Coordinates {
     /// Scale of each parameter: how far its values scatter.
     pub scales: Vec<f64>,
     levels: usize,
+    /// Whether a coordinate is a variance, which may be below zero, instead of an entry of a factor.
+    is_signed: bool,
 }
+
+/// The smallest size of a signed variance, over the square of its scale: the factor has no slope at zero.
+const VARIANCE_MIN: f64 = 1e-12;
 
 impl Coordinates {
     /// Spreads of each parameter by itself, or with all correlations.
@@ -53,7 +58,7 @@ impl Coordinates {
             let scale = (square / study.sessions.len() as f64).sqrt();
             if scale > 0.0 { scale } else { 1.0 }
         });
-        Self { all: all.collect(), scales: scales.collect(), levels }
+        Self { all: all.collect(), scales: scales.collect(), levels, is_signed: false }
     }
 
     pub fn start(&self) -> Vec<f64> {
@@ -61,19 +66,42 @@ impl Coordinates {
         self.all.iter().map(|one| if one.row == one.column { even } else { 0.0 }).collect()
     }
 
-    pub fn factors(&self, at: &[f64]) -> Vec<DMatrix<f64>> {
+    /// The same with variances that may be below zero, and where a place is then; `None` where spreads are correlated.
+    pub fn signed(&self, at: &[f64]) -> Option<(Self, Vec<f64>)> {
+        let is_alone = self.all.iter().all(|one| one.row == one.column);
+        let squares = at.iter().map(|value| value * value).collect();
+        is_alone.then(|| (Self { is_signed: true, ..self.clone() }, squares))
+    }
+
+    pub fn factors(&self, at: &[f64]) -> Vec<SpreadFactor> {
         let parameters = self.scales.len();
-        let mut factors = vec![DMatrix::zeros(parameters, parameters); self.levels];
+        let none = SpreadFactor::of(DMatrix::zeros(parameters, parameters));
+        let mut factors = vec![none; self.levels];
         for (one, value) in self.all.iter().zip(at) {
-            factors[one.level][(one.row, one.column)] = value * self.scales[one.row];
+            let factor = &mut factors[one.level];
+            let size = if self.is_signed { root_of(*value) } else { *value };
+            factor.root[(one.row, one.column)] = size * self.scales[one.row];
+            if self.is_signed && *value < 0.0 {
+                factor.signs[one.row] = -1.0;
+            }
         }
         factors
     }
 
-    fn gradient(&self, by_factor: &[DMatrix<f64>]) -> Vec<f64> {
-        let entry = |one: &Coordinate| by_factor[one.level][(one.row, one.column)];
-        self.all.iter().map(|one| entry(one) * self.scales[one.row]).collect()
+    fn gradient(&self, at: &[f64], by_factor: &[DMatrix<f64>]) -> Vec<f64> {
+        let slope = |(one, value): (&Coordinate, &f64)| {
+            let slope = by_factor[one.level][(one.row, one.column)] * self.scales[one.row];
+            match self.is_signed {
+                true => slope * value.signum() / (2.0 * root_of(*value)),
+                false => slope,
+            }
+        };
+        self.all.iter().zip(at).map(slope).collect()
     }
+}
+
+fn root_of(variance: f64) -> f64 {
+    variance.abs().max(VARIANCE_MIN).sqrt()
 }
 
 /// The criterion over the coordinates.
@@ -99,7 +127,7 @@ impl Criterion<'_> {
 
     fn gradient(&self, at: &[f64]) -> Option<Vec<f64>> {
         let (_, gradient) = self.study.evaluate_with_gradient(&self.coordinates.factors(at))?;
-        Some(self.coordinates.gradient(&gradient))
+        Some(self.coordinates.gradient(at, &gradient))
     }
 
     /// The lowest point.

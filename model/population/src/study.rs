@@ -166,30 +166,6 @@ impl Study {
     }
 }
 
-impl NestedStudy {
-    /// The outermost level within whose groups an effect is the same, and how many groups it has more than effects that are the
-    /// same within them: what is left to tell the effect from the spread of the groups.
-    pub fn level_of(&self, effect: usize) -> (usize, f64) {
-        let own = (0..self.parents.len()).find(|&level| self.is_same_within(level, effect));
-        let level = own.unwrap_or(self.parents.len());
-        let groups = self.parents.get(level).map_or(self.sessions.len(), Vec::len);
-        let alike =
-            (0..self.effects).filter(|&one| own.is_none() || self.is_same_within(level, one));
-        (level, groups.saturating_sub(alike.count()).max(1) as f64)
-    }
-
-    fn is_same_within(&self, level: usize, effect: usize) -> bool {
-        let mut first = vec![None; self.parents[level].len()];
-        self.sessions.iter().zip(&self.owner).all(|(session, &innermost)| {
-            let mut group = innermost;
-            for above in (level + 1..self.parents.len()).rev() {
-                group = self.parents[above][group];
-            }
-            *first[group].get_or_insert(session.design[effect]) == session.design[effect]
-        })
-    }
-}
-
 /// Symmetric, and no variance below zero but for rounding.
 fn is_covariance(matrix: &DMatrix<f64>) -> bool {
     let size = matrix.amax();

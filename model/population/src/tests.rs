@@ -1,4 +1,4 @@
-use crate::likelihood::Evaluation;
+use crate::likelihood::{Evaluation, SpreadFactor};
 use crate::search::Coordinates;
 use crate::study::NestedStudy;
 use crate::{Evidence, PopulationOptions, Study, StudyError, StudySession, fit_population};
@@ -35,18 +35,17 @@ fn study(random: &mut SplitMix) -> Study {
     }
 }
 
-fn factors() -> Vec<DMatrix<f64>> {
-    [[0.9, 0.0, -0.4, 0.5], [0.4, 0.0, 0.1, 0.0], [0.2, 0.0, 0.05, 0.3]]
-        .map(|entries| DMatrix::from_row_slice(2, 2, &entries))
+fn factors() -> Vec<SpreadFactor> {
+    [[0.9, 0.0, -0.4, 0.5], [0.4, 0.0, 0.1, 0.0], [0.2, 0.0, 0.05, 0.12]]
+        .map(|entries| SpreadFactor::of(DMatrix::from_row_slice(2, 2, &entries)))
         .to_vec()
 }
 
 /// The same by the covariance of all values at once.
-fn dense(study: &NestedStudy, factors: &[DMatrix<f64>]) -> Evaluation {
+fn dense(study: &NestedStudy, factors: &[SpreadFactor]) -> Evaluation {
     let (count, sessions) = (study.parameters, &study.sessions);
     let size = count * sessions.len();
-    let [outer, inner, own] =
-        [0, 1, 2].map(|level: usize| &factors[level] * factors[level].transpose());
+    let [outer, inner, own] = [0, 1, 2].map(|level: usize| factors[level].covariance());
     let mut covariance = DMatrix::zeros(size, size);
     let mut design = DMatrix::zeros(size, count * study.effects);
     let mut values = DVector::zeros(size);
@@ -94,10 +93,16 @@ fn close(found: f64, expected: f64) {
 #[test]
 fn the_tree_is_the_covariance_of_all_values_at_once() {
     let nested = study(&mut SplitMix::seeded(3)).nested().unwrap();
-    let (found, expected) = (nested.evaluate(&factors()).unwrap(), dense(&nested, &factors()));
-    close(found.criterion, expected.criterion);
-    found.effects.iter().zip(&expected.effects).for_each(|(a, b)| close(*a, *b));
-    found.covariance.iter().zip(&expected.covariance).for_each(|(a, b)| close(*a, *b));
+    // A variance below zero, too, as long as the whole is a covariance.
+    for sign in [1.0, -1.0] {
+        let mut factors = factors();
+        factors[1].root[(0, 0)] = 0.1;
+        factors[1].signs[0] = sign;
+        let (found, expected) = (nested.evaluate(&factors).unwrap(), dense(&nested, &factors));
+        close(found.criterion, expected.criterion);
+        found.effects.iter().zip(&expected.effects).for_each(|(a, b)| close(*a, *b));
+        found.covariance.iter().zip(&expected.covariance).for_each(|(a, b)| close(*a, *b));
+    }
 }
 
 /// Differences over 1e-6 are good to about 1e-8 of a criterion of some tens.
@@ -109,12 +114,15 @@ fn the_gradient_is_that_of_differences() {
             study.sessions.iter_mut().for_each(|one| one.evidence = Evidence::Exact);
         }
         let nested = study.nested().unwrap();
-        let (_, gradient) = nested.evaluate_with_gradient(&factors()).unwrap();
+        let mut factors = factors();
+        // Exact values need a whole covariance of their own.
+        factors[2].signs[1] = if exact { 1.0 } else { -1.0 };
+        let (_, gradient) = nested.evaluate_with_gradient(&factors).unwrap();
         for level in 0..3 {
             for (row, column) in [(0, 0), (1, 0), (1, 1)] {
                 let shifted = |by: f64| {
-                    let mut other = factors();
-                    other[level][(row, column)] += by;
+                    let mut other = factors.clone();
+                    other[level].root[(row, column)] += by;
                     nested.evaluate(&other).unwrap().criterion
                 };
                 let slope = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
@@ -138,8 +146,7 @@ fn shifts_are_those_of_the_covariance_of_all() {
     let total = 2 * counts.iter().sum::<usize>();
     let (mut matrix, mut right) = (DMatrix::zeros(total, total), DVector::zeros(total));
     for level in 0..3 {
-        let precision =
-            (&factors[level] * factors[level].transpose()).pseudo_inverse(1e-12).unwrap();
+        let precision = factors[level].covariance().pseudo_inverse(1e-12).unwrap();
         for k in 0..counts[level] {
             let at = 2 * (starts[level] + k);
             let mut block = matrix.view_mut((at, at), (2, 2));
