@@ -14,6 +14,7 @@ mod layer;
 mod load_curve;
 mod quadrature;
 mod shape;
+mod superposition;
 mod triangle;
 mod validity;
 mod viscoelastic;
@@ -28,6 +29,10 @@ pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;
 pub use layer::{Base, Layer, LayerError};
 pub use shape::{Contact, IndenterShape};
+pub use superposition::{
+    Arrhenius, LawRefusal, MasterCurve, ModulusError, Plot, SuperpositionError, Sweep,
+    SweepOverlap, SweepSine, WilliamsLandelFerry, master_curve,
+};
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
 pub use viscoelastic::{
     CreepSeries, CreepTerm, DepthHistory, HistoryError, LoadHistoryError, PowerLaw, PronySeries,
