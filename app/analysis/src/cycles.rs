@@ -13,6 +13,7 @@ use palpate_protocols::engine::{Effect, Record};
 use palpate_rheology::cycles::{CycleSample, split_by_depth};
 use palpate_sessions::{SampleRow, Session};
 use palpate_tables::import::{ColumnNames, MeasurementTable, read_table};
+use serde_json::Value;
 use std::path::Path;
 
 /// Samples of a record in cycles, with remarks on them.
@@ -30,6 +31,8 @@ pub struct CycleSource {
     pub notes: Vec<String>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
+    /// Of the specimen, in degrees Celsius; `None` where it was not stated.
+    pub temperature_c: Option<f64>,
 }
 
 impl CycleSource {
@@ -77,6 +80,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
         notes: session.notes.clone(),
         pulse: session.manifest.rig.as_ref().map(|rig| Depth(rig.mm_per_pulse)),
         calibration: calibration_of(session).ok(),
+        temperature_c: session.manifest.about.get("specimen.temperature_c").and_then(Value::as_f64),
         ..CycleSource::default()
     };
     let mut left_out = 0usize;

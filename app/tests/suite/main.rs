@@ -15,6 +15,7 @@ mod fit;
 mod haptics;
 mod import;
 mod lake;
+mod master_curve;
 mod material;
 mod migrations;
 mod newer;

@@ -1,7 +1,13 @@
 //! Storage and loss modulus of the sines of a record: the dynamic stiffness less what machine and moving mass add, over the slope
 //! of the contact law (Herbert, Oliver and Pharr, J. Phys. D 41 (2008) 074021).
 
+mod master_curve;
 mod sine;
+
+pub use master_curve::{
+    MasterCurveError, MasterCurveReport, MasterCurveRequest, MasterPoint, PairReport, SweepReport,
+    WilliamsLandelFerryReport, master_curve,
+};
 
 use crate::analysed_session;
 use crate::compliance::ComplianceCorrection;
@@ -12,16 +18,17 @@ use crate::material::{
 };
 use crate::recordings::is_session;
 use crate::relaxation::{
-    RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber, relaxation,
+    RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber,
+    relaxation,
 };
 use crate::source::{RecordStretch, SourceError};
 use palpate_indentation::{
     ContactError, ContactLaw, Indenter, PronySeries, PronyTerm, Quantity, Specimen,
 };
-use palpate_model::calibration::ForceUncertainty;
+use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_rheology::cycles::{Sinusoid, SinusoidError, fit_sinusoid};
 use serde::Serialize;
-use sine::{SineContact, SineUncertainty};
+use sine::{Moduli, SineContact, SineUncertainty};
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -43,6 +50,8 @@ pub struct DynamicReport {
     pub indenter: Indenter,
     pub specimen: Specimen,
     pub moving_mass_g: Option<Quantity>,
+    /// Of the specimen, in degrees Celsius; `None` where it was not stated.
+    pub temperature_c: Option<f64>,
     /// In the order in which they were run.
     pub sines: Vec<DynamicModuli>,
     pub not_included: Vec<&'static str>,
@@ -56,6 +65,9 @@ pub struct DynamicReport {
     pub compliance: Option<ComplianceCorrection>,
     #[serde(skip)]
     pub notes: Vec<String>,
+    /// The calibration its forces were read with; `None` for a table.
+    #[serde(skip)]
+    calibration: Option<Calibration>,
 }
 
 /// Moduli at one frequency, in MPa.
@@ -81,6 +93,9 @@ pub struct DynamicModuli {
     pub distortion_percent: f64,
     /// What makes the numbers not those of the specimen.
     pub remark: Option<String>,
+    /// What one standard uncertainty of each independent error changes, in the order of the errors of its source.
+    #[serde(skip)]
+    effects: Vec<(&'static str, Moduli)>,
 }
 
 /// Standard uncertainties that a source adds.
@@ -127,6 +142,15 @@ pub enum DynamicError {
 
 /// The dynamic moduli of the sines of a session, or of a record that is one sine.
 pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> {
+    let (press, term_count) = (&request.press, None);
+    measure(request, Some(relaxation(RelaxationRequest { press, term_count })))
+}
+
+/// The same beside what the relaxation of the record predicts, where that is asked.
+fn measure(
+    request: &DynamicRequest,
+    predicted: Option<Result<RelaxationReport, RelaxationError>>,
+) -> Result<DynamicReport, DynamicError> {
     let press = &request.press;
     check(request)?;
     let PressRecord { read, compliance, specimen } = read_press(press, RecordStretch::RampHold)?;
@@ -144,7 +168,11 @@ pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> 
         compliance_error_mm_per_n: applied.map(|one| one.std_error_mm_per_n),
         moving_mass_error_g: request.moving_mass_g.map(|mass| mass.standard_uncertainty),
     };
-    let predicted = relaxation(RelaxationRequest { press, term_count: None });
+    let (predicted, refused) = match predicted {
+        Some(Ok(report)) => (Some(report), None),
+        Some(Err(reason)) => (None, Some(reason.to_string())),
+        None => (None, None),
+    };
     let mut notes = read.notes;
     let mut sines = Vec::new();
     let mut deepest = 0.0f64;
@@ -170,7 +198,7 @@ pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> 
             compliance_mm_per_n: applied.map_or(0.0, |one| one.mm_per_n),
             moving_mass_g: request.moving_mass_g.map_or(0.0, |mass| mass.value),
         };
-        let row = row(&sine, &found, &uncertainty, predicted.as_ref().ok())?;
+        let row = row(&sine, &found, &uncertainty, predicted.as_ref())?;
         deepest = deepest.max(row.depth_mean_mm + row.depth_amplitude_mm);
         sines.push(row);
     }
@@ -189,9 +217,11 @@ pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> 
         not_included: uncertainty.not_included(),
         contact_error_mm,
         validity: validity_rows(&validity),
-        prediction_refused: predicted.err().map(|reason| reason.to_string()),
+        prediction_refused: refused,
         compliance,
         notes,
+        calibration: read.calibration,
+        temperature_c: source.temperature_c,
     })
 }
 
@@ -249,13 +279,18 @@ fn row(
         let variance: f64 = errors.iter().map(|(_, effect)| effect[number].powi(2)).sum();
         UncertainNumber::new(values[number], variance.sqrt())
     };
-    let budget_row = |(source, effect): &(&'static str, [f64; 5])| DynamicBudgetRow {
-        source,
-        storage_mpa: effect[0],
-        loss_mpa: effect[1],
-        tan_delta: effect[4],
+    // The errors of a source stand together.
+    let budget_row = |errors: &[(&'static str, Moduli)]| {
+        let effect = sine::root_of_squares(errors);
+        DynamicBudgetRow {
+            source: errors[0].0,
+            storage_mpa: effect[0],
+            loss_mpa: effect[1],
+            tan_delta: effect[4],
+        }
     };
-    let mut budget: Vec<DynamicBudgetRow> = errors.iter().map(budget_row).collect();
+    let of_sources = errors.chunk_by(|(one, _), (other, _)| one == other);
+    let mut budget: Vec<DynamicBudgetRow> = of_sources.map(budget_row).collect();
     budget.sort_by(|a, b| b.storage_mpa.total_cmp(&a.storage_mpa));
     Ok(DynamicModuli {
         frequency_hz: sine.frequency_hz,
@@ -271,6 +306,7 @@ fn row(
         predicted_shear_mpa: relaxation.and_then(|report| predict(report, sine.frequency_hz)),
         distortion_percent: found.distortion_percent,
         remark: found.remark(),
+        effects: errors,
     })
 }
 

@@ -13,6 +13,12 @@ pub(super) const AMPLITUDE_OVER_DEPTH_MAX: f64 = 0.05;
 /// a contact that grows and shrinks).
 const SHRINKING: f64 = 0.75;
 
+/// Sources of uncertainty that differ from sine to sine, from session to session, or with the calibration.
+pub(super) const RESIDUALS: &str = "residuals";
+pub(super) const CONTACT: &str = "contact";
+pub(super) const SHRINKING_CONTACT: &str = "shrinking contact";
+pub(super) const CALIBRATION: &str = "calibration";
+
 /// A smaller share of a modulus is rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -95,11 +101,12 @@ impl SineContact {
         Ok(depth * slope / load)
     }
 
-    /// Half of what two cases differ by; where one is beyond the law, what the other differs by from this one.
+    /// Half of what the higher case is above the lower; where one is beyond the law, what the other differs by from this one.
     fn effect(&self, low: Self, high: Self) -> Result<Moduli, DynamicError> {
         Ok(match (low.moduli(), high.moduli()) {
             (Ok(low), Ok(high)) => difference(low, high, 0.5),
-            (Ok(one), Err(_)) | (Err(_), Ok(one)) => difference(self.moduli()?, one, 1.0),
+            (Ok(low), Err(_)) => difference(low, self.moduli()?, 1.0),
+            (Err(_), Ok(high)) => difference(self.moduli()?, high, 1.0),
             (Err(err), Err(_)) => return Err(err),
         })
     }
@@ -121,7 +128,7 @@ impl SineUncertainty {
         known.into_iter().filter(|(_, is_known)| !is_known).map(|(name, _)| name).collect()
     }
 
-    /// What each source adds to the moduli.
+    /// What each independent error changes in the moduli; those of a source stand together.
     pub fn effects(
         &self,
         sine: &SineContact,
@@ -138,9 +145,9 @@ impl SineUncertainty {
         let in_phase =
             about(&|one, sign| one.stiffness_n_per_mm[0] += sign * found.storage.std_error)?;
         let ahead = about(&|one, sign| one.stiffness_n_per_mm[1] += sign * found.loss.std_error)?;
-        let mut effects = vec![("residuals", root_of_squares(&[in_phase, ahead]))];
+        let mut effects = vec![(RESIDUALS, in_phase), (RESIDUALS, ahead)];
         if let Some(error) = self.contact_error_mm {
-            effects.push(("contact", about(&|one, sign| one.depth_mm += sign * error)?));
+            effects.push((CONTACT, about(&|one, sign| one.depth_mm += sign * error)?));
         }
         for (term, both) in vary_uncertain_numbers(&sine.indenter, &sine.specimen) {
             let [low, high] =
@@ -148,7 +155,7 @@ impl SineUncertainty {
             effects.push((term.name(), sine.effect(low, high)?));
         }
         if let Some(known) = &self.calibration {
-            effects.push(("calibration", calibration_effect(known, sine, found)?));
+            effects.extend(calibration_effects(known, sine, found)?);
         }
         if let Some(error) = self.compliance_error_mm_per_n {
             let effect = about(&|one, sign| one.compliance_mm_per_n += sign * error)?;
@@ -163,17 +170,17 @@ impl SineUncertainty {
         let [storage, loss, shear_storage, shear_loss, tan_delta] = sine.moduli()?;
         let shrinking =
             [storage, loss, shear_storage, shear_loss, tan_delta].map(|one| low_by * one.abs());
-        effects.push(("shrinking contact", shrinking));
+        effects.push((SHRINKING_CONTACT, shrinking));
         Ok(effects)
     }
 }
 
 /// An error of the calibration curve is one of its slope over the force that the sine spans.
-fn calibration_effect(
+fn calibration_effects(
     known: &ForceUncertainty,
     sine: &SineContact,
     found: &Sinusoid,
-) -> Result<Moduli, DynamicError> {
+) -> Result<Vec<(&'static str, Moduli)>, DynamicError> {
     let amplitude = found.force_amplitude.value.0;
     let shift = |error: usize, force: f64| known.shift(error, Newtons(force)).0;
     // One slope for all: an error of force moves no contact.
@@ -182,23 +189,21 @@ fn calibration_effect(
         let [low, high] = [-1.0, 1.0].map(|sign| shift(error, sine.force_n + sign * amplitude));
         let gain = 0.5 * (high - low) / amplitude;
         let [low, high] = [1.0 - gain, 1.0 + gain].map(|factor| sine.scaled(factor));
-        Ok(difference(low.moduli_over(slope)?, high.moduli_over(slope)?, 0.5))
+        Ok((CALIBRATION, difference(low.moduli_over(slope)?, high.moduli_over(slope)?, 0.5)))
     };
-    let effects: Result<Vec<Moduli>, DynamicError> =
-        (0..known.errors().count()).map(effect).collect();
-    Ok(root_of_squares(&effects?))
+    (0..known.errors().count()).map(effect).collect()
 }
 
 fn difference(one: Moduli, other: Moduli, share: f64) -> Moduli {
     std::array::from_fn(|number| {
-        let change = share * (other[number] - one[number]).abs();
-        if change > ROUNDING * one[number].abs() { change } else { 0.0 }
+        let change = share * (other[number] - one[number]);
+        if change.abs() > ROUNDING * one[number].abs() { change } else { 0.0 }
     })
 }
 
-fn root_of_squares(effects: &[Moduli]) -> Moduli {
+pub(super) fn root_of_squares(effects: &[(&'static str, Moduli)]) -> Moduli {
     std::array::from_fn(|number| {
-        effects.iter().map(|effect| effect[number].powi(2)).sum::<f64>().sqrt()
+        effects.iter().map(|(_, effect)| effect[number].powi(2)).sum::<f64>().sqrt()
     })
 }
 

@@ -15,6 +15,7 @@ pub mod fit_json;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 pub mod live;
+pub mod master_curve;
 pub mod material;
 pub mod material_plot;
 pub mod panels;

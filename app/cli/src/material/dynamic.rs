@@ -12,7 +12,7 @@ pub(super) fn run(request: &DynamicRequest, output: &Output) -> Result<(), Failu
     Ok(())
 }
 
-fn failure(err: DynamicError) -> Failure {
+pub(super) fn failure(err: DynamicError) -> Failure {
     match err {
         DynamicError::Press(err) => super::failure(err),
         DynamicError::Source(err) => source_failure(err),

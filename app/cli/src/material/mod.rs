@@ -1,6 +1,7 @@
 //! `palpate material`: the moduli of a press by a contact law.
 
 mod dynamic;
+mod master_curve;
 mod relaxation;
 mod unloading;
 
@@ -10,7 +11,7 @@ use super::output::Output;
 use super::recalibrate::{self, AuthorArgs};
 use super::{Failure, compliance, source_failure};
 use clap::Args;
-use palpate_analysis::dynamic::DynamicRequest;
+use palpate_analysis::dynamic::{DynamicRequest, MasterCurveRequest};
 use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
 use palpate_analysis::material_lake::{LakeMaterialRequest, material_lake};
 use palpate_analysis::report::material::material_text;
@@ -20,14 +21,15 @@ use palpate_indentation::{
 };
 use palpate_tables::lake::{Shard, is_lake};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Moduli of a press by a contact law, with the probe's shape and the thickness taken out
 #[derive(Debug, Args)]
 pub struct MaterialArgs {
     /// Session folder, or a delimited table with columns for time, depth and force; or a lake, which keeps the moduli of
-    /// loadings
-    source: PathBuf,
+    /// loadings; or the sessions of a master curve
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<PathBuf>,
     /// What is found of the material
     #[arg(long, value_parser = choice(PROPERTIES), default_value = "modulus")]
     property: Property,
@@ -94,6 +96,9 @@ pub struct MaterialArgs {
     /// Mass in g that moves between load cell and specimen, as probe and rod; without it none
     #[arg(long, value_name = "GRAMS", value_parser = quantity, allow_hyphen_values = true)]
     moving_mass: Option<Quantity>,
+    /// Temperature in degrees Celsius at which a master curve is; without it the middle one of its sessions
+    #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true)]
+    reference_temperature: Option<f64>,
     /// Save the modulus of the loading as an analysis of this name with its session
     #[arg(long, value_name = "NAME")]
     save: Option<String>,
@@ -113,6 +118,7 @@ enum Property {
     Unloading,
     Relaxation,
     Dynamic,
+    MasterCurve,
 }
 
 const PROPERTIES: &[Choice<Property>] = &[
@@ -120,6 +126,11 @@ const PROPERTIES: &[Choice<Property>] = &[
     ("unloading", Property::Unloading, "Young's modulus of the unloading, by Oliver and Pharr"),
     ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
     ("dynamic", Property::Dynamic, "storage and loss modulus of sines"),
+    (
+        "master-curve",
+        Property::MasterCurve,
+        "those of sessions at several temperatures, as one curve",
+    ),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,8 +160,15 @@ const LAWS: &[Choice<ContactLaw>] = &[
 
 pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
-    let request = request(args)?;
-    if is_lake(&args.source) {
+    // The command line has one source at least.
+    let source = &args.sources[0];
+    if args.sources.len() > 1 && args.property != Property::MasterCurve {
+        return Err(Failure::usage(
+            "only a master curve takes several sources; give one, or --property master-curve",
+        ));
+    }
+    let request = request(args, source)?;
+    if is_lake(source) {
         return over_lake(args, &request, output);
     }
     if args.shard.is_some() {
@@ -160,15 +178,24 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
         Property::Modulus => modulus(args, &request, output),
         Property::Unloading => unloading::run(&request, output),
         Property::Relaxation => relaxation::run(&request, args.terms, output),
-        Property::Dynamic => {
-            let (frequency_hz, moving_mass_g) = (args.frequency, args.moving_mass);
-            dynamic::run(&DynamicRequest { press: request, frequency_hz, moving_mass_g }, output)
-        }
+        Property::Dynamic => dynamic::run(&dynamic_request(args, request), output),
+        Property::MasterCurve => master_curve::run(&master_curve_request(args)?, output),
     }
 }
 
+fn dynamic_request(args: &MaterialArgs, press: MaterialRequest) -> DynamicRequest {
+    let (frequency_hz, moving_mass_g) = (args.frequency, args.moving_mass);
+    DynamicRequest { press, frequency_hz, moving_mass_g }
+}
+
+fn master_curve_request(args: &MaterialArgs) -> Result<MasterCurveRequest, Failure> {
+    let sweep = |source: &PathBuf| Ok(dynamic_request(args, request(args, source)?));
+    let sweeps: Result<Vec<_>, Failure> = args.sources.iter().map(sweep).collect();
+    Ok(MasterCurveRequest { sweeps: sweeps?, reference_temperature_c: args.reference_temperature })
+}
+
 fn modulus(args: &MaterialArgs, request: &MaterialRequest, output: &Output) -> Result<(), Failure> {
-    saved::check(args.save.as_ref(), &args.source)?;
+    saved::check(args.save.as_ref(), &request.source)?;
     let report = material(request).map_err(failure)?;
     if let Some(name) = &args.save {
         let stored = MaterialToStore::of(request, &report).store(name, &args.author.author());
@@ -196,22 +223,34 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
         compliance_sha256: args.compliance.as_deref().map(lake::hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };
-    lake::fit_each("material", &args.source, output, |is_ending, hear| {
+    lake::fit_each("material", &press.source, output, |is_ending, hear| {
         material_lake(&request, is_ending, hear)
     })
 }
 
 /// A flag that belongs to another property.
 fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
-    use Property::{Dynamic, Modulus, Relaxation, Unloading};
-    let given: [(&str, bool, &[Property], &str); 7] = [
+    use Property::{Dynamic, MasterCurve, Modulus, Relaxation, Unloading};
+    let given: [(&str, bool, &[Property], &str); 9] = [
         ("depth-max", args.depth_max.is_some(), &[Modulus], "the modulus of a loading"),
         ("save", args.save.is_some(), &[Modulus], "the modulus of a loading"),
         ("zero-error", args.zero_error.is_some(), &[Modulus, Unloading], "a Young's modulus"),
-        ("law", args.law.is_some(), &[Modulus, Relaxation, Dynamic], "what is no unloading"),
+        (
+            "law",
+            args.law.is_some(),
+            &[Modulus, Relaxation, Dynamic, MasterCurve],
+            "what is no unloading",
+        ),
         ("terms", args.terms.is_some(), &[Relaxation], "a relaxation modulus"),
         ("frequency", args.frequency.is_some(), &[Dynamic], "dynamic moduli"),
-        ("moving-mass", args.moving_mass.is_some(), &[Dynamic], "dynamic moduli"),
+        ("moving-mass", args.moving_mass.is_some(), &[Dynamic, MasterCurve], "dynamic moduli"),
+        (
+            "reference-temperature",
+            args.reference_temperature.is_some(),
+            &[MasterCurve],
+            "a master curve",
+        ),
+        ("analysis", args.analysis.is_some() && args.property == MasterCurve, &[], "one session"),
     ];
     let is_wrong = |own: &[Property]| !own.contains(&args.property);
     let wrong = given.into_iter().find(|(_, is_given, own, _)| *is_given && is_wrong(own));
@@ -220,9 +259,9 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
     })
 }
 
-fn request(args: &MaterialArgs) -> Result<MaterialRequest, Failure> {
+fn request(args: &MaterialArgs, source: &Path) -> Result<MaterialRequest, Failure> {
     Ok(MaterialRequest {
-        source: args.source.clone(),
+        source: source.to_owned(),
         columns: parse_columns(args.columns.as_deref())?,
         analysis: args.analysis.clone(),
         is_rejected_included: args.include_rejected,

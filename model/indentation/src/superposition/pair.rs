@@ -43,9 +43,18 @@ pub(super) struct Pair<'a> {
 
 impl Pair<'_> {
     pub fn shift(&self) -> Result<PairShift, PairRefusal> {
-        let mut ln_shift =
+        let start =
             closed_form_shift(self.sweeps[0], self.sweeps[1]).ok_or(PairRefusal::NoOverlap)?;
-        let mut sines = Vec::new();
+        self.shift_from(start).or_else(|reason| {
+            // What is not one curve may well be without a shift.
+            let (comparison, slopes) = self.overlap(&self.sines_within(start), start);
+            comparison.in_wicket(&slopes.smooth).judge(0, Plot::Wicket)?;
+            Err(reason)
+        })
+    }
+
+    fn shift_from(&self, start: f64) -> Result<PairShift, PairRefusal> {
+        let (mut ln_shift, mut sines) = (start, Vec::new());
         for round in 0..ROUNDS_MAX {
             if round < ROUNDS_FREE {
                 sines = self.sines_within(ln_shift);

@@ -86,8 +86,13 @@ impl ShiftFactors {
     /// which it begins.
     pub fn williams_landel_ferry(&self) -> Result<WilliamsLandelFerry, LawRefusal> {
         let line: Vec<f64> = self.differences.iter().map(|one| -one).collect();
-        let start = self.whitening.triangle(&[&line, &self.ln_shifts]).solve();
-        let [mut p, mut q] = [start.ok_or(LawRefusal::TooFewTemperatures)?[0], 0.0];
+        let bend: Vec<f64> = line.iter().map(|one| one * one).collect();
+        let start = self.whitening.triangle(&[&line, &bend, &self.ln_shifts]);
+        // A third temperature bends the line.
+        let (Some(_), Some(start)) = (start.solve(), start.selected(&[0]).solve()) else {
+            return Err(LawRefusal::TooFewTemperatures);
+        };
+        let [mut p, mut q] = [start[0], 0.0];
         for _ in 0..ROUNDS_MAX {
             let below = |one: &f64| 1.0 + q * one;
             let by_p: Vec<f64> = self.differences.iter().map(|one| -one / below(one)).collect();
@@ -97,7 +102,7 @@ impl ShiftFactors {
                 self.ln_shifts.iter().zip(&by_p).map(|(shift, by_p)| shift - p * by_p).collect();
             let triangle = self.whitening.triangle(&[&by_p, &by_q, &left]);
             let (Some(step), Some(covariance)) = (triangle.solve(), triangle.covariance()) else {
-                return Err(LawRefusal::TooFewTemperatures);
+                break;
             };
             if step[1].abs() < 1e-9 * covariance[1][1].sqrt() {
                 self.check(triangle.left_over(), 2)?;

@@ -169,6 +169,8 @@ fn laws_refuse_what_shift_factors_do_not_tell() {
     assert_eq!(two.williams_landel_ferry, Err(LawRefusal::TooFewTemperatures));
     let straight = of(&|temperature| -0.05 * temperature, 3);
     assert_eq!(straight.williams_landel_ferry, Err(LawRefusal::Straight));
+    let unmoved = of(&|_| 0.0, 3);
+    assert_eq!(unmoved.williams_landel_ferry, Err(LawRefusal::Straight));
     let jump = of(&|temperature| if temperature < 45.0 { 0.0 } else { -2.0 }, 9);
     assert!(matches!(jump.arrhenius, Err(LawRefusal::Departs { .. })), "{jump:?}");
     let inverse = of(&|temperature| -0.03 * temperature / (1.0 - 0.005 * temperature), 9);
@@ -194,9 +196,17 @@ fn sweeps_that_are_not_one_curve_are_refused() {
         )
     };
     let stiffer = sweep(|frequency| prony(frequency).map(|modulus| 1.5 * modulus), 37.0, 0.0);
+    // With one relaxation time, no shift is found at all.
+    let one_term = |frequency: f64| {
+        let terms = vec![PronyTerm { modulus_mpa: 0.01, time_secs: 1.0 }];
+        PronySeries { equilibrium_mpa: 1e-4, terms }.dynamic_moduli(0.5 * frequency)
+    };
+    let larger = |frequency: f64| one_term(frequency).map(|modulus| 1.5 * modulus);
+    let sweeps = [sweep(one_term, 20.0, 0.0), sweep(larger, 37.0, 0.0)];
+    let single = master_curve(&sweeps, &errors(&sweeps, [OWN, COMMON]), 0).unwrap_err();
     let sweeps = [Sweep { temperature_c: 20.0, ..mixed(0.0) }, mixed(-3.0)];
     let parts = master_curve(&sweeps, &errors(&sweeps, [OWN, COMMON]), 0).unwrap_err();
-    for refused in [parts, refusal(stiffer)] {
+    for refused in [parts, refusal(stiffer), single] {
         assert!(matches!(refused, SuperpositionError::NotOneCurve { .. }), "{refused:?}");
         assert!(refused.to_string().contains("20 and 37 °C are not one curve"), "{refused}");
     }
