@@ -55,8 +55,8 @@ pub enum ContactError {
 
 /// A parabola takes 0.5 % more force than its sphere here: the next term is a tenth of depth over radius.
 const DEPTH_OVER_RADIUS_MAX: f64 = 0.05;
-/// A layer, bonded and incompressible, takes 1.3 % more force than a half-space here.
-const HALF_SPACE_RADIUS_OVER_THICKNESS_MAX: f64 = 0.01;
+/// A layer, bonded and incompressible, takes 0.46 % more force than a half-space here: 1.14 times the ratio.
+const HALF_SPACE_RADIUS_OVER_THICKNESS_MAX: f64 = 0.004;
 /// Linear elasticity leaves out the squares of strains: a tenth of what it keeps here.
 const STRAIN_MAX: f64 = 0.1;
 
@@ -204,7 +204,7 @@ mod tests {
         );
         let force = |law: ContactLaw| law.contact(&punch, &thick, 0.1).unwrap().force_over_modulus;
         let base = force(ContactLaw::Layer) / force(ContactLaw::Sneddon) - 1.0;
-        assert!((0.011..0.0131).contains(&base), "{base}");
+        assert!((0.0045..0.005).contains(&base), "{base}");
     }
 
     #[test]
