@@ -6,7 +6,7 @@ use palpate_sessions::{FileSink, LogPart, LogWriter, Session, SessionFolder};
 use serde_json::Value;
 use std::path::Path;
 
-const PRESS: &str = "--property master-curve --indenter cone --half-angle 70.0±0.2 --poisson 0.49±0.01 --thickness 100±1";
+const PRESS: &str = "--property master-curve --indenter cone --half-angle 70.0±0.2 --poisson 0.49±0.01 --law sneddon --thickness 10000";
 const SWEEP: &str = "--set depth=9mm --set amplitude=0.1mm --set speed=3mm/s --set settle=10s --set pause=5s --set cycles=3 --operator Ada --specimen one --about specimen.source=simulated --time-scale max";
 /// Ten in a decade, so that the moduli of one relaxation time are a smooth curve between them.
 const FREQUENCIES: &str = "0.05Hz,0.063Hz,0.08Hz,0.1Hz,0.125Hz,0.16Hz,0.2Hz,0.25Hz,0.32Hz,0.4Hz";
