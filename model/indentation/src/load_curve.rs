@@ -154,15 +154,15 @@ mod tests {
             Indenter::RoundedCone { half_angle_degrees: exact(70.0), tip_radius_mm: exact(1.0) };
         let chamfered = Indenter::ChamferedPunch { radius_mm: exact(2.5), chamfer_mm: exact(0.5) };
         let cases = [
-            (ContactLaw::Hertz, Indenter::Sphere { radius_mm: exact(4.0) }, 100.0, 0.2),
-            (ContactLaw::Sneddon, Indenter::Sphere { radius_mm: exact(4.0) }, 200.0, 0.9),
-            (ContactLaw::Sneddon, Indenter::Cone { half_angle_degrees: exact(70.0) }, 100.0, 0.3),
+            (ContactLaw::Hertz, Indenter::Sphere { radius_mm: exact(4.0) }, 400.0, 0.2),
+            (ContactLaw::Sneddon, Indenter::Sphere { radius_mm: exact(4.0) }, 800.0, 0.9),
+            (ContactLaw::Sneddon, Indenter::Cone { half_angle_degrees: exact(70.0) }, 400.0, 0.3),
             (ContactLaw::Layer, Indenter::FlatPunch { radius_mm: exact(2.0) }, 3.0, 0.2),
             (ContactLaw::Layer, Indenter::Sphere { radius_mm: exact(4.0) }, 2.0, 0.18),
             (ContactLaw::Layer, Indenter::Cone { half_angle_degrees: exact(70.0) }, 4.0, 0.3),
-            (ContactLaw::Sneddon, rounded, 100.0, 0.3),
+            (ContactLaw::Sneddon, rounded, 400.0, 0.3),
             (ContactLaw::Layer, rounded, 4.0, 0.3),
-            (ContactLaw::Sneddon, chamfered, 400.0, 0.3),
+            (ContactLaw::Sneddon, chamfered, 800.0, 0.3),
             (ContactLaw::Layer, chamfered, 8.0, 0.3),
         ];
         for (law, indenter, thickness, depth_max) in cases {

@@ -9,7 +9,7 @@ fn known(value: f64, standard_uncertainty: f64) -> Quantity {
 
 fn specimen(poisson: f64) -> Specimen {
     Specimen {
-        thickness_mm: known(500.0, 0.0),
+        thickness_mm: known(5000.0, 0.0),
         base: Base::Bonded,
         poisson_ratio: known(poisson, 0.01),
         poisson_basis: PoissonBasis::Assumed,

@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn a_power_stays_one_and_its_slope_is_its_own() {
         let punch = Indenter::FlatPunch { radius_mm: exact(2.0) };
-        let thick = specimen(300.0);
+        let thick = specimen(600.0);
         let (law, _) =
             load_history(ContactLaw::Sneddon, &punch, &thick, &[0.0, 1.0], &[0.0, 0.1]).unwrap();
         assert_eq!(law.exponent(), 1.0);
