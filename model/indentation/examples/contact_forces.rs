@@ -5,7 +5,7 @@
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 
 use palpate_indentation::{
-    ContactLaw, DepthHistory, Indenter, PowerLaw, PronySeries, Specimen, ting_force,
+    ContactLaw, DepthHistory, Indenter, PowerLaw, RelaxationModulus, Specimen, ting_force,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -20,7 +20,7 @@ enum Case {
     Viscoelastic {
         indenter: Indenter,
         poisson_ratio: f64,
-        shear_modulus: PronySeries,
+        shear_modulus: RelaxationModulus,
         times_secs: Vec<f64>,
         depths_mm: Vec<f64>,
     },

@@ -35,7 +35,7 @@ pub use superposition::{
 };
 pub use validity::{Bounded, ContactError, ContactLaw, Validity};
 pub use viscoelastic::{
-    CreepSeries, CreepTerm, DepthHistory, HistoryError, LoadHistoryError, PowerLaw, PronySeries,
-    PronyTerm, lee_radok_force, lee_radok_force_of, load_and_slope, load_history,
+    CreepSeries, CreepTerm, DepthHistory, HistoryError, LoadHistoryError, PowerLaw, RelaxationMode,
+    RelaxationModulus, lee_radok_force, lee_radok_force_of, load_and_slope, load_history,
     repeated_contact_force, ting_force,
 };

@@ -23,7 +23,7 @@ use crate::relaxation::{
 };
 use crate::source::{RecordStretch, SourceError};
 use palpate_indentation::{
-    ContactError, ContactLaw, Indenter, PronySeries, PronyTerm, Quantity, Specimen,
+    ContactError, ContactLaw, Indenter, Quantity, RelaxationMode, RelaxationModulus, Specimen,
 };
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_rheology::cycles::{Sinusoid, SinusoidError, fit_sinusoid};
@@ -314,11 +314,11 @@ fn row(
 fn predict(report: &RelaxationReport, frequency_hz: f64) -> Option<[f64; 2]> {
     let time = 1.0 / (std::f64::consts::TAU * frequency_hz);
     let is_seen = (report.seen_from_s..=report.record_s).contains(&time);
-    let term = |term: &RelaxationTerm| PronyTerm {
+    let term = |term: &RelaxationTerm| RelaxationMode {
         modulus_mpa: term.modulus_mpa.value,
         time_secs: term.time_s.value,
     };
-    let series = PronySeries {
+    let series = RelaxationModulus {
         equilibrium_mpa: report.equilibrium_mpa.value,
         terms: report.terms.iter().map(term).collect(),
     };

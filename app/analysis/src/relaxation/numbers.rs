@@ -4,7 +4,7 @@ use super::record::JudgedFit;
 use super::{
     ComplianceAtTime, CreepReport, ModulusAtTime, RelaxationTerm, RetardationTerm, UncertainNumber,
 };
-use palpate_indentation::{CreepTerm, PronySeries, RelaxationFit};
+use palpate_indentation::{CreepTerm, RelaxationFit, RelaxationModulus};
 
 /// Instantaneous and equilibrium modulus, the terms, the modulus at the times; the instantaneous compliance, its terms, the
 /// compliance at the times.
@@ -27,7 +27,7 @@ pub(super) struct CombinedNumbers {
 const STEP: f64 = 1e-5;
 
 impl<'a> Numbers<'a> {
-    pub fn of(series: &PronySeries, times: &'a [f64]) -> Self {
+    pub fn of(series: &RelaxationModulus, times: &'a [f64]) -> Self {
         let count = series.terms.len();
         let slopes = |unknown: usize| {
             let modulus = match unknown {
@@ -102,7 +102,7 @@ impl<'a> Numbers<'a> {
 }
 
 /// The series with one of its unknowns changed: a modulus in MPa, or the logarithm of a time.
-fn moved(series: &PronySeries, unknown: usize, by: f64) -> PronySeries {
+fn moved(series: &RelaxationModulus, unknown: usize, by: f64) -> RelaxationModulus {
     let mut moved = series.clone();
     let count = moved.terms.len();
     match unknown {
@@ -113,7 +113,7 @@ fn moved(series: &PronySeries, unknown: usize, by: f64) -> PronySeries {
     moved
 }
 
-fn list(series: &PronySeries, times: &[f64]) -> Vec<f64> {
+fn list(series: &RelaxationModulus, times: &[f64]) -> Vec<f64> {
     let mut list = vec![series.modulus(0.0), series.equilibrium_mpa];
     list.extend(series.terms.iter().flat_map(|term| [term.modulus_mpa, term.time_secs]));
     list.extend(times.iter().map(|time| series.modulus(*time)));

@@ -21,7 +21,9 @@ pub use loading::{
 };
 
 use crate::document::{Indenter, Specimen};
-use crate::viscoelastic::{DepthHistory, HistoryError, PowerLaw, PronySeries, PronyTerm};
+use crate::viscoelastic::{
+    DepthHistory, HistoryError, PowerLaw, RelaxationMode, RelaxationModulus,
+};
 use search::{Fitted, Record};
 use thiserror::Error;
 
@@ -29,9 +31,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelaxationFit {
     /// Terms from the shortest relaxation time to the longest.
-    pub modulus: PronySeries,
+    pub modulus: RelaxationModulus,
     /// The standard error of each number of `modulus`, from the covariance of residuals that are independent of each other.
-    pub standard_errors: PronySeries,
+    pub standard_errors: RelaxationModulus,
     /// Standard deviation of the residuals in N.
     pub residual_newtons: f64,
     /// Force less fitted force of each sample, in N.
@@ -146,9 +148,9 @@ fn report(
         // A NaN is no answer either.
         let is_known =
             error(index) <= RELATIVE_ERROR_MAX * modulus_mpa && of_time <= RELATIVE_ERROR_MAX;
-        let errors = PronyTerm { modulus_mpa: error(index), time_secs: of_time * time_secs };
+        let errors = RelaxationMode { modulus_mpa: error(index), time_secs: of_time * time_secs };
         if is_known {
-            Ok((PronyTerm { modulus_mpa, time_secs }, errors))
+            Ok((RelaxationMode { modulus_mpa, time_secs }, errors))
         } else {
             Err(RelaxationFitError::NotIdentifiable { time_secs })
         }
@@ -156,8 +158,8 @@ fn report(
     let both: Result<Vec<_>, _> = (0..count).map(term).collect();
     let (terms, errors) = both?.into_iter().unzip();
     Ok(RelaxationFit {
-        modulus: PronySeries { equilibrium_mpa: moduli[count], terms },
-        standard_errors: PronySeries { equilibrium_mpa: error(count), terms: errors },
+        modulus: RelaxationModulus { equilibrium_mpa: moduli[count], terms },
+        standard_errors: RelaxationModulus { equilibrium_mpa: error(count), terms: errors },
         residual_newtons: variance.sqrt(),
         residuals_newtons: residuals,
         tangents,
@@ -182,7 +184,7 @@ impl RelaxationFit {
     #[must_use]
     pub fn modulus_standard_error(&self, time_secs: f64) -> f64 {
         let terms = &self.modulus.terms;
-        let age = |term: &PronyTerm| time_secs / term.time_secs;
+        let age = |term: &RelaxationMode| time_secs / term.time_secs;
         let of_moduli = terms.iter().map(|term| (-age(term)).exp());
         let of_times = terms.iter().map(|term| term.modulus_mpa * age(term) * (-age(term)).exp());
         let gradient: Vec<f64> = of_moduli.chain([1.0]).chain(of_times).collect();

@@ -2,10 +2,10 @@ use super::*;
 use crate::shape::IndenterShape;
 use crate::viscoelastic::lee_radok_force;
 
-fn body() -> PronySeries {
-    let term = |(modulus_mpa, time_secs)| PronyTerm { modulus_mpa, time_secs };
+fn body() -> RelaxationModulus {
+    let term = |(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs };
     let terms = [(0.03, 0.1), (0.02, 1.0), (0.015, 10.0)].map(term).to_vec();
-    PronySeries { equilibrium_mpa: 0.01, terms }
+    RelaxationModulus { equilibrium_mpa: 0.01, terms }
 }
 
 /// Numbers of about a normal distribution.
@@ -37,7 +37,7 @@ const CONE: IndenterShape = IndenterShape::Cone { half_angle_rad: 1.2 };
 
 impl Test {
     /// Samples every 10 ms, and at the corner.
-    fn record(self, body: &PronySeries) -> (PowerLaw, DepthHistory, Vec<f64>) {
+    fn record(self, body: &RelaxationModulus) -> (PowerLaw, DepthHistory, Vec<f64>) {
         let corner = self.ramp;
         let count = ((corner + self.hold) / 0.01) as i32;
         let mut times: Vec<f64> = (0..count).map(|k| 0.01 * f64::from(k)).collect();
@@ -53,7 +53,11 @@ impl Test {
         (law, history, forces)
     }
 
-    fn fit(self, body: &PronySeries, count: usize) -> Result<RelaxationFit, RelaxationFitError> {
+    fn fit(
+        self,
+        body: &RelaxationModulus,
+        count: usize,
+    ) -> Result<RelaxationFit, RelaxationFitError> {
         let (law, history, forces) = self.record(body);
         fit_relaxation(law, &history, &forces, count)
     }
@@ -94,7 +98,7 @@ fn record_without_noise_gives_the_body_back() {
 
 #[test]
 fn what_is_not_identifiable_is_refused_in_one_sentence() {
-    let refusal = |test: Test, body: &PronySeries, count: usize| {
+    let refusal = |test: Test, body: &RelaxationModulus, count: usize| {
         test.fit(body, count).unwrap_err().to_string()
     };
     let slow = refusal(Test { ramp: 3.0, ..TEST }, &body(), 3);
@@ -107,7 +111,7 @@ fn what_is_not_identifiable_is_refused_in_one_sentence() {
     let short = refusal(Test { hold: 3.0, ..TEST }, &body(), 3);
     assert!(short.contains("is not identifiable in this record"), "{short}");
     // A term that is not there.
-    let two = PronySeries { terms: body().terms[1..].to_vec(), ..body() };
+    let two = RelaxationModulus { terms: body().terms[1..].to_vec(), ..body() };
     for seed in 1..4 {
         let refused = Test { seed, ..TEST }.fit(&two, 3);
         assert!(refused.is_err(), "{seed}: {refused:?}");

@@ -9,7 +9,7 @@
 //! `t1` is when the contact was last as wide on its way out as it is at `t` on its way back.
 
 use super::history::{DepthHistory, HistoryError, Knot, Memory, Mode};
-use super::prony::{PronySeries, PronyTerm};
+use super::relaxation_modulus::{RelaxationMode, RelaxationModulus};
 use crate::invalid_value::{InvalidValue, check_poisson, positive};
 use crate::shape::IndenterShape;
 
@@ -68,7 +68,7 @@ impl PowerLaw {
 /// that does not shrink. Where it does the force is too low, and negative in the end.
 pub fn lee_radok_force(
     law: PowerLaw,
-    modulus: &PronySeries,
+    modulus: &RelaxationModulus,
     history: &DepthHistory,
 ) -> Result<Vec<f64>, HistoryError> {
     let modes = modulus.modes()?;
@@ -110,7 +110,7 @@ pub fn lee_radok_force_of(
 /// and is what `repeated_contact_force` is for.
 pub fn ting_force(
     law: PowerLaw,
-    modulus: &PronySeries,
+    modulus: &RelaxationModulus,
     history: &DepthHistory,
 ) -> Result<Vec<f64>, HistoryError> {
     let mut forces = lee_radok_force(law, modulus, history)?;
@@ -144,7 +144,7 @@ struct Shrinking<'a> {
 
 /// One mode's memories of the depth and of its power.
 struct ShrinkingMode {
-    term: PronyTerm,
+    term: RelaxationMode,
     depth: Mode,
     power: Mode,
     depths: Vec<Memory>,
@@ -159,7 +159,12 @@ struct Start {
 }
 
 impl<'a> Shrinking<'a> {
-    fn new(law: PowerLaw, terms: Vec<PronyTerm>, knots: &'a [Knot], last_grown: usize) -> Self {
+    fn new(
+        law: PowerLaw,
+        terms: Vec<RelaxationMode>,
+        knots: &'a [Knot],
+        last_grown: usize,
+    ) -> Self {
         let modes: Vec<ShrinkingMode> = terms
             .into_iter()
             .map(|term| {

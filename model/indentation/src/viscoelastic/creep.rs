@@ -1,6 +1,6 @@
 //! What a relaxation modulus says of creep and of sines, exactly.
 
-use super::prony::{PronySeries, PronyTerm};
+use super::relaxation_modulus::{RelaxationMode, RelaxationModulus};
 use crate::invalid_value::{InvalidValue, check, positive};
 use std::f64::consts::TAU;
 
@@ -30,11 +30,11 @@ impl CreepSeries {
     }
 }
 
-impl PronySeries {
+impl RelaxationModulus {
     /// Storage and loss modulus in MPa at a frequency in Hz.
     #[must_use]
     pub fn dynamic_moduli(&self, frequency_hz: f64) -> [f64; 2] {
-        let of_term = |[storage, loss]: [f64; 2], term: &PronyTerm| {
+        let of_term = |[storage, loss]: [f64; 2], term: &RelaxationMode| {
             let angle = TAU * frequency_hz * term.time_secs;
             let share = angle / (1.0 + angle * angle);
             [storage + term.modulus_mpa * angle * share, loss + term.modulus_mpa * share]
@@ -51,7 +51,7 @@ impl PronySeries {
         self.modes()?;
         let wanted = "a modulus above 0 MPa, as of a solid";
         positive("the equilibrium modulus", self.equilibrium_mpa, wanted)?;
-        let mut terms: Vec<PronyTerm> =
+        let mut terms: Vec<RelaxationMode> =
             self.terms.iter().copied().filter(|term| term.modulus_mpa > 0.0).collect();
         terms.sort_by(|a, b| a.time_secs.total_cmp(&b.time_secs));
         for pair in terms.windows(2) {
@@ -63,7 +63,7 @@ impl PronySeries {
         let term = |index: usize| {
             let longer = terms.get(index + 1).map_or(0.0, |next| 1.0 / next.time_secs);
             let rate = self.retardation_rate([longer, 1.0 / terms[index].time_secs]);
-            let slope = |one: &PronyTerm| {
+            let slope = |one: &RelaxationMode| {
                 let own = 1.0 / one.time_secs;
                 one.modulus_mpa * own / (own - rate).powi(2)
             };
@@ -83,7 +83,8 @@ impl PronySeries {
             if rate <= low || rate >= high {
                 return rate;
             }
-            let part = |term: &PronyTerm| term.modulus_mpa * rate / (1.0 / term.time_secs - rate);
+            let part =
+                |term: &RelaxationMode| term.modulus_mpa * rate / (1.0 / term.time_secs - rate);
             let is_above = self.equilibrium_mpa > self.terms.iter().map(part).sum::<f64>();
             if is_above { low = rate } else { high = rate }
         }
@@ -94,9 +95,9 @@ impl PronySeries {
 mod tests {
     use super::*;
 
-    fn series(equilibrium_mpa: f64, terms: &[(f64, f64)]) -> PronySeries {
-        let term = |&(modulus_mpa, time_secs)| PronyTerm { modulus_mpa, time_secs };
-        PronySeries { equilibrium_mpa, terms: terms.iter().map(term).collect() }
+    fn series(equilibrium_mpa: f64, terms: &[(f64, f64)]) -> RelaxationModulus {
+        let term = |&(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs };
+        RelaxationModulus { equilibrium_mpa, terms: terms.iter().map(term).collect() }
     }
 
     /// The standard linear solid: `1 / J` is `G` at both ends, and the retardation time is the relaxation time times `G(0)` over
@@ -146,7 +147,7 @@ mod tests {
 
     #[test]
     fn what_flows_has_no_such_series() {
-        let refused = |body: PronySeries| body.creep().unwrap_err().to_string();
+        let refused = |body: RelaxationModulus| body.creep().unwrap_err().to_string();
         assert!(refused(series(0.0, &[(0.03, 1.0)])).contains("the equilibrium modulus is 0"));
         let twice = refused(series(0.01, &[(0.03, 1.0), (0.02, 1.0)]));
         assert!(twice.contains("a relaxation time is 1"), "{twice}");

@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use crate::document::{PoissonBasis, Quantity};
     use crate::layer::Base;
-    use crate::viscoelastic::{PronySeries, PronyTerm, lee_radok_force};
+    use crate::viscoelastic::{RelaxationMode, RelaxationModulus, lee_radok_force};
 
     fn exact(value: f64) -> Quantity {
         Quantity { value, standard_uncertainty: 0.0 }
@@ -78,9 +78,9 @@ mod tests {
     #[test]
     fn a_law_that_is_no_power_relaxes_by_its_own_force() {
         let (tip, modulus, time) = (4.0f64, 0.02, 0.5);
-        let body = PronySeries {
+        let body = RelaxationModulus {
             equilibrium_mpa: 0.0,
-            terms: vec![PronyTerm { modulus_mpa: modulus, time_secs: time }],
+            terms: vec![RelaxationMode { modulus_mpa: modulus, time_secs: time }],
         };
         let steps = 20_000;
         let log = |radius: f64| ((tip + radius) / (tip - radius)).ln();

@@ -4,7 +4,7 @@ mod contact;
 mod creep;
 mod history;
 mod load_history;
-mod prony;
+mod relaxation_modulus;
 mod repeated;
 
 #[cfg(test)]
@@ -17,5 +17,5 @@ pub use creep::{CreepSeries, CreepTerm};
 pub use history::{DepthHistory, HistoryError};
 pub(crate) use history::{Knot, Memory, Mode};
 pub use load_history::{LoadHistoryError, load_and_slope, load_history};
-pub use prony::{PronySeries, PronyTerm};
+pub use relaxation_modulus::{RelaxationMode, RelaxationModulus};
 pub use repeated::repeated_contact_force;

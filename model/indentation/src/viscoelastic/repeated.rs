@@ -8,7 +8,7 @@
 
 use super::contact::PowerLaw;
 use super::history::{DepthHistory, HistoryError};
-use super::prony::PronySeries;
+use super::relaxation_modulus::RelaxationModulus;
 
 /// Across the widest contact; a flat punch needs one. What the sum misses falls with the square.
 const SPRINGS: usize = 500;
@@ -18,13 +18,13 @@ const SPRINGS: usize = 500;
 /// samples in each loading and unloading.
 pub fn repeated_contact_force(
     law: PowerLaw,
-    modulus: &PronySeries,
+    modulus: &RelaxationModulus,
     history: &DepthHistory,
 ) -> Result<Vec<f64>, HistoryError> {
     let (modes, knots) = (modulus.modes()?, history.knots());
     // Of each interval and mode, what is left of the force and how stiff the mode is against a change over the interval.
     let step = |secs: f64| -> Vec<(f64, f64)> {
-        let of_mode = |mode: &super::PronyTerm| {
+        let of_mode = |mode: &super::RelaxationMode| {
             let times = (secs / mode.time_secs).min(1e12);
             let mean = if times > 0.0 { -(-times).exp_m1() / times } else { 1.0 };
             ((-times).exp(), mode.modulus_mpa * mean)

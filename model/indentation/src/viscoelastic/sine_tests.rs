@@ -11,8 +11,8 @@ const CONE: IndenterShape = IndenterShape::Cone { half_angle_rad: 1.2 };
 /// the depth, times the exponent less one: on the way back the contact shrinks, and what it leaves no longer pulls.
 #[test]
 fn small_sine_about_a_depth_feels_the_slope_of_the_law() {
-    let terms = vec![PronyTerm { modulus_mpa: 0.02, time_secs: 0.5 }];
-    let body = PronySeries { equilibrium_mpa: 0.01, terms };
+    let terms = vec![RelaxationMode { modulus_mpa: 0.02, time_secs: 0.5 }];
+    let body = RelaxationModulus { equilibrium_mpa: 0.01, terms };
     for (shape, share) in [(CONE, 0.05), (CONE, 0.02), (SPHERE, 0.05), (PUNCH, 0.05)] {
         let law = PowerLaw::new(shape, 0.5).unwrap();
         let low_by = 0.75 * (law.exponent() - 1.0) * share;
@@ -34,7 +34,7 @@ fn small_sine_about_a_depth_feels_the_slope_of_the_law() {
 /// Storage and loss in N/mm of the last of four cycles about a depth, long after the ramp to it; the amplitude is a share of it.
 fn stiffness_of_sine(
     shape: IndenterShape,
-    body: &PronySeries,
+    body: &RelaxationModulus,
     (depth, share): (f64, f64),
     frequency: f64,
 ) -> [f64; 2] {

@@ -11,12 +11,12 @@ fn law(shape: IndenterShape) -> PowerLaw {
     PowerLaw::new(shape, 0.5).unwrap()
 }
 
-fn series(equilibrium_mpa: f64, terms: &[(f64, f64)]) -> PronySeries {
-    let term = |&(modulus_mpa, time_secs)| PronyTerm { modulus_mpa, time_secs };
-    PronySeries { equilibrium_mpa, terms: terms.iter().map(term).collect() }
+fn series(equilibrium_mpa: f64, terms: &[(f64, f64)]) -> RelaxationModulus {
+    let term = |&(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs };
+    RelaxationModulus { equilibrium_mpa, terms: terms.iter().map(term).collect() }
 }
 
-fn three_terms() -> PronySeries {
+fn three_terms() -> RelaxationModulus {
     series(0.01, &[(0.03, 0.1), (0.02, 1.0), (0.015, 8.0)])
 }
 
@@ -34,9 +34,9 @@ fn history(knots: &[(f64, f64)], steps: usize) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn forces_of(
-    run: impl Fn(PowerLaw, &PronySeries, &DepthHistory) -> Result<Vec<f64>, HistoryError>,
+    run: impl Fn(PowerLaw, &RelaxationModulus, &DepthHistory) -> Result<Vec<f64>, HistoryError>,
     shape: IndenterShape,
-    modulus: &PronySeries,
+    modulus: &RelaxationModulus,
     (times, depths): &(Vec<f64>, Vec<f64>),
 ) -> Vec<f64> {
     run(law(shape), modulus, &DepthHistory::new(times, depths).unwrap()).unwrap()
