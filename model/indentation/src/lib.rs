@@ -22,8 +22,8 @@ mod viscoelastic;
 pub use document::{Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen};
 pub use fit::{
     LoadingFit, LoadingFitError, LoadingKnowledge, LoadingSample, ModulusTerm, RELATIVE_ERROR_MAX,
-    RelaxationFit, RelaxationFitError, TERMS_MAX, UnloadingFit, UnloadingFitError, fit_loading,
-    fit_relaxation, fit_unloading, vary_uncertain_numbers,
+    RelaxationFamily, RelaxationFit, RelaxationFitError, TERMS_MAX, UnloadingFit,
+    UnloadingFitError, fit_loading, fit_relaxation, fit_unloading, vary_uncertain_numbers,
 };
 pub use hayes::HayesFactor;
 pub use invalid_value::InvalidValue;

@@ -40,15 +40,19 @@ impl Triangle {
         Self { columns: triangle }
     }
 
-    /// The columns of these numbers and the right-hand side, as short as the triangle is wide.
-    pub fn selected(&self, numbers: &[usize]) -> Self {
+    /// Sums of columns, by their numbers and shares, and the right-hand side, as short as the triangle is wide.
+    pub fn combined(&self, sums: &[Vec<(usize, f64)>]) -> Self {
         let last = self.columns.len() - 1;
-        let column = |number: &usize| {
-            let mut column = self.columns[*number].clone();
-            column.resize(last + 1, 0.0);
-            column
+        let column = |parts: &Vec<(usize, f64)>| {
+            let mut sum = vec![0.0; last + 1];
+            for (number, share) in parts {
+                for (value, own) in sum.iter_mut().zip(&self.columns[*number]) {
+                    *value += share * own;
+                }
+            }
+            sum
         };
-        Self::new(numbers.iter().chain([&last]).map(column).collect())
+        Self::new(sums.iter().chain([&vec![(last, 1.0)]]).map(column).collect())
     }
 
     /// The coefficients that leave the least, or `None` where a column is a sum of others.
@@ -107,7 +111,7 @@ mod tests {
     fn line_by_hand() {
         let columns = vec![vec![1.0; 4], vec![0.0, 1.0, 2.0, 3.0], vec![1.0, 3.0, 4.0, 4.0]];
         let triangle = Triangle::new(columns);
-        for triangle in [triangle.selected(&[0, 1]), triangle] {
+        for triangle in [triangle.combined(&[vec![(0, 1.0)], vec![(1, 1.0)]]), triangle] {
             let found = triangle.solve().unwrap();
             assert!((found[0] - 1.5).abs() < 1e-14 && (found[1] - 1.0).abs() < 1e-14, "{found:?}");
             assert!((triangle.left_over() - 1.0).abs() < 1e-14);

@@ -5,7 +5,7 @@ use crate::viscoelastic::lee_radok_force;
 fn body() -> RelaxationModulus {
     let term = |(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs };
     let terms = [(0.03, 0.1), (0.02, 1.0), (0.015, 10.0)].map(term).to_vec();
-    RelaxationModulus { equilibrium_mpa: 0.01, terms }
+    RelaxationModulus { equilibrium_mpa: 0.01, terms, exponent: 1.0 }
 }
 
 /// Numbers of about a normal distribution.
@@ -22,22 +22,24 @@ fn normals(seed: u64) -> impl FnMut() -> f64 {
 
 /// A test: ramp time and hold time in s, noise over the largest force.
 #[derive(Clone, Copy)]
-struct Test {
-    shape: IndenterShape,
-    ramp: f64,
-    hold: f64,
-    noise: f64,
-    seed: u64,
+pub(super) struct Test {
+    pub shape: IndenterShape,
+    pub ramp: f64,
+    pub hold: f64,
+    pub noise: f64,
+    pub seed: u64,
 }
 
-const TEST: Test = Test { shape: SPHERE, ramp: 0.1, hold: 60.0, noise: 1e-3, seed: 1 };
-const SPHERE: IndenterShape = IndenterShape::Sphere { radius_mm: 5.0 };
-const PUNCH: IndenterShape = IndenterShape::FlatPunch { radius_mm: 2.0 };
-const CONE: IndenterShape = IndenterShape::Cone { half_angle_rad: 1.2 };
+pub(super) const TEST: Test = Test { shape: SPHERE, ramp: 0.1, hold: 60.0, noise: 1e-3, seed: 1 };
+const ONE_TERM: RelaxationFamily = RelaxationFamily::Prony { terms: 1 };
+const THREE_TERMS: RelaxationFamily = RelaxationFamily::Prony { terms: 3 };
+pub(super) const SPHERE: IndenterShape = IndenterShape::Sphere { radius_mm: 5.0 };
+pub(super) const PUNCH: IndenterShape = IndenterShape::FlatPunch { radius_mm: 2.0 };
+pub(super) const CONE: IndenterShape = IndenterShape::Cone { half_angle_rad: 1.2 };
 
 impl Test {
     /// Samples every 10 ms, and at the corner.
-    fn record(self, body: &RelaxationModulus) -> (PowerLaw, DepthHistory, Vec<f64>) {
+    pub fn record(self, body: &RelaxationModulus) -> (PowerLaw, DepthHistory, Vec<f64>) {
         let corner = self.ramp;
         let count = ((corner + self.hold) / 0.01) as i32;
         let mut times: Vec<f64> = (0..count).map(|k| 0.01 * f64::from(k)).collect();
@@ -56,10 +58,18 @@ impl Test {
     fn fit(
         self,
         body: &RelaxationModulus,
-        count: usize,
+        terms: usize,
+    ) -> Result<RelaxationFit, RelaxationFitError> {
+        self.fit_family(body, RelaxationFamily::Prony { terms })
+    }
+
+    pub fn fit_family(
+        self,
+        body: &RelaxationModulus,
+        family: RelaxationFamily,
     ) -> Result<RelaxationFit, RelaxationFitError> {
         let (law, history, forces) = self.record(body);
-        fit_relaxation(law, &history, &forces, count)
+        fit_relaxation(law, &history, &forces, family)
     }
 }
 
@@ -127,11 +137,17 @@ fn standard_errors_are_the_spread_of_the_fits() {
     for seed in 1..=draws {
         let fit = Test { seed, hold: 20.0, noise: 2e-3, ..TEST }.fit(&body(), 3).unwrap();
         let (found, exact, error) = (&fit.modulus, body(), &fit.standard_errors);
+        // Of the moduli, the equilibrium and the logarithms of the times.
+        let age = |term: &RelaxationMode| 0.3 / term.time_secs;
+        let of_moduli = found.terms.iter().map(|term| (-age(term)).exp());
+        let of_times =
+            found.terms.iter().map(|term| term.modulus_mpa * age(term) * (-age(term)).exp());
+        let gradient: Vec<f64> = of_moduli.chain([1.0]).chain(of_times).collect();
         for (sum, (found, exact, error)) in squares.iter_mut().zip([
             (found.terms[0].time_secs, exact.terms[0].time_secs, error.terms[0].time_secs),
             (found.terms[2].modulus_mpa, exact.terms[2].modulus_mpa, error.terms[2].modulus_mpa),
             (found.equilibrium_mpa, exact.equilibrium_mpa, error.equilibrium_mpa),
-            (found.modulus(0.3), exact.modulus(0.3), fit.modulus_standard_error(0.3)),
+            (found.modulus(0.3), exact.modulus(0.3), fit.standard_error_along(&gradient)),
         ]) {
             *sum += ((found - exact) / error).powi(2) / draws as f64;
         }
@@ -144,8 +160,9 @@ fn standard_errors_are_the_spread_of_the_fits() {
 #[test]
 fn bad_records_are_refused_in_words() {
     let (law, history, forces) = Test { hold: 1.0, ..TEST }.record(&body());
-    let message = |forces: &[f64], count: usize| {
-        fit_relaxation(law, &history, forces, count).unwrap_err().to_string()
+    let message = |forces: &[f64], terms: usize| {
+        let family = RelaxationFamily::Prony { terms };
+        fit_relaxation(law, &history, forces, family).unwrap_err().to_string()
     };
     assert_eq!(message(&forces, 0), "the number of terms is 0; give 1 to 5");
     assert_eq!(message(&forces, 6), "the number of terms is 6; give 1 to 5");
@@ -155,9 +172,9 @@ fn bad_records_are_refused_in_words() {
     assert!(message(&holes, 1).starts_with("the force of sample 7 is NaN"));
     assert!(message(&vec![0.0; forces.len()], 1).contains("take fewer terms"));
     let still = DepthHistory::new(&[0.0, 1.0, 2.0, 3.0], &[0.0; 4]).unwrap();
-    assert!(fit_relaxation(law, &still, &[0.1; 4], 1).is_err());
+    assert!(fit_relaxation(law, &still, &[0.1; 4], ONE_TERM).is_err());
     let once = DepthHistory::new(&[1.0; 9], &[0.1; 9]).unwrap();
-    let few = fit_relaxation(law, &once, &[0.1; 9], 1).unwrap_err().to_string();
+    let few = fit_relaxation(law, &once, &[0.1; 9], ONE_TERM).unwrap_err().to_string();
     assert!(few.starts_with("the record has 1 samples at different times"), "{few}");
 }
 
@@ -166,12 +183,12 @@ fn bad_records_are_refused_in_words() {
 fn small_errors_of_force_move_the_fit_by_as_much_as_a_fit_of_them() {
     let test = Test { noise: 1e-3, ramp: 0.3, hold: 20.0, ..TEST };
     let (law, history, forces) = test.record(&body());
-    let fit = fit_relaxation(law, &history, &forces, 3).unwrap();
+    let fit = fit_relaxation(law, &history, &forces, THREE_TERMS).unwrap();
     let largest = forces.iter().copied().fold(0.0, f64::max);
     let error = |force: &f64| 2e-3 * force * (force / largest - 0.3);
     let errors: Vec<f64> = forces.iter().map(error).collect();
     let moved: Vec<f64> = forces.iter().zip(&errors).map(|(force, error)| force + error).collect();
-    let again = fit_relaxation(law, &history, &moved, 3).unwrap();
+    let again = fit_relaxation(law, &history, &moved, THREE_TERMS).unwrap();
     let shifts = fit.shift_by(&errors);
     for number in 0..3 {
         let (before, after) = (fit.modulus.terms[number], again.modulus.terms[number]);

@@ -71,7 +71,7 @@ pub fn lee_radok_force(
     modulus: &RelaxationModulus,
     history: &DepthHistory,
 ) -> Result<Vec<f64>, HistoryError> {
-    let modes = modulus.modes()?;
+    let modes = modulus.modes(history.knots())?;
     let mut forces = vec![0.0; history.knots().len() - 1];
     for mode in &modes {
         let memories = Mode::new(mode.time_secs, law.exponent).memories(history.knots());
@@ -122,7 +122,7 @@ pub fn ting_force(
         knots.windows(2).position(|pair| pair[1].depth < pair[0].depth).unwrap_or(count)
     };
     if last_grown < count {
-        let mut shrinking = Shrinking::new(law, modulus.modes()?, knots, last_grown);
+        let mut shrinking = Shrinking::new(law, modulus.modes(knots)?, knots, last_grown);
         if is_punch {
             shrinking.start = shrinking.start_in(0, 0.0);
         }

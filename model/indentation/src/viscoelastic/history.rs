@@ -76,10 +76,11 @@ pub(crate) struct Mode {
     rule: Vec<(f64, f64)>,
 }
 
-/// An interval is cut where it is longer than this many relaxation times, and `exp(-40)` is forgotten.
-const PIECES_MAX: f64 = 40.0;
-/// Nodes of a piece, which is no longer than a relaxation time: exact to rounding.
+/// Nodes of a piece.
 const NODES: usize = 8;
+/// Ages in relaxation times at which an interval is cut into pieces that the nodes integrate to rounding: the more is forgotten
+/// there the longer they are. `exp(-40)` is nothing.
+const PIECE_ENDS: [f64; 8] = [2.0, 4.5, 7.5, 11.0, 15.5, 21.5, 30.0, 40.0];
 
 impl Mode {
     pub fn new(time_secs: f64, exponent: f64) -> Self {
@@ -113,23 +114,21 @@ impl Mode {
 
     /// What an interval of so many relaxation times adds.
     fn fresh(&self, times: f64, first: f64, last: f64) -> Memory {
-        let (end, pieces) = match times > PIECES_MAX {
-            true => (PIECES_MAX / times, PIECES_MAX),
-            false => (1.0, times.ceil().max(1.0)),
-        };
+        let depth = |before_end: f64| last - before_end * (last - first);
         let mut sum = Memory::default();
-        let edge = |piece: f64| {
-            let before_end = end * piece / pieces;
-            (before_end, last - before_end * (last - first))
-        };
-        for piece in 0..pieces as usize {
-            let ((late, high), (early, low)) = (edge(piece as f64), edge(piece as f64 + 1.0));
-            for (passed, part) in self.parts(high, low) {
+        let mut late = 0.0;
+        for end in PIECE_ENDS {
+            let early = (end / times).min(1.0);
+            for (passed, part) in self.parts(depth(late), depth(early)) {
                 let age = times * (late + passed * (early - late));
                 let part = part * (-age).exp();
                 sum.value += part;
                 sum.slope += age * part;
             }
+            if early == 1.0 {
+                break;
+            }
+            late = early;
         }
         sum
     }

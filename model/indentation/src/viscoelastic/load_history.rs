@@ -81,6 +81,7 @@ mod tests {
         let body = RelaxationModulus {
             equilibrium_mpa: 0.0,
             terms: vec![RelaxationMode { modulus_mpa: modulus, time_secs: time }],
+            exponent: 1.0,
         };
         let steps = 20_000;
         let log = |radius: f64| ((tip + radius) / (tip - radius)).ln();

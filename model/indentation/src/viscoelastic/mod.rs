@@ -8,6 +8,8 @@ mod relaxation_modulus;
 mod repeated;
 
 #[cfg(test)]
+mod fractional_tests;
+#[cfg(test)]
 mod sine_tests;
 #[cfg(test)]
 mod tests;
@@ -17,5 +19,6 @@ pub use creep::{CreepSeries, CreepTerm};
 pub use history::{DepthHistory, HistoryError};
 pub(crate) use history::{Knot, Memory, Mode};
 pub use load_history::{LoadHistoryError, load_and_slope, load_history};
+pub(crate) use relaxation_modulus::{EXPONENT_MIN, fractional_rates};
 pub use relaxation_modulus::{RelaxationMode, RelaxationModulus};
 pub use repeated::repeated_contact_force;

@@ -21,7 +21,8 @@ pub fn repeated_contact_force(
     modulus: &RelaxationModulus,
     history: &DepthHistory,
 ) -> Result<Vec<f64>, HistoryError> {
-    let (modes, knots) = (modulus.modes()?, history.knots());
+    let knots = history.knots();
+    let modes = modulus.modes(knots)?;
     // Of each interval and mode, what is left of the force and how stiff the mode is against a change over the interval.
     let step = |secs: f64| -> Vec<(f64, f64)> {
         let of_mode = |mode: &super::RelaxationMode| {

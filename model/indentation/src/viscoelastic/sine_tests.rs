@@ -12,7 +12,7 @@ const CONE: IndenterShape = IndenterShape::Cone { half_angle_rad: 1.2 };
 #[test]
 fn small_sine_about_a_depth_feels_the_slope_of_the_law() {
     let terms = vec![RelaxationMode { modulus_mpa: 0.02, time_secs: 0.5 }];
-    let body = RelaxationModulus { equilibrium_mpa: 0.01, terms };
+    let body = RelaxationModulus { equilibrium_mpa: 0.01, terms, exponent: 1.0 };
     for (shape, share) in [(CONE, 0.05), (CONE, 0.02), (SPHERE, 0.05), (PUNCH, 0.05)] {
         let law = PowerLaw::new(shape, 0.5).unwrap();
         let low_by = 0.75 * (law.exponent() - 1.0) * share;

@@ -13,7 +13,7 @@ fn law(shape: IndenterShape) -> PowerLaw {
 
 fn series(equilibrium_mpa: f64, terms: &[(f64, f64)]) -> RelaxationModulus {
     let term = |&(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs };
-    RelaxationModulus { equilibrium_mpa, terms: terms.iter().map(term).collect() }
+    RelaxationModulus { equilibrium_mpa, terms: terms.iter().map(term).collect(), exponent: 1.0 }
 }
 
 fn three_terms() -> RelaxationModulus {
