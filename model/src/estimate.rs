@@ -111,6 +111,16 @@ pub fn student_t975(degrees_of_freedom: f64) -> f64 {
     }
 }
 
+/// Standard uncertainties in half of a 95 % interval of a number of this variance: Student's t for as many degrees of freedom as
+/// Welch's and Satterthwaite's formula gives where one standard uncertainty in it has its own and all others have infinitely many
+/// (JCGM 100:2008, G.4.1).
+#[must_use]
+pub fn coverage_factor(uncertainty: f64, freedom: f64, variance: f64) -> f64 {
+    // Where there is no variance the ratio is no number, and there is no share.
+    let share = (uncertainty * uncertainty / variance).max(0.0);
+    student_t975(freedom / (share * share))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -142,7 +142,7 @@ pub enum MaterialError {
     Source(#[from] SourceError),
     #[error(transparent)]
     Fit(#[from] LoadingFitError),
-    #[error("{reason}; for this indenter and specimen the law holds down to {depth_max_mm:.4} mm")]
+    #[error("{reason}; for this indenter and specimen the law holds down to {depth_max_mm} mm")]
     TooDeep { reason: LoadingFitError, depth_max_mm: f64 },
     #[error(
         "the thickness of the specimen is not known; state it, or find the base in the session with the step find-base"
@@ -158,8 +158,6 @@ const LACK_OF_FIT_DEVIATIONS: f64 = 5.0;
 const LACK_OF_FIT_SHARE: f64 = 0.2;
 /// The loading ends where this share of its greatest depth is reached: a slider at rest trembles by a pulse.
 pub(crate) const END_SHARE: f64 = 0.998;
-/// Standard uncertainties in half of a 95 % interval of a normal number (JCGM 100:2008, table G.1).
-pub(crate) const COVERAGE: f64 = 1.96;
 
 /// The modulus of the loading of a session or a table.
 pub fn material(request: &MaterialRequest) -> Result<MaterialReport, MaterialError> {
@@ -401,12 +399,20 @@ fn too_deep(
         let middle = 0.5 * (low + high);
         if is_valid(middle) { low = middle } else { high = middle }
     }
-    // In four decimals, so that the depth given is within.
-    let depth_max_mm = ((low + contact_shift_mm) * 1e4).floor() * 1e-4;
-    match low > 0.0 && depth_max_mm > contact_shift_mm.max(0.0) {
-        true => MaterialError::TooDeep { reason, depth_max_mm },
-        false => reason.into(),
+    let deepest = Some(low + contact_shift_mm).filter(|depth| low > 0.0 && *depth > 0.0);
+    match deepest.map(in_four_digits) {
+        Some(depth_max_mm) if depth_max_mm > contact_shift_mm => {
+            MaterialError::TooDeep { reason, depth_max_mm }
+        }
+        _ => reason.into(),
     }
+}
+
+/// The next depth in mm that is no deeper and has four digits: presses reach from centimetres to nanometres. Above 0.
+fn in_four_digits(depth_mm: f64) -> f64 {
+    let decimals = 3 - depth_mm.log10().floor() as i32;
+    // Division by a power of ten leaves the number that is printed.
+    (depth_mm * 10f64.powi(decimals)).floor() / 10f64.powi(decimals)
 }
 
 /// Residuals over the noise, where they are larger than by chance.

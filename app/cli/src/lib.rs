@@ -348,7 +348,7 @@ fn source_failure(err: SourceError) -> Failure {
     let with = |way_out: &str| Failure::Usage(format!("{err}; {way_out}"));
     match err {
         SourceError::Rejected { .. } => with(
-            "add --include-rejected to 'palpate fit' or 'palpate select', or change the verdict with 'palpate verdict'",
+            "add --include-rejected to 'palpate fit', 'palpate select' or 'palpate material', or change the verdict with 'palpate verdict'",
         ),
         SourceError::Imported { .. } => with("'palpate info' shows the content of the session"),
         // The error of tables has no variant for it.

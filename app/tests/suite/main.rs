@@ -12,6 +12,7 @@ mod doctor;
 mod emulate;
 mod extremes;
 mod fit;
+mod fractional_material;
 mod haptics;
 mod import;
 mod lake;

@@ -10,7 +10,7 @@ const RADIUS_MM: f64 = 3.0;
 const POISSON: f64 = 0.45;
 const EQUILIBRIUM_MPA: f64 = 0.01;
 const TERMS: [(f64, f64); 3] = [(0.03, 0.1), (0.02, 1.0), (0.015, 10.0)];
-const PUNCH: &str =
+pub(super) const PUNCH: &str =
     "--indenter flat-punch --radius 3.00 --poisson 0.45 --law sneddon --thickness 800";
 
 fn modulus(t: f64) -> f64 {
@@ -23,9 +23,14 @@ fn noise(index: i32) -> f64 {
     6f64.sqrt() * (sawtooth(0.754_877_67) + sawtooth(0.569_840_29))
 }
 
-/// A punch pressed at constant speed to 0.2 mm and held: `F = 4 R / (1 - nu) (G d)`, where each term of the modulus has the ramp's
-/// response `v tau (exp(-(t - s) / tau) - exp(-t / tau))`, with `s` the time up to which it moves.
-fn press_table(at: &Path, name: &str, ramp: f64, hold: f64, rms: f64) {
+/// A punch pressed at constant speed to 0.2 mm and held: `F = 4 R / (1 - nu) v` times what has relaxed, the integral of the modulus
+/// from `t - s` to `t`, with `s` the time up to which it moves. Of the ramp and the hold in s, and of the noise in N.
+pub(super) fn press_table(
+    at: &Path,
+    name: &str,
+    [ramp, hold, rms]: [f64; 3],
+    relaxed: impl Fn(f64, f64) -> f64,
+) {
     let speed = 0.2 / ramp;
     let mut times: Vec<f64> = (0..(100.0 * hold) as i32).map(|k| 0.01 * f64::from(k)).collect();
     times.extend((1..=20).map(|k| 0.05 * f64::from(k) * ramp));
@@ -34,17 +39,20 @@ fn press_table(at: &Path, name: &str, ramp: f64, hold: f64, rms: f64) {
     let mut text = String::from("t_s,depth_mm,force_N\n");
     for (index, t) in times.into_iter().enumerate() {
         let moved = t.min(ramp);
-        let of_term = |(g, tau): &(f64, f64)| {
-            g * speed * tau * ((-(t - moved) / tau).exp() - (-t / tau).exp())
-        };
-        let relaxed = EQUILIBRIUM_MPA * speed * moved + TERMS.iter().map(of_term).sum::<f64>();
-        let force = 4.0 * RADIUS_MM / (1.0 - POISSON) * relaxed + rms * noise(index as i32);
+        let force = 4.0 * RADIUS_MM / (1.0 - POISSON) * speed * relaxed(t, moved);
+        let force = force + rms * noise(index as i32);
         let _ = writeln!(text, "{t},{},{force}", speed * moved);
     }
     std::fs::write(at.join(name), text).unwrap();
 }
 
-fn number(object: &Value, path: &str) -> f64 {
+/// What has relaxed of the three terms: each `tau (exp(-(t - s) / tau) - exp(-t / tau))`.
+fn relaxed(t: f64, moved: f64) -> f64 {
+    let of_term = |(g, tau): &(f64, f64)| g * tau * ((-(t - moved) / tau).exp() - (-t / tau).exp());
+    EQUILIBRIUM_MPA * moved + TERMS.iter().map(of_term).sum::<f64>()
+}
+
+pub(super) fn number(object: &Value, path: &str) -> f64 {
     object.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {object}"))
 }
 
@@ -53,7 +61,7 @@ fn three_terms_come_back_from_ramps_short_and_long() {
     let at = tempfile::tempdir().unwrap();
     let mut worst: f64 = 0.0;
     for ramp_over_time in [0.01, 0.1, 1.0, 3.0] {
-        press_table(at.path(), "press.csv", 0.1 * ramp_over_time, 60.0, 2e-4);
+        press_table(at.path(), "press.csv", [0.1 * ramp_over_time, 60.0, 2e-4], relaxed);
         let line = format!("material press.csv --property relaxation {PUNCH} --json");
         let found = answer(&typed(at.path(), &line));
         let terms = found["terms"].as_array().unwrap();
@@ -85,7 +93,7 @@ fn three_terms_come_back_from_ramps_short_and_long() {
 #[test]
 fn creep_compliance_belongs_to_the_modulus() {
     let at = tempfile::tempdir().unwrap();
-    press_table(at.path(), "press.csv", 0.1, 60.0, 2e-4);
+    press_table(at.path(), "press.csv", [0.1, 60.0, 2e-4], relaxed);
     let line = format!("material press.csv --property relaxation {PUNCH} --terms 3 --json");
     let found = answer(&typed(at.path(), &line));
     let creep = &found["creep"];
@@ -112,7 +120,7 @@ fn creep_compliance_belongs_to_the_modulus() {
 #[test]
 fn budget_of_a_relaxation_modulus_is_that_of_its_law() {
     let at = tempfile::tempdir().unwrap();
-    press_table(at.path(), "press.csv", 0.1, 30.0, 2e-4);
+    press_table(at.path(), "press.csv", [0.1, 30.0, 2e-4], relaxed);
     let line = "material press.csv --property relaxation --indenter flat-punch --radius 3.00±0.03 --poisson 0.45±0.01 --law sneddon --thickness 800 --contact-error 0.002 --terms 3";
     let found = answer(&typed(at.path(), &format!("{line} --json")));
     let row = |source: &str| {
@@ -154,9 +162,9 @@ fn budget_of_a_relaxation_modulus_is_that_of_its_law() {
 #[test]
 fn what_a_record_does_not_hold_is_refused_in_one_sentence() {
     let at = tempfile::tempdir().unwrap();
-    press_table(at.path(), "slow.csv", 3.0, 60.0, 2e-4);
-    press_table(at.path(), "noisy.csv", 0.1, 60.0, 5e-2);
-    press_table(at.path(), "short.csv", 0.1, 2.0, 2e-4);
+    press_table(at.path(), "slow.csv", [3.0, 60.0, 2e-4], relaxed);
+    press_table(at.path(), "noisy.csv", [0.1, 60.0, 5e-2], relaxed);
+    press_table(at.path(), "short.csv", [0.1, 2.0, 2e-4], relaxed);
     let relaxation = format!("--property relaxation {PUNCH}");
     for (line, code, reason) in [
         (format!("slow.csv {relaxation} --terms 3"), 1, "is not identifiable behind a ramp of 2.9"),

@@ -18,7 +18,7 @@ use crate::material::{
 };
 use crate::recordings::is_session;
 use crate::relaxation::{
-    RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber,
+    NoiseError, RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber,
     relaxation,
 };
 use crate::source::{RecordStretch, SourceError};
@@ -142,8 +142,8 @@ pub enum DynamicError {
 
 /// The dynamic moduli of the sines of a session, or of a record that is one sine.
 pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> {
-    let (press, term_count) = (&request.press, None);
-    measure(request, Some(relaxation(RelaxationRequest { press, term_count })))
+    let press = &request.press;
+    measure(request, Some(relaxation(RelaxationRequest { press, family: None })))
 }
 
 /// The same beside what the relaxation of the record predicts, where that is asked.
@@ -275,9 +275,12 @@ fn row(
     sine.check_amplitude(amplitude)?;
     let values = sine.moduli()?;
     let errors = uncertainty.effects(sine, found)?;
+    // The first source are the residuals.
+    let noise =
+        |number: usize| NoiseError { standard_error: errors[0].1[number], freedom: found.freedom };
     let combined = |number: usize| {
         let variance: f64 = errors.iter().map(|(_, effect)| effect[number].powi(2)).sum();
-        UncertainNumber::new(values[number], variance.sqrt())
+        UncertainNumber::new(values[number], variance.sqrt(), noise(number))
     };
     // The errors of a source stand together.
     let budget_row = |errors: &[(&'static str, Moduli)]| {
@@ -318,9 +321,10 @@ fn predict(report: &RelaxationReport, frequency_hz: f64) -> Option<[f64; 2]> {
         modulus_mpa: term.modulus_mpa.value,
         time_secs: term.time_s.value,
     };
-    let series = RelaxationModulus {
+    let modulus = RelaxationModulus {
         equilibrium_mpa: report.equilibrium_mpa.value,
         terms: report.terms.iter().map(term).collect(),
+        exponent: report.exponent.map_or(1.0, |exponent| exponent.value),
     };
-    is_seen.then(|| series.dynamic_moduli(frequency_hz))
+    is_seen.then(|| modulus.dynamic_moduli(frequency_hz))
 }

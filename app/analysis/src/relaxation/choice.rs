@@ -2,7 +2,7 @@
 
 use super::RelaxationError;
 use super::record::{JudgedFit, Press, Record};
-use palpate_indentation::TERMS_MAX;
+use palpate_indentation::{RelaxationFamily, TERMS_MAX};
 use palpate_rheology::select::criteria;
 use serde::Serialize;
 
@@ -31,7 +31,7 @@ pub(super) fn choose(
 ) -> Result<(JudgedFit, TermChoice), RelaxationError> {
     let (mut fits, mut refused, mut too_few) = (Vec::new(), None, None);
     for count in 1..=TERMS_MAX {
-        match record.fit(press, count) {
+        match record.fit(press, RelaxationFamily::Prony { terms: count }) {
             Ok(fit) => fits.push(fit),
             // More terms may describe it.
             Err(err @ RelaxationError::Autocorrelated { .. }) => too_few = Some(err),

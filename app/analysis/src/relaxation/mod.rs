@@ -12,12 +12,15 @@ pub use choice::{TermCandidate, TermChoice};
 
 use crate::compliance::ComplianceCorrection;
 use crate::material::{
-    COVERAGE, ErrorSource, MaterialError, MaterialRequest, PressRecord, ValidityRow, above_noise,
-    read_press, validity_rows,
+    ErrorSource, MaterialError, MaterialRequest, PressRecord, ValidityRow, above_noise, read_press,
+    validity_rows,
 };
 use crate::source::RecordStretch;
 use numbers::Numbers;
-use palpate_indentation::{ContactLaw, Indenter, LoadHistoryError, RelaxationFitError, Specimen};
+use palpate_indentation::{
+    ContactLaw, Indenter, LoadHistoryError, RelaxationFamily, RelaxationFitError, Specimen,
+};
+use palpate_model::estimate::coverage_factor;
 use record::{Record, Source};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -27,8 +30,8 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug)]
 pub struct RelaxationRequest<'a> {
     pub press: &'a MaterialRequest,
-    /// Terms of the Prony series; `None` takes as many as the record is worth.
-    pub term_count: Option<usize>,
+    /// `None` takes a Prony series with as many terms as the record is worth.
+    pub family: Option<RelaxationFamily>,
 }
 
 /// A relaxation modulus and all it rests on.
@@ -36,6 +39,8 @@ pub struct RelaxationRequest<'a> {
 pub struct RelaxationReport {
     pub source: PathBuf,
     pub property: &'static str,
+    /// `prony` or `fractional`.
+    pub family: &'static str,
     pub law: ContactLaw,
     pub indenter: Indenter,
     pub specimen: Specimen,
@@ -45,7 +50,9 @@ pub struct RelaxationReport {
     pub equilibrium_mpa: UncertainNumber,
     /// From the shortest relaxation time to the longest.
     pub terms: Vec<RelaxationTerm>,
-    /// What relaxes within this time in s is in no number; `instantaneous_mpa` is the sum of the terms that were found.
+    /// Of the Mittag-Leffler function by which the term of the fractional Zener model relaxes, and creeps; `None` for a Prony series.
+    pub exponent: Option<UncertainNumber>,
+    /// What relaxes within this time in s is in no number; `instantaneous_mpa` is that of the family.
     pub seen_from_s: f64,
     /// At the powers of ten from there to the end of the record.
     pub modulus: Vec<ModulusAtTime>,
@@ -54,7 +61,7 @@ pub struct RelaxationReport {
     /// The largest share in the equilibrium modulus first.
     pub budget: Vec<RelaxationBudgetRow>,
     pub not_included: Vec<&'static str>,
-    /// `None` where the number of terms was given.
+    /// `None` where the family was given.
     pub term_choice: Option<TermChoice>,
     pub samples: usize,
     /// Number of independent samples that carry the information of the residuals.
@@ -88,9 +95,21 @@ pub struct UncertainNumber {
     pub total95: [f64; 2],
 }
 
+/// What residuals make uncertain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NoiseError {
+    /// In the unit of the number.
+    pub standard_error: f64,
+    /// Degrees of freedom, for Student's t.
+    pub freedom: f64,
+}
+
 impl UncertainNumber {
-    pub(crate) fn new(value: f64, standard_uncertainty: f64) -> Self {
-        let half = COVERAGE * standard_uncertainty;
+    /// A number with the standard uncertainty of all sources, of which the noise is one.
+    pub(crate) fn new(value: f64, standard_uncertainty: f64, noise: NoiseError) -> Self {
+        let variance = standard_uncertainty * standard_uncertainty;
+        let factor = coverage_factor(noise.standard_error, noise.freedom, variance);
+        let half = factor * standard_uncertainty;
         Self { value, standard_uncertainty, total95: [value - half, value + half] }
     }
 }
@@ -153,7 +172,7 @@ pub enum RelaxationError {
     )]
     ContactFree,
     #[error(
-        "the term with the relaxation time of {time_secs:.3e} s is known to {percent:.0} % only, because the residuals are autocorrelated: the modulus does not describe the record; take another law or another number of terms, or press less deep"
+        "the term with the relaxation time of {time_secs:.3e} s is known to {percent:.0} % only, because the residuals are autocorrelated: the modulus does not describe the record; take another law or another model, or press less deep"
     )]
     Autocorrelated { time_secs: f64, percent: f64 },
     #[error("the standard uncertainty of the contact is {error_mm} mm; give mm, not below 0")]
@@ -182,8 +201,8 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
     };
     let record = Record::of(&read)?;
     let law = (press.law, &press.indenter, &specimen);
-    let (judged, term_choice) = match request.term_count {
-        Some(count) => (record.fit(law, count)?, None),
+    let (judged, term_choice) = match request.family {
+        Some(family) => (record.fit(law, family)?, None),
         None => {
             let (judged, choice) = choice::choose(&record, law)?;
             (judged, Some(choice))
@@ -193,10 +212,12 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
     if fit.modulus.equilibrium_mpa <= 0.0 {
         return Err(RelaxationError::NegativeEquilibrium { mpa: fit.modulus.equilibrium_mpa });
     }
-    let seen_from_s = record.seen_from_secs(law, fit.modulus.terms.len());
+    let seen_from_s = record.seen_from_secs(law, fit);
     let times = record.decades(seen_from_s);
-    let numbers = Numbers::of(&fit.modulus, &times);
-    let mut sources: Vec<(&'static str, Vec<f64>)> = vec![("residuals", numbers.noise(&judged))];
+    let numbers = Numbers::of(fit, &times);
+    let noise = numbers.noise(&judged);
+    let of_residuals = noise.iter().map(|one| one.standard_error).collect();
+    let mut sources: Vec<(&'static str, Vec<f64>)> = vec![("residuals", of_residuals)];
     let mut not_included = Vec::new();
     let applied = compliance.as_ref().filter(|one| one.is_applied);
     for Source { name, errors } in record.sources(law, fit, &read, contact_error_mm, applied)? {
@@ -205,18 +226,21 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
             false => sources.push((name, numbers.shifts(fit, &errors))),
         }
     }
-    let found = numbers.combined(&sources);
+    let found = numbers.combined(&noise, &sources);
+    let is_fractional = fit.family == RelaxationFamily::Fractional;
     let validity = press.law.validity(&press.indenter, &specimen, record.deepest());
     let validity = validity_rows(&validity.map_err(LoadHistoryError::from)?);
     Ok(RelaxationReport {
         source: press.source.clone(),
         property: "relaxation",
+        family: if is_fractional { "fractional" } else { "prony" },
         law: press.law,
         indenter: press.indenter,
         specimen,
         instantaneous_mpa: found.instantaneous,
         equilibrium_mpa: found.equilibrium,
         terms: found.terms,
+        exponent: is_fractional.then_some(found.exponent),
         seen_from_s,
         modulus: found.modulus,
         creep: found.creep,

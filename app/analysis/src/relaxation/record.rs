@@ -1,12 +1,13 @@
 //! The part of a record that a relaxation modulus is fitted to, and what errors of what was measured do to its forces.
 
-use super::RelaxationError;
+use super::{NoiseError, RelaxationError};
 use crate::compliance::ComplianceCorrection;
 use crate::material::zero_scatter;
 use crate::source::FitSource;
 use palpate_indentation::{
-    ContactLaw, Indenter, LoadHistoryError, RELATIVE_ERROR_MAX, RelaxationFit, RelaxationFitError,
-    Specimen, fit_relaxation, lee_radok_force, load_history, vary_uncertain_numbers,
+    ContactLaw, Indenter, LoadHistoryError, RELATIVE_ERROR_MAX, RelaxationFamily, RelaxationFit,
+    RelaxationFitError, Specimen, fit_relaxation, lee_radok_force, load_history,
+    vary_uncertain_numbers,
 };
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::units::Newtons;
@@ -39,14 +40,17 @@ impl JudgedFit {
         let memory = ResidualAutocorrelation::of(&fit.residuals_newtons, &fit.tangents)
             .ok_or(RelaxationError::NoResiduals { samples })?;
         let judged = Self { fit, memory };
-        let count = judged.fit.modulus.terms.len();
+        let (count, unknowns) = (judged.fit.modulus.terms.len(), judged.fit.tangents.len());
+        let error = |unknown: usize| {
+            let along = |one: usize| if one == unknown { 1.0 } else { 0.0 };
+            let along: Vec<f64> = (0..unknowns).map(along).collect();
+            judged.error_along(&along).standard_error
+        };
+        // Of an exponent, which is that of all terms.
+        let of_exponent = (2 * count + 1..unknowns).map(error).fold(0.0, f64::max);
         for (index, term) in judged.fit.modulus.terms.iter().enumerate() {
-            let error = |unknown: usize| {
-                let along = |one: usize| if one == unknown { 1.0 } else { 0.0 };
-                let along: Vec<f64> = (0..2 * count + 1).map(along).collect();
-                judged.standard_error_along(&along)
-            };
-            let share = (error(index) / term.modulus_mpa).max(error(count + 1 + index));
+            let of_modulus = error(index) / term.modulus_mpa;
+            let share = of_modulus.max(error(count + 1 + index)).max(of_exponent);
             if share > RELATIVE_ERROR_MAX {
                 let (time_secs, percent) = (term.time_secs, 100.0 * share);
                 return Err(RelaxationError::Autocorrelated { time_secs, percent });
@@ -56,8 +60,10 @@ impl JudgedFit {
     }
 
     /// As that of the fit, with the autocorrelation of the residuals.
-    pub fn standard_error_along(&self, gradient: &[f64]) -> f64 {
-        self.fit.standard_error_along(gradient) * self.memory.inflation(gradient).sqrt()
+    pub fn error_along(&self, gradient: &[f64]) -> NoiseError {
+        let (inflation, freedom) = self.memory.inflation(gradient);
+        let standard_error = self.fit.standard_error_along(gradient) * inflation.sqrt();
+        NoiseError { standard_error, freedom }
     }
 }
 
@@ -100,10 +106,14 @@ impl Record {
         })
     }
 
-    pub fn fit(&self, press: Press, term_count: usize) -> Result<JudgedFit, RelaxationError> {
+    pub fn fit(
+        &self,
+        press: Press,
+        family: RelaxationFamily,
+    ) -> Result<JudgedFit, RelaxationError> {
         let (law, indenter, specimen) = press;
         let (power, history) = load_history(law, indenter, specimen, &self.times, &self.depths)?;
-        JudgedFit::of(fit_relaxation(power, &history, &self.forces, term_count)?)
+        JudgedFit::of(fit_relaxation(power, &history, &self.forces, family)?)
     }
 
     pub fn deepest(&self) -> f64 {
@@ -121,12 +131,15 @@ impl Record {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// From when on in s after a step so many terms are the modulus: behind the mean interval of the samples and a tenth of the
-    /// ramp, within which no fit finds a time, and behind all of the ramp where one more term is hidden there.
-    pub fn seen_from_secs(&self, press: Press, term_count: usize) -> f64 {
-        let hidden = self.fit(press, term_count + 1);
-        let is_hidden =
-            matches!(hidden, Err(RelaxationError::Fit(RelaxationFitError::RampTooLong { .. })));
+    /// From when on in s after a step a fit is the modulus: behind the mean interval of the samples and a tenth of the ramp, within
+    /// which no fit finds a time, and behind all of the ramp where one more term of a Prony series is hidden there.
+    pub fn seen_from_secs(&self, press: Press, fit: &RelaxationFit) -> f64 {
+        let more = RelaxationFamily::Prony { terms: fit.modulus.terms.len() + 1 };
+        let is_hidden = fit.family != RelaxationFamily::Fractional
+            && matches!(
+                self.fit(press, more),
+                Err(RelaxationError::Fit(RelaxationFitError::RampTooLong { .. }))
+            );
         let share = if is_hidden { 1.0 } else { 0.1 };
         (self.secs() / self.times.len() as f64).max(share * self.ramp_secs())
     }

@@ -24,10 +24,15 @@ pub fn relaxation_text(report: &RelaxationReport) -> String {
             with_uncertainty(term.time_s),
         ));
     }
-    lines.push(format!(
-        "seen from        {} s on: what relaxes faster is in no number, and the instantaneous G is the sum of the terms",
-        significant(report.seen_from_s, 2)
-    ));
+    lines.extend(report.exponent.map(exponent_words));
+    let instantaneous = match report.exponent {
+        Some(_) => "what is faster is extrapolated, as the instantaneous G",
+        None => {
+            "what relaxes faster is in no number, and the instantaneous G is the sum of the terms"
+        }
+    };
+    let seen_from = significant(report.seen_from_s, 2);
+    lines.push(format!("seen from        {seen_from} s on: {instantaneous}"));
     let both = report.modulus.iter().zip(&report.creep.compliance);
     lines.extend(both.map(|(modulus, compliance)| {
         format!(
@@ -83,6 +88,13 @@ fn modulus_line(name: &str, mpa: UncertainNumber) -> String {
         with_uncertainty(number),
         significant(number.total95[0], 4),
         significant(number.total95[1], 4),
+    )
+}
+
+fn exponent_words(exponent: UncertainNumber) -> String {
+    format!(
+        "exponent         {} of the fractional Zener model: the term relaxes and creeps by the Mittag-Leffler function of this exponent",
+        with_uncertainty(exponent)
     )
 }
 

@@ -18,6 +18,7 @@ use palpate_analysis::report::material::material_text;
 use palpate_analysis::session_actions::MaterialToStore;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
+    RelaxationFamily,
 };
 use palpate_tables::lake::{Shard, is_lake};
 use std::num::NonZeroUsize;
@@ -87,7 +88,10 @@ pub struct MaterialArgs {
     /// the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
-    /// Terms of the relaxation modulus; without it as many as the record is worth
+    /// Model family of the relaxation modulus; without it prony
+    #[arg(long, value_parser = choice(FAMILIES))]
+    family: Option<FamilyWord>,
+    /// Terms of the Prony series; without it as many as the record is worth
     #[arg(long, value_name = "COUNT")]
     terms: Option<usize>,
     /// Treat a table as one sine of this frequency in Hz; a session has its own
@@ -134,6 +138,17 @@ const PROPERTIES: &[Choice<Property>] = &[
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FamilyWord {
+    Prony,
+    Fractional,
+}
+
+const FAMILIES: &[Choice<FamilyWord>] = &[
+    ("prony", FamilyWord::Prony, "a sum of exponentials"),
+    ("fractional", FamilyWord::Fractional, "the fractional Zener model"),
+];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum IndenterWord {
     FlatPunch,
     Sphere,
@@ -177,7 +192,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     match args.property {
         Property::Modulus => modulus(args, &request, output),
         Property::Unloading => unloading::run(&request, output),
-        Property::Relaxation => relaxation::run(&request, args.terms, output),
+        Property::Relaxation => relaxation::run(&request, family(args)?, output),
         Property::Dynamic => dynamic::run(&dynamic_request(args, request), output),
         Property::MasterCurve => master_curve::run(&master_curve_request(args)?, output),
     }
@@ -231,7 +246,7 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
 /// A flag that belongs to another property.
 fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
     use Property::{Dynamic, MasterCurve, Modulus, Relaxation, Unloading};
-    let given: [(&str, bool, &[Property], &str); 9] = [
+    let given: [(&str, bool, &[Property], &str); 10] = [
         ("depth-max", args.depth_max.is_some(), &[Modulus], "the modulus of a loading"),
         ("save", args.save.is_some(), &[Modulus], "the modulus of a loading"),
         ("zero-error", args.zero_error.is_some(), &[Modulus, Unloading], "a Young's modulus"),
@@ -241,6 +256,7 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
             &[Modulus, Relaxation, Dynamic, MasterCurve],
             "what is no unloading",
         ),
+        ("family", args.family.is_some(), &[Relaxation], "a relaxation modulus"),
         ("terms", args.terms.is_some(), &[Relaxation], "a relaxation modulus"),
         ("frequency", args.frequency.is_some(), &[Dynamic], "dynamic moduli"),
         ("moving-mass", args.moving_mass.is_some(), &[Dynamic, MasterCurve], "dynamic moduli"),
@@ -260,6 +276,7 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
 }
 
 fn request(args: &MaterialArgs, source: &Path) -> Result<MaterialRequest, Failure> {
+        ("family", args.family.is_some(), &[Relaxation], "a relaxation modulus"),
     Ok(MaterialRequest {
         source: source.to_owned(),
         columns: parse_columns(args.columns.as_deref())?,
@@ -292,7 +309,7 @@ pub(super) fn failure(err: MaterialError) -> Failure {
             | LoadingFitError::Samples { .. },
         ) => Failure::failed(err),
         MaterialError::TooDeep { reason, depth_max_mm } => Failure::usage(format!(
-            "{reason}; for this indenter and specimen give --depth-max {depth_max_mm:.4} or less"
+            "{reason}; for this indenter and specimen give --depth-max {depth_max_mm} or less"
         )),
         MaterialError::NoThickness => Failure::usage(format!("{err}; give --thickness")),
         err => Failure::usage(err),

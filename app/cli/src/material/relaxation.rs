@@ -5,14 +5,14 @@ use super::super::output::Output;
 use palpate_analysis::material::MaterialRequest;
 use palpate_analysis::relaxation::{RelaxationError, RelaxationRequest, relaxation};
 use palpate_analysis::report::relaxation::relaxation_text;
-use palpate_indentation::RelaxationFitError;
+use palpate_indentation::{RelaxationFamily, RelaxationFitError};
 
 pub(super) fn run(
     press: &MaterialRequest,
-    term_count: Option<usize>,
+    family: Option<RelaxationFamily>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let report = relaxation(RelaxationRequest { press, term_count }).map_err(failure)?;
+    let report = relaxation(RelaxationRequest { press, family }).map_err(failure)?;
     report.notes.iter().for_each(|note| output.note(note));
     output.answer("material", &report, || relaxation_text(&report));
     Ok(())

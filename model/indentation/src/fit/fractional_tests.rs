@@ -75,7 +75,7 @@ fn what_is_no_fractional_relaxation_is_refused_in_one_sentence() {
     // Exponentials relax faster at the end.
     let steep = refusal(TEST, &body(1.0));
     assert!(steep.contains("the exponent reaches 1"), "{steep}");
-    let noisy = refusal(Test { noise: 0.05, hold: 5.0, ..TEST }, &body(0.6));
+    let noisy = refusal(Test { noise: 0.1, hold: 5.0, ..TEST }, &body(0.6));
     assert!(noisy.contains("not identifiable in this record"), "{noisy}");
     assert!(noisy.contains("a Prony series, a faster ramp"), "{noisy}");
     let slow = refusal(Test { ramp: 30.0, ..TEST }, &body(0.7));

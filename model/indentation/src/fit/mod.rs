@@ -33,6 +33,7 @@ use thiserror::Error;
 /// A relaxation modulus and how well it is known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelaxationFit {
+    pub family: RelaxationFamily,
     /// Terms from the shortest relaxation time to the longest.
     pub modulus: RelaxationModulus,
     /// The standard error of each number of `modulus`, from the covariance of residuals that are independent of each other.
@@ -219,6 +220,7 @@ fn report(
         exponent: exponent_error,
     };
     Ok(RelaxationFit {
+        family,
         modulus: RelaxationModulus { equilibrium_mpa: moduli[count], terms, exponent },
         standard_errors,
         residual_newtons: variance.sqrt(),

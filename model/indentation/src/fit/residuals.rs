@@ -5,7 +5,6 @@
 //! those of every fit of palpate are.
 
 use palpate_model::autocorrelation::{BlockedResiduals, block_sums, memory};
-use palpate_model::estimate::student_t975;
 
 /// Mean square of residuals over that of the forces that is rounding: 1e-12 of a force.
 const ROUNDING: f64 = 1e-24;
@@ -52,11 +51,4 @@ impl FittedSamples<'_> {
             _ => white,
         }
     }
-}
-
-/// Standard uncertainties in half of a 95 % interval of a modulus of a variance in MPa², of which the noise's has its degrees of
-/// freedom and all others have infinitely many.
-pub(super) fn coverage_factor(noise_mpa: f64, freedom: f64, variance: f64) -> f64 {
-    let share = noise_mpa * noise_mpa / variance;
-    student_t975(freedom / (share * share))
 }

@@ -7,10 +7,11 @@
 //! 2660-2671), and `beta` is one but for pyramids (King, Int. J. Solids Struct. 23 (1987) 1657-1664).
 
 use super::loading::{LoadingKnowledge, LoadingSample, ModulusTerm, varied};
-use super::residuals::{FittedSamples, ModulusNoise, coverage_factor};
+use super::residuals::{FittedSamples, ModulusNoise};
 use crate::document::{Indenter, Specimen};
 use crate::triangle::Triangle;
 use crate::validity::{ContactError, ContactLaw, Validity};
+use palpate_model::estimate::coverage_factor;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use thiserror::Error;

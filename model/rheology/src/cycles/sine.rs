@@ -45,6 +45,8 @@ pub struct Sinusoid {
     pub storage: Estimate<f64>,
     /// Force a quarter of a cycle ahead of depth, per depth, in N/mm.
     pub loss: Estimate<f64>,
+    /// Degrees of freedom of all standard errors.
+    pub freedom: f64,
     /// Total harmonic distortion of the force: the root of the sum of squares of harmonics 2 to 5 over the first, in
     /// percent.
     pub distortion_percent: f64,
@@ -82,11 +84,12 @@ pub enum SinusoidError {
     NoMotion { frequency: f64 },
 }
 
-/// Coefficients of one response, the standard error of those at the frequency, and the standard deviation of what is
-/// left.
+/// Coefficients of one response, the standard error of those at the frequency with its degrees of freedom, and the
+/// standard deviation of what is left.
 struct HarmonicFit {
     coefficients: [f64; COLUMNS],
     error: f64,
+    freedom: f64,
     noise: f64,
 }
 
@@ -137,6 +140,7 @@ pub fn fit_sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid,
         },
         storage: Estimate { value: storage, std_error: error },
         loss: Estimate { value: loss, std_error: error },
+        freedom: force.freedom,
         distortion_percent: 100.0 * harmonics.sqrt() / force_amplitude,
         zero_share: zero_share(used().map(|one| one.force.0), force_amplitude, force.noise),
     })
@@ -206,6 +210,7 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
     Some(HarmonicFit {
         coefficients,
         error: (variance * 0.5 * errors).sqrt(),
+        freedom: free as f64,
         noise: variance.sqrt(),
     })
 }

@@ -1,6 +1,6 @@
 //! Autocorrelation of the residuals of a fit that another crate made.
 
-use super::inflation::{inflation, triangle};
+use super::inflation::{freedom, inflation, triangle};
 use palpate_model::autocorrelation::{BlockedResiduals, Memory, memory};
 
 /// What the residuals of a least-squares fit say of its uncertainty, as [`fit()`](super::fit()) takes it.
@@ -11,6 +11,8 @@ pub struct ResidualAutocorrelation {
     /// Variance of the residuals.
     white: f64,
     samples: usize,
+    /// Samples beyond the unknowns.
+    spare: usize,
 }
 
 impl ResidualAutocorrelation {
@@ -24,7 +26,7 @@ impl ResidualAutocorrelation {
         let blocks = BlockedResiduals::of(residuals, tangents);
         let memory = memory(&blocks, &vec![true; tangents.len()], white);
         let memory = memory.unwrap_or_else(|| Memory::none(white));
-        Some(Self { blocks, memory, white, samples })
+        Some(Self { blocks, memory, white, samples, spare })
     }
 
     /// Number of independent samples that carry the same information.
@@ -37,12 +39,14 @@ impl ResidualAutocorrelation {
         }
     }
 
-    /// Factor on the variance under independence of a combination of the unknowns, at least one.
+    /// Factor on the variance under independence of a combination of the unknowns, at least one, and the degrees of freedom of
+    /// that variance, for Student's t.
     #[must_use]
-    pub fn inflation(&self, combination: &[f64]) -> f64 {
+    pub fn inflation(&self, combination: &[f64]) -> (f64, f64) {
         let factor = triangle([&self.blocks].into_iter(), combination.len()).finish();
         let records = [(self.blocks.clone(), Some(self.memory), self.white)];
-        inflation(&records, &factor, combination, self.white).0
+        let (inflation, uncertainty) = inflation(&records, &factor, combination, self.white);
+        (inflation, freedom(self.spare as f64, uncertainty))
     }
 }
 
@@ -56,7 +60,7 @@ mod tests {
     #[test]
     fn inflation_is_that_of_the_process() {
         for keep in [0.0, 0.9, 0.98] {
-            let (mut factors, mut effective) = (Vec::new(), Vec::new());
+            let (mut factors, mut freedoms, mut effective) = (Vec::new(), Vec::new(), Vec::new());
             for seed in 0..20 {
                 let mut random = SplitMix::seeded(seed);
                 let mut value = 0.0;
@@ -68,7 +72,9 @@ mod tests {
                     .collect();
                 let constant = vec![1.0; residuals.len()];
                 let found = ResidualAutocorrelation::of(&residuals, &[constant]).unwrap();
-                factors.push(found.inflation(&[1.0]));
+                let (factor, freedom) = found.inflation(&[1.0]);
+                factors.push(factor);
+                freedoms.push(freedom);
                 effective.push(found.effective_samples());
             }
             // A record in twenty passes for one of longer memory.
@@ -76,7 +82,10 @@ mod tests {
                 numbers.sort_by(f64::total_cmp);
                 numbers[numbers.len() / 2]
             };
-            let (factor, effective) = (median(factors), median(effective));
+            let (factor, freedom, effective) =
+                (median(factors), median(freedoms), median(effective));
+            // Independent samples all tell of the variance, and what lasts is told by far fewer.
+            assert_eq!(freedom > 1e4, keep == 0.0, "{keep}: {freedom}");
             let exact = (1.0 + keep) / (1.0 - keep);
             assert!((factor / exact - 1.0).abs() < 0.15, "{keep}: {factor} {exact}");
             assert!((effective * exact / 20_000.0 - 1.0).abs() < 0.15, "{keep}: {effective}");

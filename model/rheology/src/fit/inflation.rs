@@ -22,6 +22,11 @@ pub(super) fn triangle<'b>(
     triangle
 }
 
+/// Degrees of freedom of a variance whose logarithm has this variance, no more than there are spare samples.
+pub(super) fn freedom(spare: f64, uncertainty: f64) -> f64 {
+    if uncertainty > 0.0 { spare.min((2.0 / uncertainty).max(1.0)) } else { spare }
+}
+
 /// Variance of a combination of unknowns under the memories found over that under independent
 /// noise of variance `white`, and the variance of its logarithm; `factor` is the [`triangle`].
 pub(super) fn inflation(

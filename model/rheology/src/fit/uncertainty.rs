@@ -1,6 +1,6 @@
 //! Standard errors that allow for autocorrelated residuals.
 
-use super::inflation::{inflation, triangle};
+use super::inflation::{freedom, inflation, triangle};
 use super::passes::{RecordFactor, UnknownPlace};
 use super::refine::RefinedFit;
 use super::solve::FitSolution;
@@ -161,8 +161,7 @@ impl Uncertainty {
         });
         let known = self.drift.as_ref().map_or(0.0, |(_, known)| *known);
         let uncertainty = uncertainty + shares.map_or(0.0, |[drift, _]| known * drift * drift);
-        let freedom =
-            if uncertainty > 0.0 { spare.min((2.0 / uncertainty).max(1.0)) } else { spare };
+        let freedom = freedom(spare, uncertainty);
         std_error.is_finite().then_some(UncertaintyEstimate {
             std_error,
             inflation,

@@ -240,7 +240,7 @@ impl MaterialForm {
     /// Limits the depth in mm.
     pub fn limit_depth(&mut self, depth_mm: f64) {
         self.is_depth_limited = true;
-        self.depth_max = QuantityField::typed(format!("{depth_mm:.4}"));
+        self.depth_max = QuantityField::typed(depth_mm.to_string());
     }
 
     /// Checks every field.

@@ -111,7 +111,7 @@ impl MaterialScreen {
         let Some(refused) = self.refused() else { return };
         alarm_ui(ui, refused.to_string());
         let MaterialError::TooDeep { depth_max_mm, .. } = *refused else { return };
-        if ui.button(format!("Fit the loading down to {depth_max_mm:.4} mm")).clicked() {
+        if ui.button(format!("Fit the loading down to {depth_max_mm} mm")).clicked() {
             self.form.limit_depth(depth_max_mm);
             commands.push(UiCommand::Work);
         }

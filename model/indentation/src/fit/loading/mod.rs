@@ -10,10 +10,11 @@ mod variations;
 #[cfg(test)]
 mod tests;
 
-use super::residuals::{FittedSamples, ModulusNoise, coverage_factor};
+use super::residuals::{FittedSamples, ModulusNoise};
 use crate::document::{Indenter, Specimen};
 use crate::load_curve::LoadCurve;
 use crate::validity::{ContactError, ContactLaw, Validity};
+use palpate_model::estimate::coverage_factor;
 use problem::{Found, LoadingProblem, MODULUS, SHIFT, ZERO};
 use std::collections::BTreeMap;
 use thiserror::Error;
