@@ -42,7 +42,7 @@ fn fractional_model_comes_back_from_ramps_short_and_long() {
         let line = format!("material press.csv --property relaxation {PUNCH} --family fractional");
         let found = answer(&typed(at.path(), &format!("{line} --json")));
         assert_eq!(found["family"], "fractional");
-        let mut check = |name: &str, exact: f64| {
+        let check = |name: &str, exact: f64| {
             let value = |part: &str| number(&found, &format!("{name}/{part}"));
             let off = (value("value") - exact).abs();
             assert!(off < 0.01 * exact, "{ramp} {name}: {found}");
