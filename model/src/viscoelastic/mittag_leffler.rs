@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn rates_move_with_alpha_as_their_slopes_say() {
         for alpha in [0.1, 0.5, 0.9, 0.999] {
-            let step = 1e-4 * (1.0 - alpha);
+            let step: f64 = 1e-4 * (1.0 - alpha);
             for w in [-12.0, -2.0, 0.0, 0.3, 5.0, 20.0] {
                 let [low, high] = [-step, step].map(|by| rate_share(alpha * by.exp(), w).ln_rate);
                 let slope = rate_share(alpha, w).slope;
