@@ -195,7 +195,7 @@ fn superpose(
     let (energy, energy_refused) = split(
         found
             .arrhenius
-            .map(|law| UncertainNumber::new(law.activation_energy, law.standard_uncertainty)),
+            .map(|law| UncertainNumber::normal(law.activation_energy, law.standard_uncertainty)),
     );
     let (constants, constants_refused) = split(found.williams_landel_ferry.map(constants));
     Ok(MasterCurveReport {
@@ -254,7 +254,7 @@ fn modulus_errors(measured: &[MeasuredSweep]) -> Vec<ModulusError> {
 fn sweep_reports(measured: &[MeasuredSweep], found: &MasterCurve) -> Vec<SweepReport> {
     let report = |(place, one): (usize, &MeasuredSweep)| {
         let (ln_shift, error) = (found.ln_shifts[place], found.covariance[place][place].sqrt());
-        let log10_shift_factor = UncertainNumber::new(ln_shift / LN_10, error / LN_10);
+        let log10_shift_factor = UncertainNumber::normal(ln_shift / LN_10, error / LN_10);
         SweepReport {
             source: one.report.source.clone(),
             temperature_c: one.temperature_c,

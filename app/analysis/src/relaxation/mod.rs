@@ -112,6 +112,12 @@ impl UncertainNumber {
         let half = factor * standard_uncertainty;
         Self { value, standard_uncertainty, total95: [value - half, value + half] }
     }
+
+    /// A number whose standard uncertainty is known, as of a sum of many sources.
+    pub(crate) fn normal(value: f64, standard_uncertainty: f64) -> Self {
+        let noise = NoiseError { standard_error: standard_uncertainty, freedom: f64::INFINITY };
+        Self::new(value, standard_uncertainty, noise)
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
