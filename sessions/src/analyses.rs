@@ -19,7 +19,7 @@ use thiserror::Error;
 
 /// Name of the file of analyses in a session folder.
 pub const ANALYSES_FILE: &str = "analyses.jsonl";
-/// Version of the results of a modulus; a field that changes its meaning raises it.
+/// Version of the results of a property of the material; a field that changes its meaning raises it.
 pub const MATERIAL_VERSION: u32 = 1;
 /// Longest name of an analysis in letters: it has to fit on a line.
 const NAME_MAX: usize = 80;
@@ -44,7 +44,7 @@ pub enum AnalysisContent {
         /// The report, as `palpate fit --json` prints it.
         results: Value,
     },
-    /// Young's modulus by a contact law.
+    /// A property of the material by a contact law.
     Material {
         /// [`MATERIAL_VERSION`] of the program that wrote it.
         material_version: u32,

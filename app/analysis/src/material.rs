@@ -1,6 +1,7 @@
 //! Young's modulus of a recorded press by a contact law, with what makes it uncertain.
 
 use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
+use crate::press_modulus::{FittedPoint, ModulusBudget, PressModulus};
 use crate::source::{self, FitSource, RecordStretch, SourceError, SourceSelection};
 use palpate_indentation::{
     Base, Bounded, ContactLaw, Indenter, LoadingFit, LoadingFitError, LoadingKnowledge,
@@ -58,21 +59,13 @@ impl ErrorSource {
     }
 }
 
-/// A modulus and all it rests on.
+/// A modulus of a loading and all it rests on.
 #[derive(Clone, Debug, Serialize)]
 pub struct MaterialReport {
-    pub source: PathBuf,
     pub law: ContactLaw,
-    pub indenter: Indenter,
-    pub specimen: Specimen,
-    /// Young's modulus in MPa, which is N/mm².
-    pub modulus_mpa: f64,
-    pub standard_uncertainty_mpa: f64,
-    pub total95_mpa: [f64; 2],
-    /// The largest first.
-    pub budget: Vec<MaterialBudgetRow>,
-    /// What the budget does not have, in words.
-    pub not_included: Vec<&'static str>,
+    /// Its depths count from the contact as fitted.
+    #[serde(flatten)]
+    pub press: PressModulus,
     /// By how much deeper than found the contact is, in mm.
     pub contact_shift_mm: f64,
     /// Standard uncertainty of the contact as found, in mm; `None` where the loading alone shows it.
@@ -81,42 +74,10 @@ pub struct MaterialReport {
     pub force_zero_n: f64,
     /// Standard uncertainty of the force out of contact before the fit, in N; `None` where the loading alone shows it.
     pub force_zero_error_n: Option<f64>,
-    pub samples: usize,
-    /// Of the deepest sample from the contact as fitted, in mm.
-    pub depth_mm: f64,
     /// From the contact to the deepest sample, in s.
     pub loading_s: f64,
-    pub residual_n: f64,
-    /// Standard deviation of a force in N, where it is known.
-    pub noise_n: Option<f64>,
-    pub validity: Vec<ValidityRow>,
     /// Where residuals are larger than the noise: the moduli of the shallow and the deep half.
     pub lack_of_fit: Option<LoadingLackOfFit>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub compliance: Option<ComplianceCorrection>,
-    #[serde(skip)]
-    pub notes: Vec<String>,
-    /// The samples that were fitted, for a plot.
-    #[serde(skip)]
-    pub curve: Vec<LoadingPoint>,
-}
-
-/// A sample of a loading and the force of the law there.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LoadingPoint {
-    /// From the contact as fitted.
-    pub depth_mm: f64,
-    pub force_n: f64,
-    pub law_n: f64,
-}
-
-/// A source of uncertainty of a modulus.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct MaterialBudgetRow {
-    pub source: &'static str,
-    pub mpa: f64,
-    /// Share of the variance.
-    pub percent: f64,
 }
 
 /// A ratio and up to where the law holds.
@@ -189,47 +150,40 @@ pub fn material_of(
     let fit = fit_loading(law, indenter, &specimen, &loading.samples, knowledge)
         .map_err(|reason| too_deep(reason, request, &specimen))?;
     let lack_of_fit = lack_of_fit(&fit, law, (indenter, &specimen), &loading);
-    let mut terms: Vec<(&'static str, f64)> =
-        fit.terms.iter().map(|(term, mpa)| (term.name(), *mpa)).collect();
-    let mut not_included = Vec::new();
-    match calibration_mpa(&read, &fit, &loading) {
-        Some(mpa) => terms.push(("calibration", mpa)),
-        None => not_included.push("calibration"),
-    }
-    match &compliance {
-        Some(applied) if applied.is_applied => {
-            let mpa = compliance_mpa(applied, &fit, law, (indenter, &specimen), &loading)?;
-            terms.push(("machine compliance", mpa));
-        }
-        _ => not_included.push("machine compliance"),
-    }
-    let variance: f64 = terms.iter().map(|(_, mpa)| mpa * mpa).sum();
-    let standard_uncertainty_mpa = variance.sqrt();
-    let half = fit.coverage_factor(variance) * standard_uncertainty_mpa;
-    Ok(MaterialReport {
+    let mut budget = ModulusBudget::of(&fit.terms);
+    budget.add("calibration", calibration_mpa(&read, &fit, &loading));
+    let applied = compliance.as_ref().filter(|one| one.is_applied);
+    let bent = applied.map(|one| compliance_mpa(one, &fit, law, (indenter, &specimen), &loading));
+    budget.add("machine compliance", bent.transpose()?);
+    let variance = budget.variance();
+    let half = fit.coverage_factor(variance) * variance.sqrt();
+    let press = PressModulus {
         source: request.source.clone(),
-        law,
         indenter: *indenter,
         specimen,
         modulus_mpa: fit.modulus_mpa,
-        standard_uncertainty_mpa,
+        standard_uncertainty_mpa: variance.sqrt(),
         total95_mpa: [fit.modulus_mpa - half, fit.modulus_mpa + half],
-        budget: budget_rows(terms, variance),
-        not_included,
+        budget: budget.rows(),
+        not_included: budget.not_included,
+        samples: loading.samples.len(),
+        depth_mm: loading.deepest() - fit.contact_shift_mm,
+        residual_n: fit.residual_newtons,
+        noise_n: loading.noise,
+        validity: validity_rows(&fit.validity),
+        compliance,
+        notes: read.notes,
+        curve: fitted_points(&loading.samples, &fit.residuals_newtons, fit.contact_shift_mm),
+    };
+    Ok(MaterialReport {
+        law,
+        press,
         contact_shift_mm: fit.contact_shift_mm,
         contact_error_mm,
         force_zero_n: fit.force_zero_newtons,
         force_zero_error_n,
-        samples: loading.samples.len(),
-        depth_mm: loading.deepest() - fit.contact_shift_mm,
         loading_s: loading.secs,
-        residual_n: fit.residual_newtons,
-        noise_n: loading.noise,
-        validity: validity_rows(&fit.validity),
         lack_of_fit,
-        compliance,
-        notes: read.notes,
-        curve: curve(&fit, &loading),
     })
 }
 
@@ -273,14 +227,18 @@ impl PressRecord {
     }
 }
 
-fn curve(fit: &LoadingFit, loading: &Loading) -> Vec<LoadingPoint> {
-    let samples = loading.samples.iter().zip(&fit.residuals_newtons);
-    let point = |(one, residual): (&LoadingSample, &f64)| LoadingPoint {
-        depth_mm: one.depth_mm - fit.contact_shift_mm,
+/// Samples with their residuals in N, depths from a contact in mm.
+pub(crate) fn fitted_points(
+    samples: &[LoadingSample],
+    residuals: &[f64],
+    contact_mm: f64,
+) -> Vec<FittedPoint> {
+    let point = |(one, residual): (&LoadingSample, &f64)| FittedPoint {
+        depth_mm: one.depth_mm - contact_mm,
         force_n: one.force_newtons,
         law_n: one.force_newtons - residual,
     };
-    samples.map(point).collect()
+    samples.iter().zip(residuals).map(point).collect()
 }
 
 /// The thickness in mm that a session measured by touching the base; `None` where it did not, and for a table.
@@ -288,21 +246,6 @@ pub fn measured_thickness(source: &Path) -> Result<Option<Quantity>, SourceError
     let wanted = SourceSelection { is_rejected_included: true, ..SourceSelection::default() };
     let measured = source::read_analysed(source, None, wanted, None)?.thickness_mm;
     Ok(measured.map(|[value, standard_uncertainty]| Quantity { value, standard_uncertainty }))
-}
-
-/// The largest first.
-pub(crate) fn budget_rows(
-    terms: Vec<(&'static str, f64)>,
-    variance: f64,
-) -> Vec<MaterialBudgetRow> {
-    let row = |(source, mpa): (&'static str, f64)| MaterialBudgetRow {
-        source,
-        mpa,
-        percent: 100.0 * mpa * mpa / variance,
-    };
-    let mut rows: Vec<MaterialBudgetRow> = terms.into_iter().map(row).collect();
-    rows.sort_by(|a, b| b.mpa.total_cmp(&a.mpa));
-    rows
 }
 
 /// The samples of a press down to its deepest place.

@@ -63,8 +63,8 @@ impl LakeMaterialRequest<'_> {
         }
         let source = source::of_session(session, RecordStretch::default(), &[])?;
         let mut report = material_of(source, self.press)?;
-        report.source = PathBuf::from(&one.id);
-        let notes = std::mem::take(&mut report.notes);
+        report.press.source = PathBuf::from(&one.id);
+        let notes = std::mem::take(&mut report.press.notes);
         store_fit(&file, &StoredModulus { report, notes })?;
         Ok(LakeFitOutcome::Fitted)
     }

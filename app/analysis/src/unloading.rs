@@ -1,54 +1,35 @@
 //! Young's modulus of a recorded unloading by the method of Oliver and Pharr, with what makes it uncertain.
 
-use crate::compliance::ComplianceCorrection;
 use crate::material::{
-    END_SHARE, MaterialBudgetRow, MaterialError, MaterialRequest, PressRecord, ValidityRow,
-    budget_rows, read_press, validity_rows, zero_scatter,
+    END_SHARE, MaterialError, MaterialRequest, PressRecord, fitted_points, read_press,
+    validity_rows, zero_scatter,
 };
+use crate::press_modulus::{ModulusBudget, PressModulus};
 use crate::source::{FitSource, RecordStretch};
 use palpate_indentation::{
-    Indenter, LoadingKnowledge, LoadingSample, Specimen, UnloadingFit, UnloadingFitError,
-    fit_unloading,
+    LoadingKnowledge, LoadingSample, UnloadingFit, UnloadingFitError, fit_unloading,
 };
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::units::Newtons;
 use serde::Serialize;
-use std::path::PathBuf;
 use thiserror::Error;
 
 /// A modulus of an unloading and all it rests on.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnloadingReport {
     pub property: &'static str,
-    pub source: PathBuf,
-    pub indenter: Indenter,
-    pub specimen: Specimen,
-    /// Young's modulus in MPa, which is N/mm².
-    pub modulus_mpa: f64,
-    pub standard_uncertainty_mpa: f64,
-    pub total95_mpa: [f64; 2],
-    /// The largest first.
-    pub budget: Vec<MaterialBudgetRow>,
-    /// What the budget does not have, in words.
-    pub not_included: Vec<&'static str>,
+    /// Its depth is where the unloading begins, its samples are those of the part that was fitted.
+    #[serde(flatten)]
+    pub press: PressModulus,
     /// Slope of the unloading where it begins, in N/mm.
     pub stiffness_n_per_mm: f64,
     pub exponent: f64,
-    /// Of the deepest sample, in mm.
-    pub depth_mm: f64,
     /// How deep the contact reaches, in mm.
     pub contact_depth_mm: f64,
     pub contact_area_mm2: f64,
-    /// Samples of the part of the unloading that was fitted.
-    pub samples: usize,
-    pub residual_n: f64,
-    /// Standard deviation of a force in N, where it is known.
-    pub noise_n: Option<f64>,
-    pub validity: Vec<ValidityRow>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub compliance: Option<ComplianceCorrection>,
+    /// All of the unloading as depths in mm and forces in N, for a plot.
     #[serde(skip)]
-    pub notes: Vec<String>,
+    pub unloading: Vec<[f64; 2]>,
 }
 
 #[derive(Debug, Error)]
@@ -80,51 +61,49 @@ pub fn unloading(request: &MaterialRequest) -> Result<UnloadingReport, Unloading
     };
     let fit_of = |samples: &[LoadingSample]| fit_unloading(indenter, &specimen, samples, knowledge);
     let fit = fit_of(&samples)?;
-    let mut terms: Vec<(&'static str, f64)> =
-        fit.terms.iter().map(|(term, mpa)| (term.name(), *mpa)).collect();
-    let mut not_included = Vec::new();
+    let mut budget = ModulusBudget::of(&fit.terms);
     if knowledge.zero_error_newtons.is_none() {
-        not_included.push("force zero");
+        budget.add("force zero", None);
     }
-    match calibration_mpa(&read, &fit, &samples, fit_of)? {
-        Some(mpa) => terms.push(("calibration", mpa)),
-        None => not_included.push("calibration"),
-    }
-    match &compliance {
-        Some(applied) if applied.is_applied => {
-            let moved = |one: &LoadingSample| LoadingSample {
-                depth_mm: one.depth_mm - applied.std_error_mm_per_n * one.force_newtons,
-                ..*one
-            };
-            let other = fit_of(&samples.iter().map(moved).collect::<Vec<_>>())?;
-            terms.push(("machine compliance", (other.modulus_mpa - fit.modulus_mpa).abs()));
-        }
-        _ => not_included.push("machine compliance"),
-    }
-    let variance: f64 = terms.iter().map(|(_, mpa)| mpa * mpa).sum();
-    let standard_uncertainty_mpa = variance.sqrt();
-    let half = fit.coverage_factor(variance) * standard_uncertainty_mpa;
-    Ok(UnloadingReport {
-        property: "unloading",
+    budget.add("calibration", calibration_mpa(&read, &fit, &samples, fit_of)?);
+    let applied = compliance.as_ref().filter(|one| one.is_applied);
+    let bent = applied.map(|applied| {
+        let moved = |one: &LoadingSample| LoadingSample {
+            depth_mm: one.depth_mm - applied.std_error_mm_per_n * one.force_newtons,
+            ..*one
+        };
+        let other = fit_of(&samples.iter().map(moved).collect::<Vec<_>>())?;
+        Ok::<_, UnloadingFitError>((other.modulus_mpa - fit.modulus_mpa).abs())
+    });
+    budget.add("machine compliance", bent.transpose()?);
+    let variance = budget.variance();
+    let half = fit.coverage_factor(variance) * variance.sqrt();
+    let press = PressModulus {
         source: request.source.clone(),
         indenter: *indenter,
         specimen,
         modulus_mpa: fit.modulus_mpa,
-        standard_uncertainty_mpa,
+        standard_uncertainty_mpa: variance.sqrt(),
         total95_mpa: [fit.modulus_mpa - half, fit.modulus_mpa + half],
-        budget: budget_rows(terms, variance),
-        not_included,
-        stiffness_n_per_mm: fit.stiffness_n_per_mm,
-        exponent: fit.exponent,
+        budget: budget.rows(),
+        not_included: budget.not_included,
+        samples: fit.fitted.len(),
         depth_mm: samples.first().map_or(0.0, |one| one.depth_mm),
-        contact_depth_mm: fit.contact_depth_mm,
-        contact_area_mm2: fit.contact_area_mm2,
-        samples: fit.samples,
         residual_n: fit.residual_newtons,
         noise_n,
         validity: validity_rows(&fit.validity),
         compliance,
         notes: read.notes,
+        curve: fitted_points(&fit.fitted, &fit.residuals_newtons, 0.0),
+    };
+    Ok(UnloadingReport {
+        property: "unloading",
+        press,
+        stiffness_n_per_mm: fit.stiffness_n_per_mm,
+        exponent: fit.exponent,
+        contact_depth_mm: fit.contact_depth_mm,
+        contact_area_mm2: fit.contact_area_mm2,
+        unloading: samples.iter().map(|one| [one.depth_mm, one.force_newtons]).collect(),
     })
 }
 

@@ -123,7 +123,7 @@ fn a_saved_modulus_is_listed_searched_and_printed_on_the_report() {
     stdout(&typed(at, "report library/press --html page.html"));
     let page = std::fs::read_to_string(at.join("page.html")).unwrap();
     for part in [
-        "Modulus &apos;&lt;b&gt;soft&apos;:",
+        "Material property &apos;&lt;b&gt;soft&apos;:",
         "Poisson&apos;s ratio assumed",
         "Young&apos;s modulus",
     ] {

@@ -271,7 +271,7 @@ impl CatalogEntry {
                     self.named.extend(parameters.into_iter().flatten().filter_map(fitted_value));
                 }
                 AnalysisContent::Material { results, .. } => {
-                    self.named.extend(modulus_value(results));
+                    self.named.extend(moduli(results));
                 }
                 _ => {}
             }
@@ -314,11 +314,14 @@ fn fitted_value(parameter: &Value) -> Option<NamedValue> {
     Some(NamedValue::new(NamedValueSource::Fit, name, (Some(number), unit), number.to_string()))
 }
 
-/// The modulus in a report, as `palpate material --json` prints it.
-fn modulus_value(results: &Value) -> Option<NamedValue> {
-    const NAME: &str = "modulus_mpa";
-    let modulus = results[NAME].as_f64()?;
-    Some(NamedValue::new(NamedValueSource::Fit, NAME, (Some(modulus), ""), modulus.to_string()))
+/// Moduli in a report, as `palpate material --json` prints it: numbers, or objects with a value.
+fn moduli(results: &Value) -> impl Iterator<Item = NamedValue> {
+    let names = ["modulus_mpa", "instantaneous_mpa", "equilibrium_mpa"];
+    names.into_iter().filter_map(|name| {
+        let modulus = results[name].as_f64().or(results[name]["value"].as_f64())?;
+        let text = modulus.to_string();
+        Some(NamedValue::new(NamedValueSource::Fit, name, (Some(modulus), ""), text))
+    })
 }
 
 /// The number in a text such as `20 mm`, converted to its base unit.

@@ -14,9 +14,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 #[derive(Debug)]
-pub struct MasterCurveRequest {
+pub struct MasterCurveRequest<'a> {
     /// One for each session.
-    pub sweeps: Vec<DynamicRequest>,
+    pub sweeps: Vec<DynamicRequest<'a>>,
     /// That of one of the sessions; `None` takes the middle one.
     pub reference_temperature_c: Option<f64>,
 }
@@ -118,7 +118,7 @@ pub fn master_curve(request: &MasterCurveRequest) -> Result<MasterCurveReport, M
         if measured.iter().any(|one| one.report.source == *path) {
             return Err(MasterCurveError::Twice(path.clone()));
         }
-        let report = measure(sweep, None).map_err(|reason| MasterCurveError::Sweep {
+        let report = measure(*sweep, None).map_err(|reason| MasterCurveError::Sweep {
             path: path.clone(),
             reason: Box::new(reason),
         })?;

@@ -32,9 +32,9 @@ use sine::{Moduli, SineContact, SineUncertainty};
 use std::path::PathBuf;
 use thiserror::Error;
 
-#[derive(Debug)]
-pub struct DynamicRequest {
-    pub press: MaterialRequest,
+#[derive(Clone, Copy, Debug)]
+pub struct DynamicRequest<'a> {
+    pub press: &'a MaterialRequest,
     /// Takes all of the record as one sine of this frequency in Hz; `None` takes the sines of a session.
     pub frequency_hz: Option<f64>,
     /// What moves between load cell and specimen, in g.
@@ -141,17 +141,17 @@ pub enum DynamicError {
 }
 
 /// The dynamic moduli of the sines of a session, or of a record that is one sine.
-pub fn dynamic(request: &DynamicRequest) -> Result<DynamicReport, DynamicError> {
-    let press = &request.press;
+pub fn dynamic(request: DynamicRequest) -> Result<DynamicReport, DynamicError> {
+    let press = request.press;
     measure(request, Some(relaxation(RelaxationRequest { press, family: None })))
 }
 
 /// The same beside what the relaxation of the record predicts, where that is asked.
 fn measure(
-    request: &DynamicRequest,
+    request: DynamicRequest,
     predicted: Option<Result<RelaxationReport, RelaxationError>>,
 ) -> Result<DynamicReport, DynamicError> {
-    let press = &request.press;
+    let press = request.press;
     check(request)?;
     let PressRecord { read, compliance, specimen } = read_press(press, RecordStretch::RampHold)?;
     let contact_error_mm = match press.contact {
@@ -225,7 +225,7 @@ fn measure(
     })
 }
 
-fn check(request: &DynamicRequest) -> Result<(), DynamicError> {
+fn check(request: DynamicRequest) -> Result<(), DynamicError> {
     let given = |name, value: f64, is_valid: bool, wanted| match is_valid {
         true => Ok(()),
         false => Err(DynamicError::Value { name, value, wanted }),
@@ -244,8 +244,8 @@ fn check(request: &DynamicRequest) -> Result<(), DynamicError> {
 }
 
 /// Every sine with its samples; without forces that do not count.
-fn read_sines(request: &DynamicRequest) -> Result<CycleSource, DynamicError> {
-    let press = &request.press;
+fn read_sines(request: DynamicRequest) -> Result<CycleSource, DynamicError> {
+    let press = request.press;
     let (path, analysis) = (press.source.as_path(), press.analysis.as_deref());
     if !is_session(path) {
         let mut source = cycles::read(path, press.columns.as_ref())?;

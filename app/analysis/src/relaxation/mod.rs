@@ -85,6 +85,12 @@ pub struct RelaxationReport {
     pub compliance: Option<ComplianceCorrection>,
     #[serde(skip)]
     pub notes: Vec<String>,
+    /// From `seen_from_s` to the end of the record, for a plot.
+    #[serde(skip)]
+    pub modulus_curve: Vec<ModulusAtTime>,
+    /// At the same times.
+    #[serde(skip)]
+    pub creep_curve: Vec<ComplianceAtTime>,
 }
 
 /// A number with its combined standard uncertainty and 95 % interval, all in its unit.
@@ -117,6 +123,16 @@ impl UncertainNumber {
     pub(crate) fn normal(value: f64, standard_uncertainty: f64) -> Self {
         let noise = NoiseError { standard_error: standard_uncertainty, freedom: f64::INFINITY };
         Self::new(value, standard_uncertainty, noise)
+    }
+
+    /// The same in a unit of which there are so many in its own.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            value: factor * self.value,
+            standard_uncertainty: factor * self.standard_uncertainty,
+            total95: self.total95.map(|end| factor * end),
+        }
     }
 }
 
@@ -219,7 +235,8 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
         return Err(RelaxationError::NegativeEquilibrium { mpa: fit.modulus.equilibrium_mpa });
     }
     let seen_from_s = record.seen_from_secs(law, fit);
-    let times = record.decades(seen_from_s);
+    let decades = record.decades(seen_from_s);
+    let times: Vec<f64> = decades.iter().copied().chain(record.plot_times(seen_from_s)).collect();
     let numbers = Numbers::of(fit, &times);
     let noise = numbers.noise(&judged);
     let of_residuals = noise.iter().map(|one| one.standard_error).collect();
@@ -232,7 +249,9 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
             false => sources.push((name, numbers.shifts(fit, &errors))),
         }
     }
-    let found = numbers.combined(&noise, &sources);
+    let mut found = numbers.combined(&noise, &sources);
+    let modulus_curve = found.modulus.split_off(decades.len());
+    let creep_curve = found.creep.compliance.split_off(decades.len());
     let is_fractional = fit.family == RelaxationFamily::Fractional;
     let validity = press.law.validity(&press.indenter, &specimen, record.deepest());
     let validity = validity_rows(&validity.map_err(LoadHistoryError::from)?);
@@ -267,6 +286,8 @@ pub fn relaxation(request: RelaxationRequest) -> Result<RelaxationReport, Relaxa
         validity,
         compliance,
         notes: read.notes,
+        modulus_curve,
+        creep_curve,
     })
 }
 

@@ -77,6 +77,8 @@ pub(super) struct Source {
 /// The press begins at the contact before this share of its greatest depth, and ends where it is less deep than before by as
 /// much: a contact that shrinks is beyond Lee and Radok. A slider at rest trembles by less.
 const DEPTH_SHARE: f64 = 0.02;
+/// Fifteen in each of four decades: a term bends over one.
+const PLOT_TIMES: u32 = 61;
 /// A session that pauses for so many of its intervals moved in between, as in a sine.
 const PAUSE_INTERVALS: f64 = 50.0;
 
@@ -149,6 +151,13 @@ impl Record {
         let first = from_secs.log10().ceil() as i32;
         let last = self.secs().log10().floor() as i32;
         (first..=last).map(|power| 10f64.powi(power)).collect()
+    }
+
+    /// As many times in s from one to the end of the record as a curve over their logarithm needs.
+    pub fn plot_times(&self, from_secs: f64) -> Vec<f64> {
+        let ratio = self.secs() / from_secs;
+        let share = |index: u32| f64::from(index) / f64::from(PLOT_TIMES - 1);
+        (0..PLOT_TIMES).map(|index| from_secs * ratio.powf(share(index))).collect()
     }
 
     /// Everything but the noise.

@@ -1,74 +1,70 @@
-//! A modulus as people read it: the number first, and every assumption under it.
+//! A modulus as people read it, and the words that every property of a press has.
 
-use crate::material::{LoadingLackOfFit, MaterialBudgetRow, MaterialReport, ValidityRow};
+use super::property::{NumberInPrint, NumberLine, PropertySections};
+use crate::material::{LoadingLackOfFit, MaterialReport};
+use crate::press_modulus::{MaterialBudgetRow, PressModulus};
+use crate::relaxation::UncertainNumber;
 use palpate_figures::uncertain::{error_alone, significant, with_error};
 use palpate_indentation::{
     Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
 };
 
 /// What no budget has.
-pub const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
+const RELAXES: &str = "elastic: tissue that relaxes is stiffer the faster it is pressed, so state the loading time with the modulus";
 
-#[must_use]
-pub fn material_text(report: &MaterialReport) -> String {
-    let line = |name: &str, words: &str| format!("{name:<17}{words}");
-    let mut lines = vec![line(
-        "Young's modulus",
-        &format!("{}, {}", modulus_words(report), interval_words(report)),
-    )];
-    lines.extend(report.lack_of_fit.map(|lack| line("lack of fit", &lack_words(lack))));
-    lines.extend(assumptions(report).iter().map(|(name, words)| line(name, words)));
-    lines.extend(report.validity.iter().map(validity_line));
-    lines.extend(report.budget.iter().map(budget_line));
-    lines.extend(not_included_line(&report.not_included));
-    lines.push(RELAXES.into());
-    lines.join("\n")
+pub(super) fn sections(report: &MaterialReport) -> PropertySections {
+    let lack = report.lack_of_fit.map(|lack| ("lack of fit".to_owned(), lack_words(lack)));
+    PropertySections {
+        warnings: lack.into_iter().collect(),
+        assumptions: named([
+            ("law", law_words(report.law).to_owned()),
+            ("indenter", indenter_words(&report.press.indenter)),
+            ("specimen", specimen_words(&report.press.specimen)),
+            ("loading", loading_words(report)),
+            ("contact", contact_words(report)),
+            ("force zero", zero_words(report)),
+        ]),
+        remarks: vec![RELAXES],
+        ..press_sections(&report.press)
+    }
 }
 
-pub(super) fn validity_line(row: &ValidityRow) -> String {
-    format!("valid            {} {}, at most {}", row.ratio, significant(row.value, 3), row.max)
+/// What every Young's modulus of a press has.
+pub(super) fn press_sections(press: &PressModulus) -> PropertySections {
+    let title = "Young's modulus";
+    let mpa = UncertainNumber {
+        value: press.modulus_mpa,
+        standard_uncertainty: press.standard_uncertainty_mpa,
+        total95: press.total95_mpa,
+    };
+    let row = |row: &MaterialBudgetRow| {
+        let MaterialBudgetRow { source, mpa, percent } = *row;
+        let kpa = format!("{} kPa", error_alone(kpa(mpa)));
+        vec![source.to_owned(), kpa, format!("{percent:.0} % of the variance")]
+    };
+    PropertySections {
+        title,
+        numbers: vec![alone(title, in_kpa("", mpa))],
+        warnings: Vec::new(),
+        assumptions: Vec::new(),
+        validity: press.validity.clone(),
+        budget: press.budget.iter().map(row).collect(),
+        not_included: press.not_included.clone(),
+        remarks: Vec::new(),
+    }
 }
 
-pub(super) fn budget_line(row: &MaterialBudgetRow) -> String {
-    let MaterialBudgetRow { source, percent, .. } = row;
-    format!("uncertainty      {source:<18} {:>8} kPa  {percent:>3.0} %", budget_kpa(row))
+pub(super) fn named<const N: usize>(words: [(&str, String); N]) -> Vec<(String, String)> {
+    words.map(|(name, words)| (name.to_owned(), words)).into()
 }
 
-/// Nothing where the budget has everything.
-pub(super) fn not_included_line(names: &[&str]) -> Option<String> {
-    (!names.is_empty()).then(|| format!("not included     {}", names.join(", ")))
+/// A number that has the line to itself.
+pub(super) fn alone(name: &str, number: NumberInPrint) -> NumberLine {
+    NumberLine { name: name.to_owned(), numbers: vec![number] }
 }
 
-/// The modulus with its standard uncertainty.
-#[must_use]
-pub fn modulus_words(report: &MaterialReport) -> String {
-    let modulus = with_error(kpa(report.modulus_mpa), kpa(report.standard_uncertainty_mpa));
-    format!("{modulus} kPa")
-}
-
-#[must_use]
-pub fn interval_words(report: &MaterialReport) -> String {
-    let [low, high] = report.total95_mpa.map(|end| significant(kpa(end), 4));
-    format!("95 % interval {low} to {high} kPa")
-}
-
-/// What the modulus rests on: a name and its words each.
-#[must_use]
-pub fn assumptions(report: &MaterialReport) -> Vec<(&'static str, String)> {
-    vec![
-        ("law", law_words(report.law).to_owned()),
-        ("indenter", indenter_words(&report.indenter)),
-        ("specimen", specimen_words(&report.specimen)),
-        ("loading", loading_words(report)),
-        ("contact", contact_words(report)),
-        ("force zero", zero_words(report)),
-    ]
-}
-
-/// Standard uncertainty in kPa that a source adds.
-#[must_use]
-pub fn budget_kpa(row: &MaterialBudgetRow) -> String {
-    error_alone(kpa(row.mpa))
+pub(super) fn in_kpa(name: &'static str, mpa: UncertainNumber) -> NumberInPrint {
+    NumberInPrint { name, number: mpa.scaled(1e3), unit: "kPa" }
 }
 
 pub(super) fn kpa(mpa: f64) -> f64 {
@@ -76,8 +72,7 @@ pub(super) fn kpa(mpa: f64) -> f64 {
 }
 
 /// How the law misses the loading.
-#[must_use]
-pub fn lack_words(lack: LoadingLackOfFit) -> String {
+fn lack_words(lack: LoadingLackOfFit) -> String {
     let LoadingLackOfFit { residual_over_noise, halves_mpa: [shallow, deep] } = lack;
     format!(
         "residuals are {} times the noise: the shallow half alone gives {} kPa, the deep half {} kPa; the interval counts the misfit as noise that lasts",
@@ -179,13 +174,13 @@ pub(super) fn force(newtons: f64) -> String {
 }
 
 fn loading_words(report: &MaterialReport) -> String {
-    let noise = report.noise_n.map(|noise| format!(", noise {}", force(noise)));
+    let noise = report.press.noise_n.map(|noise| format!(", noise {}", force(noise)));
     format!(
         "to {} in {} s, {} samples; residuals {}{}",
-        length(report.depth_mm),
+        length(report.press.depth_mm),
         significant(report.loading_s, 3),
-        report.samples,
-        force(report.residual_n),
+        report.press.samples,
+        force(report.press.residual_n),
         noise.unwrap_or_default(),
     )
 }

@@ -7,7 +7,7 @@ pub mod calibration_plot;
 pub mod catalog;
 pub mod cycles;
 pub mod dossier;
-pub mod dynamic;
+mod dynamic;
 #[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod figures;
@@ -16,15 +16,16 @@ pub mod fit_json;
 pub mod haptics;
 pub mod live;
 pub mod master_curve;
-pub mod material;
-pub mod material_plot;
+mod material;
 pub mod panels;
 pub mod picture;
 pub mod plan_picture;
 pub mod plan_plot;
 pub mod programme;
+pub mod property;
+pub mod property_plot;
 pub mod queue;
-pub mod relaxation;
+mod relaxation;
 pub mod scatter;
 #[cfg(feature = "haptics")]
 pub mod scene;
@@ -34,6 +35,6 @@ pub mod session;
 pub mod session_text;
 pub mod stored_analysis;
 pub mod text;
-pub mod unloading;
+mod unloading;
 
 pub use selection_plot::of_selection;

@@ -1,106 +1,96 @@
 //! A relaxation modulus as people read it: the numbers first, and every assumption under them.
 
 use super::material::{
-    force, indenter_words, kpa, law_words, length, not_included_line, specimen_words, validity_line,
+    alone, force, in_kpa, indenter_words, kpa, law_words, length, named, specimen_words,
 };
-use crate::relaxation::{RelaxationReport, TermCandidate, TermChoice, UncertainNumber};
-use palpate_figures::uncertain::{error_alone, significant, with_error};
+use super::property::{NumberInPrint, NumberLine, PropertySections};
+use crate::relaxation::{
+    RelaxationBudgetRow, RelaxationReport, TermCandidate, TermChoice, UncertainNumber,
+};
+use palpate_figures::uncertain::{error_alone, significant};
 
 const POISSON: &str = "assumed: Poisson's ratio is the same at all times";
 /// Hu, Zhao, Vlassak and Suo, Appl. Phys. Lett. 96 (2010) 121904: the time of flow grows with the square of the contact radius.
 const FLOW: &str = "one record cannot tell: a fluid that flows out of the specimen relaxes the force as viscoelasticity does; a second radius tells them apart";
 
-#[must_use]
-pub fn relaxation_text(report: &RelaxationReport) -> String {
-    let mut lines = vec![
-        modulus_line("G instantaneous", report.instantaneous_mpa),
-        modulus_line("G equilibrium", report.equilibrium_mpa),
-    ];
-    for (number, term) in report.terms.iter().enumerate() {
-        lines.push(format!(
-            "{:<16} {} kPa with the relaxation time {} s",
-            format!("term {}", number + 1),
-            with_uncertainty(scaled(term.modulus_mpa, 1e3)),
-            with_uncertainty(term.time_s),
-        ));
-    }
-    lines.extend(report.exponent.map(exponent_words));
+pub(super) fn sections(report: &RelaxationReport) -> PropertySections {
+    let lack = report.lack_of_fit.map(|lack| ("lack of fit".to_owned(), lack_words(lack)));
     let instantaneous = match report.exponent {
         Some(_) => "what is faster is extrapolated, as the instantaneous G",
         None => {
             "what relaxes faster is in no number, and the instantaneous G is the sum of the terms"
         }
     };
-    let seen_from = significant(report.seen_from_s, 2);
-    lines.push(format!("seen from        {seen_from} s on: {instantaneous}"));
-    let both = report.modulus.iter().zip(&report.creep.compliance);
-    lines.extend(both.map(|(modulus, compliance)| {
-        format!(
-            "{:<16} G {} kPa, J {} /kPa",
-            format!("at {} s", modulus.t_s),
-            with_uncertainty(scaled(modulus.mpa, 1e3)),
-            with_uncertainty(scaled(compliance.per_mpa, 1e-3)),
-        )
+    let seen = format!("{} s on: {instantaneous}", significant(report.seen_from_s, 2));
+    let mut assumptions = named([
+        ("seen from", seen),
+        ("law", law_words(report.law).to_owned()),
+        ("indenter", indenter_words(&report.indenter)),
+        ("specimen", specimen_words(&report.specimen)),
+        ("record", record_words(report)),
+    ]);
+    let choice = report.term_choice.as_ref();
+    assumptions.extend(choice.map(|choice| ("number of terms".to_owned(), choice_words(choice))));
+    PropertySections {
+        title: "Relaxation modulus",
+        numbers: number_lines(report),
+        warnings: lack.into_iter().collect(),
+        assumptions,
+        validity: report.validity.clone(),
+        budget: report.budget.iter().map(budget_row).collect(),
+        not_included: report.not_included.clone(),
+        remarks: vec![POISSON, FLOW],
+    }
+}
+
+fn number_lines(report: &RelaxationReport) -> Vec<NumberLine> {
+    let mut lines = vec![
+        alone("G instantaneous", in_kpa("", report.instantaneous_mpa)),
+        alone("G equilibrium", in_kpa("", report.equilibrium_mpa)),
+    ];
+    let terms = report.terms.iter().zip(&report.creep.terms).enumerate();
+    lines.extend(terms.map(|(index, (term, creep))| NumberLine {
+        name: format!("term {}", index + 1),
+        numbers: vec![
+            in_kpa("G", term.modulus_mpa),
+            in_seconds("relaxation time", term.time_s),
+            per_kpa(creep.compliance_per_mpa),
+            in_seconds("retardation time", creep.time_s),
+        ],
     }));
-    for term in &report.creep.terms {
-        lines.push(format!(
-            "creep            {} /kPa with the retardation time {} s",
-            with_uncertainty(scaled(term.compliance_per_mpa, 1e-3)),
-            with_uncertainty(term.time_s),
-        ));
-    }
-    lines.extend(report.lack_of_fit.map(lack_words));
-    lines.extend(report.term_choice.as_ref().map(choice_words));
-    lines.push(format!("law              {}", law_words(report.law)));
-    lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
-    lines.push(format!("specimen         {}", specimen_words(&report.specimen)));
-    lines.push(format!("record           {}", record_words(report)));
-    lines.extend(report.validity.iter().map(validity_line));
-    for row in &report.budget {
-        lines.push(format!(
-            "uncertainty      {:<18} instantaneous {:>8} kPa, equilibrium {:>8} kPa",
-            row.source,
-            error_alone(kpa(row.instantaneous_mpa)),
-            error_alone(kpa(row.equilibrium_mpa)),
-        ));
-    }
-    lines.extend(not_included_line(&report.not_included));
-    lines.extend([POISSON, FLOW].map(String::from));
-    lines.join("\n")
+    lines.extend(report.exponent.map(|exponent| NumberLine {
+        name: "exponent".to_owned(),
+        numbers: vec![NumberInPrint { name: "", number: exponent, unit: "" }],
+    }));
+    let times = report.modulus.iter().zip(&report.creep.compliance);
+    lines.extend(times.map(|(modulus, compliance)| NumberLine {
+        name: format!("at {} s", modulus.t_s),
+        numbers: vec![in_kpa("G", modulus.mpa), per_kpa(compliance.per_mpa)],
+    }));
+    lines
 }
 
-fn scaled(number: UncertainNumber, factor: f64) -> UncertainNumber {
-    UncertainNumber {
-        value: factor * number.value,
-        standard_uncertainty: factor * number.standard_uncertainty,
-        total95: number.total95.map(|end| factor * end),
-    }
+fn in_seconds(name: &'static str, number: UncertainNumber) -> NumberInPrint {
+    NumberInPrint { name, number, unit: "s" }
 }
 
-fn with_uncertainty(number: UncertainNumber) -> String {
-    with_error(number.value, number.standard_uncertainty)
+fn per_kpa(per_mpa: UncertainNumber) -> NumberInPrint {
+    NumberInPrint { name: "J", number: per_mpa.scaled(1e-3), unit: "/kPa" }
 }
 
-fn modulus_line(name: &str, mpa: UncertainNumber) -> String {
-    let number = scaled(mpa, 1e3);
-    format!(
-        "{name:<16} {} kPa, 95 % interval {} to {} kPa",
-        with_uncertainty(number),
-        significant(number.total95[0], 4),
-        significant(number.total95[1], 4),
-    )
-}
-
-fn exponent_words(exponent: UncertainNumber) -> String {
-    format!(
-        "exponent         {} of the fractional Zener model: the term relaxes and creeps by the Mittag-Leffler function of this exponent",
-        with_uncertainty(exponent)
-    )
+fn budget_row(row: &RelaxationBudgetRow) -> Vec<String> {
+    let [instantaneous, equilibrium] =
+        [row.instantaneous_mpa, row.equilibrium_mpa].map(|mpa| error_alone(kpa(mpa)));
+    vec![
+        row.source.to_owned(),
+        format!("instantaneous {instantaneous} kPa"),
+        format!("equilibrium {equilibrium} kPa"),
+    ]
 }
 
 fn lack_words(residual_over_noise: f64) -> String {
     format!(
-        "lack of fit      residuals are {} times the noise; the intervals allow for their autocorrelation, not for a wrong law",
+        "residuals are {} times the noise; the intervals allow for their autocorrelation, not for a wrong law",
         significant(residual_over_noise, 3),
     )
 }
@@ -111,7 +101,7 @@ fn choice_words(choice: &TermChoice) -> String {
     let candidates: Vec<String> = choice.candidates.iter().map(candidate).collect();
     let refused = choice.refused.as_ref().map(|reason| format!("; more are refused: {reason}"));
     format!(
-        "number of terms  by the Bayesian criterion above its lowest: {}{}",
+        "by the Bayesian criterion above its lowest: {}{}",
         candidates.join(", "),
         refused.unwrap_or_default()
     )

@@ -1,16 +1,16 @@
-//! A modulus of a session, and its stored form.
+//! A property of the material of a session, and its stored form.
 
 use super::actions::keep;
 use super::{Attribution, SessionActionError};
 use crate::analysed_session;
-use crate::material::{MaterialReport, MaterialRequest};
 use crate::material_lake::error_setting;
-use crate::report::material::material_text;
+use crate::property::{Property, PropertyReport, PropertyRequest};
+use crate::report::property::property_text;
 use palpate_sessions::analyses::{Analysis, AnalysisContent, MATERIAL_VERSION};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// A modulus that can be stored with its session.
+/// A property that can be stored with its session.
 #[derive(Clone, Debug)]
 pub struct MaterialToStore {
     session: PathBuf,
@@ -22,20 +22,28 @@ pub struct MaterialToStore {
 
 impl MaterialToStore {
     #[must_use]
-    pub fn of(request: &MaterialRequest, report: &MaterialReport) -> Self {
+    pub fn of(request: &PropertyRequest, report: &PropertyReport) -> Self {
+        let press = &request.press;
         // Everything else that was asked for is in the report.
-        let settings = json!({
-            "depth_max_mm": request.depth_max_mm,
-            "contact": error_setting(request.contact),
-            "force_zero": error_setting(request.force_zero),
-            "include_rejected": request.is_rejected_included,
+        let mut settings = json!({
+            "depth_max_mm": press.depth_max_mm,
+            "contact": error_setting(press.contact),
+            "force_zero": error_setting(press.force_zero),
+            "include_rejected": press.is_rejected_included,
         });
+        match request.property {
+            Property::Modulus | Property::Unloading => {}
+            Property::Relaxation { term_count } => settings["terms"] = json!(term_count),
+            Property::Dynamic { frequency_hz, .. } => {
+                settings["frequency_hz"] = json!(frequency_hz);
+            }
+        }
         Self {
-            session: request.source.clone(),
-            based_on: request.analysis.clone(),
+            session: press.source.clone(),
+            based_on: press.analysis.clone(),
             settings,
             results: json!(report),
-            words: material_text(report),
+            words: property_text(report),
         }
     }
 

@@ -128,7 +128,7 @@ fn failure(err: LakeFitError) -> Failure {
         }
         LakeFitError::Keep(err) => export::failure(err),
         LakeFitError::NotFitted(SourceFitError::Source(err)) => source_failure(err),
-        LakeFitError::NoModulus(err) => material::failure(err),
+        LakeFitError::NoModulus(err) => material::failure::of_press(err),
         _ => Failure::failed(err),
     }
 }

@@ -1,24 +1,22 @@
 //! `palpate material`: the moduli of a press by a contact law.
 
-mod dynamic;
-mod master_curve;
-mod relaxation;
-mod unloading;
+pub(super) mod failure;
 
 use super::arguments::{Choice, choice, parse_columns, parse_number, positive};
 use super::fit::{jobs, lake, saved};
 use super::output::Output;
 use super::recalibrate::{self, AuthorArgs};
-use super::{Failure, compliance, source_failure};
+use super::{Failure, compliance};
 use clap::Args;
-use palpate_analysis::dynamic::{DynamicRequest, MasterCurveRequest};
-use palpate_analysis::material::{ErrorSource, MaterialError, MaterialRequest, material};
+use palpate_analysis::dynamic::{DynamicRequest, MasterCurveRequest, master_curve};
+use palpate_analysis::material::{ErrorSource, MaterialRequest};
 use palpate_analysis::material_lake::{LakeMaterialRequest, material_lake};
-use palpate_analysis::report::material::material_text;
+use palpate_analysis::property::{Property, PropertyRequest, find_property};
+use palpate_analysis::report::master_curve::master_curve_text;
+use palpate_analysis::report::property::property_text;
 use palpate_analysis::session_actions::MaterialToStore;
 use palpate_indentation::{
-    Base, ContactLaw, Indenter, LoadingFitError, PoissonBasis, PyramidFaces, Quantity,
-    RelaxationFamily,
+    Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, RelaxationFamily,
 };
 use palpate_tables::lake::{Shard, is_lake};
 use std::num::NonZeroUsize;
@@ -33,7 +31,7 @@ pub struct MaterialArgs {
     sources: Vec<PathBuf>,
     /// What is found of the material
     #[arg(long, value_parser = choice(PROPERTIES), default_value = "modulus")]
-    property: Property,
+    property: PropertyWord,
     /// Shape of the indenter
     #[arg(long, value_parser = choice(INDENTERS))]
     indenter: IndenterWord,
@@ -103,7 +101,7 @@ pub struct MaterialArgs {
     /// Temperature in degrees Celsius at which a master curve is; without it the middle one of its sessions
     #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true)]
     reference_temperature: Option<f64>,
-    /// Save the modulus of the loading as an analysis of this name with its session
+    /// Save the property as an analysis of this name with its session
     #[arg(long, value_name = "NAME")]
     save: Option<String>,
     #[command(flatten)]
@@ -117,7 +115,7 @@ pub struct MaterialArgs {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Property {
+enum PropertyWord {
     Modulus,
     Unloading,
     Relaxation,
@@ -125,14 +123,14 @@ enum Property {
     MasterCurve,
 }
 
-const PROPERTIES: &[Choice<Property>] = &[
-    ("modulus", Property::Modulus, "Young's modulus of the loading"),
-    ("unloading", Property::Unloading, "Young's modulus of the unloading, by Oliver and Pharr"),
-    ("relaxation", Property::Relaxation, "the relaxation modulus of ramp and hold"),
-    ("dynamic", Property::Dynamic, "storage and loss modulus of sines"),
+const PROPERTIES: &[Choice<PropertyWord>] = &[
+    ("modulus", PropertyWord::Modulus, "Young's modulus of the loading"),
+    ("unloading", PropertyWord::Unloading, "Young's modulus of the unloading, by Oliver and Pharr"),
+    ("relaxation", PropertyWord::Relaxation, "the relaxation modulus of ramp and hold"),
+    ("dynamic", PropertyWord::Dynamic, "storage and loss modulus of sines"),
     (
         "master-curve",
-        Property::MasterCurve,
+        PropertyWord::MasterCurve,
         "those of sessions at several temperatures, as one curve",
     ),
 ];
@@ -177,57 +175,76 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     check_flags(args)?;
     // The command line has one source at least.
     let source = &args.sources[0];
-    if args.sources.len() > 1 && args.property != Property::MasterCurve {
+    if args.sources.len() > 1 && args.property != PropertyWord::MasterCurve {
         return Err(Failure::usage(
             "only a master curve takes several sources; give one, or --property master-curve",
         ));
     }
-    let request = request(args, source)?;
+    let press = request(args, source)?;
     if is_lake(source) {
-        return over_lake(args, &request, output);
+        return over_lake(args, &press, output);
     }
     if args.shard.is_some() {
         return Err(Failure::usage("--shard needs a lake; give a lake, or leave out --shard"));
     }
-    match args.property {
-        Property::Modulus => modulus(args, &request, output),
-        Property::Unloading => unloading::run(&request, output),
-        Property::Relaxation => relaxation::run(&request, family(args)?, output),
-        Property::Dynamic => dynamic::run(&dynamic_request(args, request), output),
-        Property::MasterCurve => master_curve::run(&master_curve_request(args)?, output),
-    }
-}
-
-fn dynamic_request(args: &MaterialArgs, press: MaterialRequest) -> DynamicRequest {
-    let (frequency_hz, moving_mass_g) = (args.frequency, args.moving_mass);
-    DynamicRequest { press, frequency_hz, moving_mass_g }
-}
-
-fn master_curve_request(args: &MaterialArgs) -> Result<MasterCurveRequest, Failure> {
-    let sweep = |source: &PathBuf| Ok(dynamic_request(args, request(args, source)?));
-    let sweeps: Result<Vec<_>, Failure> = args.sources.iter().map(sweep).collect();
-    Ok(MasterCurveRequest { sweeps: sweeps?, reference_temperature_c: args.reference_temperature })
-}
-
-fn modulus(args: &MaterialArgs, request: &MaterialRequest, output: &Output) -> Result<(), Failure> {
-    saved::check(args.save.as_ref(), &request.source)?;
-    let report = material(request).map_err(failure)?;
+    let property = match args.property {
+        PropertyWord::Modulus => Property::Modulus,
+        PropertyWord::Unloading => Property::Unloading,
+        PropertyWord::Relaxation => Property::Relaxation { family: family(args)? },
+        PropertyWord::Dynamic => {
+            Property::Dynamic { frequency_hz: args.frequency, moving_mass_g: args.moving_mass }
+        }
+        PropertyWord::MasterCurve => return sweeps_at_temperatures(args, output),
+    };
+    saved::check(args.save.as_ref(), source)?;
+    let request = PropertyRequest { press, property };
+    let report = find_property(&request).map_err(failure::of_property)?;
     if let Some(name) = &args.save {
-        let stored = MaterialToStore::of(request, &report).store(name, &args.author.author());
+        let stored = MaterialToStore::of(&request, &report).store(name, &args.author.author());
         stored.map_err(recalibrate::analysis_edit_failure)?;
     }
-    report.notes.iter().for_each(|note| output.note(note));
+    report.notes().iter().for_each(|note| output.note(note));
     output.answer("material", &report, || {
         let saved = args.save.iter().map(|name| format!("saved as analysis '{name}'"));
-        [material_text(&report)].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
+        [property_text(&report)].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
     });
     Ok(())
+}
+
+/// The sweeps of sessions at several temperatures as one curve.
+fn sweeps_at_temperatures(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
+    let presses: Result<Vec<_>, Failure> =
+        args.sources.iter().map(|source| request(args, source)).collect();
+    let presses = presses?;
+    let sweep = |press| DynamicRequest {
+        press,
+        frequency_hz: args.frequency,
+        moving_mass_g: args.moving_mass,
+    };
+    let request = MasterCurveRequest {
+        sweeps: presses.iter().map(sweep).collect(),
+        reference_temperature_c: args.reference_temperature,
+    };
+    let report = master_curve(&request).map_err(failure::of_master_curve)?;
+    report.notes.iter().for_each(|note| output.note(note));
+    output.answer("material", &report, || master_curve_text(&report));
+    Ok(())
+}
+
+fn family(args: &MaterialArgs) -> Result<Option<RelaxationFamily>, Failure> {
+    match (args.family, args.terms) {
+        (Some(FamilyWord::Fractional), None) => Ok(Some(RelaxationFamily::Fractional)),
+        (Some(FamilyWord::Fractional), Some(_)) => {
+            Err(Failure::usage("--terms belongs to --family prony; leave it out"))
+        }
+        (_, terms) => Ok(terms.map(|terms| RelaxationFamily::Prony { terms })),
+    }
 }
 
 /// Fits the sessions of a lake, or of one shard, and stores the moduli in the lake.
 fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> Result<(), Failure> {
     lake::refuse_options(&[
-        ("--property", args.property != Property::Modulus),
+        ("--property", args.property != PropertyWord::Modulus),
         ("--columns", args.columns.is_some()),
         ("--save", args.save.is_some()),
         ("--analysis", args.analysis.is_some()),
@@ -245,10 +262,9 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
 
 /// A flag that belongs to another property.
 fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
-    use Property::{Dynamic, MasterCurve, Modulus, Relaxation, Unloading};
-    let given: [(&str, bool, &[Property], &str); 10] = [
+    use PropertyWord::{Dynamic, MasterCurve, Modulus, Relaxation, Unloading};
+    let given: [(&str, bool, &[PropertyWord], &str); 10] = [
         ("depth-max", args.depth_max.is_some(), &[Modulus], "the modulus of a loading"),
-        ("save", args.save.is_some(), &[Modulus], "the modulus of a loading"),
         ("zero-error", args.zero_error.is_some(), &[Modulus, Unloading], "a Young's modulus"),
         (
             "law",
@@ -266,9 +282,10 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
             &[MasterCurve],
             "a master curve",
         ),
+        ("save", args.save.is_some() && args.property == MasterCurve, &[], "one session"),
         ("analysis", args.analysis.is_some() && args.property == MasterCurve, &[], "one session"),
     ];
-    let is_wrong = |own: &[Property]| !own.contains(&args.property);
+    let is_wrong = |own: &[PropertyWord]| !own.contains(&args.property);
     let wrong = given.into_iter().find(|(_, is_given, own, _)| *is_given && is_wrong(own));
     wrong.map_or(Ok(()), |(flag, .., of)| {
         Err(Failure::usage(format!("--{flag} belongs to {of}; leave it out")))
@@ -276,7 +293,6 @@ fn check_flags(args: &MaterialArgs) -> Result<(), Failure> {
 }
 
 fn request(args: &MaterialArgs, source: &Path) -> Result<MaterialRequest, Failure> {
-        ("family", args.family.is_some(), &[Relaxation], "a relaxation modulus"),
     Ok(MaterialRequest {
         source: source.to_owned(),
         columns: parse_columns(args.columns.as_deref())?,
@@ -296,24 +312,6 @@ fn request(args: &MaterialArgs, source: &Path) -> Result<MaterialRequest, Failur
         contact: args.contact_error.unwrap_or(ErrorSource::Recorded),
         force_zero: args.zero_error.unwrap_or(ErrorSource::Recorded),
     })
-}
-
-pub(super) fn failure(err: MaterialError) -> Failure {
-    match err {
-        MaterialError::Source(err) => source_failure(err),
-        // The record has no answer, whatever is given.
-        MaterialError::Fit(
-            LoadingFitError::NoContact
-            | LoadingFitError::ContactMoved { .. }
-            | LoadingFitError::ZeroMoved { .. }
-            | LoadingFitError::Samples { .. },
-        ) => Failure::failed(err),
-        MaterialError::TooDeep { reason, depth_max_mm } => Failure::usage(format!(
-            "{reason}; for this indenter and specimen give --depth-max {depth_max_mm} or less"
-        )),
-        MaterialError::NoThickness => Failure::usage(format!("{err}; give --thickness")),
-        err => Failure::usage(err),
-    }
 }
 
 fn indenter(args: &MaterialArgs) -> Result<Indenter, Failure> {

@@ -27,7 +27,9 @@ pub struct UnloadingFit {
     pub contact_depth_mm: f64,
     pub contact_area_mm2: f64,
     /// Samples of the part that was fitted.
-    pub samples: usize,
+    pub fitted: Vec<LoadingSample>,
+    /// Forces of those samples less the power's, in N.
+    pub residuals_newtons: Vec<f64>,
     /// Root mean square of the residuals in N.
     pub residual_newtons: f64,
     /// What each source adds, in MPa.
@@ -113,11 +115,12 @@ pub fn fit_unloading(
         exponent: power[2],
         contact_depth_mm: contact.depth_mm,
         contact_area_mm2: contact.area_mm2,
-        samples: unloading.forces.len(),
+        residuals_newtons: unloading.residuals(power),
         residual_newtons,
         terms,
         noise_freedom: noise.freedom,
         validity,
+        fitted: unloading.fitted,
     })
 }
 
@@ -132,6 +135,7 @@ impl UnloadingFit {
 /// The part of an unloading that is fitted.
 #[derive(Clone)]
 struct Unloading {
+    fitted: Vec<LoadingSample>,
     depths: Vec<f64>,
     forces: Vec<f64>,
     /// Where it begins.
@@ -145,13 +149,17 @@ impl Unloading {
         let [low, high] = SHARES.map(|share| share * top.force_newtons);
         let until = samples.iter().position(|one| one.force_newtons < low);
         let all = &samples[..until.unwrap_or(samples.len())];
-        let taken = || all.iter().filter(|one| one.force_newtons <= high);
-        let depths: Vec<f64> = taken().map(|one| one.depth_mm).collect();
-        if depths.len() < SAMPLES_MIN || top.force_newtons <= 0.0 {
-            return Err(few(depths.len()));
+        let fitted: Vec<LoadingSample> =
+            all.iter().copied().filter(|one| one.force_newtons <= high).collect();
+        if fitted.len() < SAMPLES_MIN || top.force_newtons <= 0.0 {
+            return Err(few(fitted.len()));
         }
-        let forces = taken().map(|one| one.force_newtons).collect();
-        Ok(Self { depths, forces, top_mm: top.depth_mm })
+        Ok(Self {
+            depths: fitted.iter().map(|one| one.depth_mm).collect(),
+            forces: fitted.iter().map(|one| one.force_newtons).collect(),
+            fitted,
+            top_mm: top.depth_mm,
+        })
     }
 
     /// Force and how it changes with each number of the power.

@@ -143,7 +143,7 @@ pub(super) fn afterwards(body: &mut HtmlBody, subject: &ReportSubject, level: u8
                 body.list(stored_analysis::sentences(results).iter().map(String::as_str));
             }
             AnalysisContent::Material { words, .. } => {
-                body.paragraph(&format!("Modulus '{}':", one.name));
+                body.paragraph(&format!("Material property '{}':", one.name));
                 body.pre(words);
             }
             _ => {}
