@@ -22,6 +22,7 @@ use palpate_window::app::WorkbenchApp;
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::material::MaterialScreen;
 use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::screen::Screen;
 use palpate_window::screens::table::screens;
 use palpate_window::window::WindowOptions;
 use std::path::{Path, PathBuf};
@@ -194,24 +195,66 @@ fn fit_modulus(window: &mut Window) {
     }
     window.get_by_label("a part of the loading only").click_accesskit();
     window.run_steps(2);
-    for (name, text) in [
-        ("radius", "6.00"),
-        ("uncertainty of radius", "0.02"),
-        ("thickness", "60.0"),
-        ("uncertainty of thickness", "0.5"),
-        ("Poisson", "0.49"),
-        ("uncertainty of Poisson", "0.01"),
-        ("depth", "0.9"),
-    ] {
+    type_fields(
+        window,
+        &[
+            ("radius", "6.00"),
+            ("uncertainty of radius", "0.02"),
+            ("thickness", "60.0"),
+            ("uncertainty of thickness", "0.5"),
+            ("Poisson", "0.49"),
+            ("uncertainty of Poisson", "0.01"),
+            ("depth", "0.9"),
+        ],
+    );
+    fit_and_wait(window);
+}
+
+/// Other properties than that of the loading, with names of their pictures.
+const PROPERTIES: [(&str, &str); 2] =
+    [("relaxation modulus", "relaxation"), ("dynamic moduli", "dynamic")];
+
+/// Fits a property of a session under a blunt cone on the material screen.
+fn fit_property(window: &mut Window, session: &Path, property: &str) {
+    window.key_press_modifiers(Modifiers::COMMAND, Key::M);
+    window.run_steps(3);
+    for (list, choice) in [("property", property), ("shape", "cone")] {
+        if window.query_by_label(choice).is_none() {
+            window.get_by_label(list).click_accesskit();
+            window.run_steps(3);
+        }
+        window.get_by_label(choice).click_accesskit();
+        window.run_steps(3);
+    }
+    type_fields(
+        window,
+        &[
+            ("session", &session.display().to_string()),
+            ("half angle", "80.0"),
+            ("uncertainty of half angle", "0.2"),
+            ("thickness", "500"),
+            ("uncertainty of thickness", "5"),
+        ],
+    );
+    fit_and_wait(window);
+}
+
+fn type_fields(window: &mut Window, fields: &[(&str, &str)]) {
+    for (name, text) in fields {
         window.get_by_label(name).focus();
         window.step();
         window.get_by_label(name).set_text_value_accesskit(text);
         window.run_steps(2);
     }
+}
+
+fn fit_and_wait(window: &mut Window) {
     window.get_by_label("Fit modulus  F6").click_accesskit();
+    window.run_steps(2);
     for _ in 0..FRAMES_MAX {
         window.step();
-        if screen_of::<MaterialScreen>(window).fitted().is_some() {
+        let screen = screen_of::<MaterialScreen>(window);
+        if !screen.is_busy() && screen.fitted().is_some() {
             window.get_by_label("Fit modulus  F6").focus();
             window.run_steps(2);
             return;
@@ -328,5 +371,10 @@ fn every_screen_looks_as_it_did() {
         let name = if theme == "light" { "Dark screen" } else { "Light screen" };
         window.get_by_label(name).click_accesskit();
         window.run_steps(3);
+    }
+    for (property, name) in PROPERTIES {
+        fit_property(&mut window, &library.join("every-motion"), property);
+        settle(&mut window);
+        results.add(picture(&mut window, format!("material-{name}-light"), "light", &options));
     }
 }

@@ -67,7 +67,7 @@ fn relaxation_and_creep_are_drawn_as_the_solid_that_made_the_record() {
         [t, speed * pressed, N_PER_MM_MPA * force]
     };
     let punch = Indenter::FlatPunch { radius_mm: exact(3.0) };
-    let property = Property::Relaxation { term_count: Some(1) };
+    let property = Property::Relaxation { family: Some(RelaxationFamily::Prony { terms: 1 }) };
     let report = found(punch, property, (0..=4000).map(row));
     let PropertyReport::Relaxation(relaxation) = &report else { panic!("{report:?}") };
     let [modulus, creep] = property_plots(&report);

@@ -33,7 +33,8 @@ impl MaterialToStore {
         });
         match request.property {
             Property::Modulus | Property::Unloading => {}
-            Property::Relaxation { term_count } => settings["terms"] = json!(term_count),
+            // The number of terms that was found stands in the report.
+            Property::Relaxation { family } => settings["is_family_given"] = json!(family.is_some()),
             Property::Dynamic { frequency_hz, .. } => {
                 settings["frequency_hz"] = json!(frequency_hz);
             }

@@ -1,4 +1,7 @@
-//! The press, the indenter and the specimen as typed.
+//! The property that is wanted, the press, the indenter and the specimen as typed.
+
+mod property;
+mod shape;
 
 use crate::widgets::{
     QuantityField, UncertainField, choice_ui, quantity_ui, quiet_ui, require, section_ui,
@@ -8,86 +11,13 @@ use crate::workbench::ScreenOffers;
 use eframe::egui::{Button, Ui};
 use palpate_analysis::compliance::ComplianceCorrections;
 use palpate_analysis::material::{ErrorSource, MaterialRequest};
-use palpate_indentation::{
-    Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, Specimen,
-};
+use palpate_analysis::property::PropertyRequest;
+use palpate_indentation::{Base, ContactLaw, PoissonBasis, Quantity, Specimen};
+use property::PropertyForm;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use shape::{SHAPES, Shape};
 use std::path::{Path, PathBuf};
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-enum Shape {
-    #[default]
-    FlatPunch,
-    Sphere,
-    Cone,
-    PyramidThree,
-    PyramidFour,
-    ChamferedPunch,
-    RoundedCone,
-    RoundedPyramidThree,
-    RoundedPyramidFour,
-}
-
-const SHAPES: [(Shape, &str); 9] = [
-    (Shape::FlatPunch, "flat punch"),
-    (Shape::Sphere, "sphere"),
-    (Shape::Cone, "cone"),
-    (Shape::PyramidThree, "pyramid of three faces"),
-    (Shape::PyramidFour, "pyramid of four faces"),
-    (Shape::ChamferedPunch, "flat punch with a chamfer"),
-    (Shape::RoundedCone, "cone with a round tip"),
-    (Shape::RoundedPyramidThree, "three faces, round tip"),
-    (Shape::RoundedPyramidFour, "four faces, round tip"),
-];
-
-impl Shape {
-    const fn has_radius(self) -> bool {
-        matches!(self, Self::FlatPunch | Self::Sphere | Self::ChamferedPunch)
-    }
-
-    /// Name and meaning of its second length in mm, where it has one.
-    const fn edge(self) -> Option<(&'static str, &'static str)> {
-        match self {
-            Self::ChamferedPunch => {
-                Some(("chamfer", "its width at 45°, with its standard uncertainty"))
-            }
-            Self::RoundedCone | Self::RoundedPyramidThree | Self::RoundedPyramidFour => {
-                Some(("tip radius", "with its standard uncertainty"))
-            }
-            _ => None,
-        }
-    }
-
-    /// `size` is a radius in mm, or a half angle in degrees; `edge` a chamfer or the radius of a tip in mm.
-    const fn indenter(self, size: Quantity, edge: Quantity) -> Indenter {
-        match self {
-            Self::ChamferedPunch => Indenter::ChamferedPunch { radius_mm: size, chamfer_mm: edge },
-            Self::RoundedCone => {
-                Indenter::RoundedCone { half_angle_degrees: size, tip_radius_mm: edge }
-            }
-            Self::RoundedPyramidThree => Indenter::RoundedPyramid {
-                faces: PyramidFaces::Three,
-                half_angle_degrees: size,
-                tip_radius_mm: edge,
-            },
-            Self::RoundedPyramidFour => Indenter::RoundedPyramid {
-                faces: PyramidFaces::Four,
-                half_angle_degrees: size,
-                tip_radius_mm: edge,
-            },
-            Self::FlatPunch => Indenter::FlatPunch { radius_mm: size },
-            Self::Sphere => Indenter::Sphere { radius_mm: size },
-            Self::Cone => Indenter::Cone { half_angle_degrees: size },
-            Self::PyramidThree => {
-                Indenter::Pyramid { faces: PyramidFaces::Three, half_angle_degrees: size }
-            }
-            Self::PyramidFour => {
-                Indenter::Pyramid { faces: PyramidFaces::Four, half_angle_degrees: size }
-            }
-        }
-    }
-}
 
 const BASES: [(Base, &str); 2] =
     [(Base::Bonded, "the specimen sticks to it"), (Base::Frictionless, "the specimen slips on it")];
@@ -144,6 +74,7 @@ pub(super) struct MaterialForm {
     /// The texts that the measured thickness gave the field of the thickness.
     #[serde(skip)]
     measured: Option<[String; 2]>,
+    property: PropertyForm,
     shape: Shape,
     radius: UncertainField,
     half_angle: UncertainField,
@@ -170,6 +101,7 @@ impl Default for MaterialForm {
             session: String::new(),
             offered: None,
             measured: None,
+            property: PropertyForm::default(),
             shape: Shape::default(),
             radius: empty(),
             half_angle: empty(),
@@ -269,13 +201,18 @@ impl MaterialForm {
             .check(|pair| possible(Specimen { thickness_mm: quantity(pair), ..specimen }));
         self.poisson.check(|pair| possible(Specimen { poisson_ratio: quantity(pair), ..specimen }));
         self.depth_max.check(|depth| require(depth > 0.0, "must be above 0"));
+        self.property.check();
         for error in [&mut self.contact_error, &mut self.zero_error] {
             error.check(|error| require(error >= 0.0, "must be 0 or more"));
         }
     }
 
-    /// The press to fit, its depths as they were measured, or the first thing that is wrong.
-    pub fn request(&self) -> Result<MaterialRequest, String> {
+    /// What is to be found, its depths as they were measured, or the first thing that is wrong.
+    pub fn request(&self) -> Result<PropertyRequest, String> {
+        Ok(PropertyRequest { press: self.press()?, property: self.property.property()? })
+    }
+
+    fn press(&self) -> Result<MaterialRequest, String> {
         let source = self.source();
         require(!source.as_os_str().is_empty(), "choose a session first")?;
         let (name, size) = self.size();
@@ -288,8 +225,14 @@ impl MaterialForm {
         let thickness = quantity(self.thickness.named_values("thickness")?);
         let poisson_ratio = quantity(self.poisson.named_values(POISSON)?);
         self.law_verdict()?;
-        let depth_max_mm =
-            self.is_depth_limited.then(|| self.depth_max.named_value("depth")).transpose()?;
+        let wanted = self.property.choice;
+        let is_limited = self.is_depth_limited && wanted.is_loading();
+        let depth_max_mm = is_limited.then(|| self.depth_max.named_value("depth")).transpose()?;
+        self.contact_verdict()?;
+        let force_zero = match wanted.has_force_zero() {
+            true => self.force_zero.source("force zero", &self.zero_error)?,
+            false => ErrorSource::Recorded,
+        };
         Ok(MaterialRequest {
             source: source.to_owned(),
             columns: None,
@@ -307,7 +250,7 @@ impl MaterialForm {
             },
             depth_max_mm,
             contact: self.contact.source("contact", &self.contact_error)?,
-            force_zero: self.force_zero.source("force zero", &self.zero_error)?,
+            force_zero,
         })
     }
 
@@ -323,13 +266,21 @@ impl MaterialForm {
     }
 
     fn law_verdict(&self) -> Result<(), String> {
-        let is_possible = self.law != ContactLaw::Hertz || self.shape == Shape::Sphere;
+        let is_hertz = self.law == ContactLaw::Hertz && self.property.choice.has_law();
+        let is_possible = !is_hertz || self.shape == Shape::Sphere;
         require(is_possible, "this law describes a sphere only; choose another law")
+    }
+
+    /// Only a loading shows where contact is.
+    fn contact_verdict(&self) -> Result<(), String> {
+        let is_known = self.property.choice.is_loading() || self.contact != ErrorChoice::Free;
+        require(is_known, "only the modulus of a loading finds the contact; choose another one")
     }
 
     /// Draws the fields; true when the button of the session dialog is pressed.
     pub fn ui(&mut self, ui: &mut Ui, offers: &ScreenOffers) -> bool {
         section_ui(ui, "Press");
+        self.property.choice_ui(ui);
         text_row(ui, "session", "a session's folder, or a table", &mut self.session);
         let mut is_dialog_pressed = false;
         ui.horizontal_wrapped(|ui| {
@@ -381,22 +332,35 @@ impl MaterialForm {
     }
 
     fn law_ui(&mut self, ui: &mut Ui) {
-        section_ui(ui, "Law");
-        choice_ui(ui, "law", &mut self.law, &LAWS);
+        let wanted = self.property.choice;
+        section_ui(ui, if wanted.has_law() { "Law" } else { "Contact" });
+        if wanted.has_law() {
+            choice_ui(ui, "law", &mut self.law, &LAWS);
+        }
         if let Err(reason) = self.law_verdict() {
             small_alarm_ui(ui, reason);
         }
-        tick_box(ui, &mut self.is_depth_limited, "a part of the loading only");
-        if self.is_depth_limited {
-            quantity_ui(ui, "depth", "mm, greatest", &mut self.depth_max);
+        if wanted.is_loading() {
+            tick_box(ui, &mut self.is_depth_limited, "a part of the loading only");
+            if self.is_depth_limited {
+                quantity_ui(ui, "depth", "mm, greatest", &mut self.depth_max);
+            }
         }
-        choice_ui(ui, "contact", &mut self.contact, &CONTACTS);
+        self.property.ui(ui);
+        // What the loading alone shows stands last.
+        let count = if wanted.is_loading() { CONTACTS.len() } else { CONTACTS.len() - 1 };
+        choice_ui(ui, "contact", &mut self.contact, &CONTACTS[..count]);
+        if let Err(reason) = self.contact_verdict() {
+            small_alarm_ui(ui, reason);
+        }
         if self.contact == ErrorChoice::Stated {
             quantity_ui(ui, "uncertainty", "mm, standard", &mut self.contact_error);
         }
-        choice_ui(ui, "force zero", &mut self.force_zero, &ZEROS);
-        if self.force_zero == ErrorChoice::Stated {
-            quantity_ui(ui, "zero error", "N, standard", &mut self.zero_error);
+        if wanted.has_force_zero() {
+            choice_ui(ui, "force zero", &mut self.force_zero, &ZEROS);
+            if self.force_zero == ErrorChoice::Stated {
+                quantity_ui(ui, "zero error", "N, standard", &mut self.zero_error);
+            }
         }
         tick_box(ui, &mut self.is_compliance_corrected, "correct depths for machine compliance");
     }

@@ -1,5 +1,5 @@
-//! From a press to Young's modulus: indenter, specimen and law on the left, the loading in the middle, the number and all
-//! that it rests on at the right.
+//! From a press to a property of its material: property, indenter, specimen and law on the left, plots in the middle, the
+//! numbers and all that they rest on at the right.
 
 mod form;
 mod result;
@@ -15,8 +15,9 @@ use eframe::egui::{Context, Key, Ui};
 use form::MaterialForm;
 use palpate_analysis::compliance::{ComplianceCorrections, LATEST_COMPLIANCE};
 use palpate_analysis::edits::author;
-use palpate_analysis::material::{MaterialError, MaterialRequest, material, measured_thickness};
+use palpate_analysis::material::{MaterialError, MaterialRequest, measured_thickness};
 use palpate_analysis::progress::Progress;
+use palpate_analysis::property::{PropertyError, PropertyRequest, find_property};
 use palpate_analysis::session_actions::Attribution;
 use palpate_indentation::Quantity;
 use serde_json::Value;
@@ -25,15 +26,15 @@ use std::path::PathBuf;
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Material",
     icon: lucide_icons::Icon::Layers,
-    purpose: "Young's modulus of a press, with what makes it uncertain",
+    purpose: "moduli of a press, with what makes them uncertain",
     key: Some(Key::M),
     open: |workbench| Box::new(MaterialScreen::new(workbench.library.clone().ok())),
 };
 
-const BEFORE: &str = "Choose a session, describe the indenter and the specimen, and fit a contact law to the loading. The modulus belongs to the tissue; force and depth belong to one probe and one specimen.";
+const BEFORE: &str = "Choose a session, describe the indenter and the specimen, and fit a contact law to the press. A modulus belongs to the tissue; force and depth belong to one probe and one specimen.";
 
-/// A modulus, or why a contact law gives none.
-type MaterialAnswer = Result<FittedMaterial, MaterialError>;
+/// A property, or why the press does not show it.
+type MaterialAnswer = Result<FittedMaterial, PropertyError>;
 
 pub struct MaterialScreen {
     library: Option<PathBuf>,
@@ -74,7 +75,7 @@ impl MaterialScreen {
     }
 
     /// Why the last press has no modulus.
-    pub fn refused(&self) -> Option<&MaterialError> {
+    pub fn refused(&self) -> Option<&PropertyError> {
         self.task.answer()?.as_ref().ok()?.as_ref().err()
     }
 
@@ -110,7 +111,9 @@ impl MaterialScreen {
     fn refusal_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let Some(refused) = self.refused() else { return };
         alarm_ui(ui, refused.to_string());
-        let MaterialError::TooDeep { depth_max_mm, .. } = *refused else { return };
+        let PropertyError::Modulus(MaterialError::TooDeep { depth_max_mm, .. }) = *refused else {
+            return;
+        };
         if ui.button(format!("Fit the loading down to {depth_max_mm} mm")).clicked() {
             self.form.limit_depth(depth_max_mm);
             commands.push(UiCommand::Work);
@@ -139,11 +142,11 @@ impl Screen for MaterialScreen {
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         match self.fitted() {
             Some(fitted) => {
-                result::number_ui(ui, &fitted.report);
+                result::numbers_ui(ui, fitted);
                 self.save_ui(ui);
             }
             None => {
-                section_ui(ui, "Young's modulus");
+                section_ui(ui, "Modulus");
                 placeholder_ui(ui, "no modulus yet");
             }
         }
@@ -196,8 +199,9 @@ impl Screen for MaterialScreen {
                     .map_err(|err| err.to_string())?,
                 false => ComplianceCorrections::none(library),
             };
-            let request = MaterialRequest { corrections, ..request };
-            Ok(material(&request).map(|report| FittedMaterial::of(&request, report)))
+            let press = MaterialRequest { corrections, ..request.press };
+            let request = PropertyRequest { press, ..request };
+            Ok(find_property(&request).map(|report| FittedMaterial::of(&request, report)))
         });
     }
 

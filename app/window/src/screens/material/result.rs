@@ -1,84 +1,142 @@
-//! A modulus, drawn: the plots in the middle, the number and all it rests on at the right.
+//! A property, drawn: plots and tables in the middle, its numbers and all they rest on at the right.
 
 use crate::plots::figure::{PlacedPlot, PlotLook, legend_ui};
 use crate::widgets::{
-    alarm_ui, fact_ui, heading_ui, placeholder_ui, quiet_ui, section_ui, sentence_ui,
+    Column, TableRow, alarm_ui, fact_ui, heading_ui, placeholder_ui, quiet_ui, section_ui,
+    sentence_ui, table_ui,
 };
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_analysis::material::{MaterialReport, MaterialRequest};
-use palpate_analysis::report::material::{
-    RELAXES, assumptions, budget_kpa, interval_words, lack_words, modulus_words,
-};
-use palpate_analysis::report::material_plot::material_plots;
+use palpate_analysis::property::{PropertyReport, PropertyRequest};
+use palpate_analysis::report::property::{NumberInPrint, NumberLine, PropertySections, sections};
+use palpate_analysis::report::property_plot::property_plots;
 use palpate_analysis::session_actions::MaterialToStore;
 use palpate_figures::uncertain::significant;
 
-/// Share of the height that the plot of the loading gets.
-const LOADING_SHARE: f32 = 0.64;
+/// Shares of the height that the upper plot gets: residuals need less than what they are of.
+const UPPER_SHARE: f32 = 0.64;
+const UPPER_SHARE_WITH_TABLES: f32 = 0.54;
+/// Height in points of a line of a table; of all of them, the share of the page that they get at most.
+const TABLE_LINE: f32 = 28.0;
+const TABLES_SHARE_MAX: f32 = 0.4;
 
-/// A modulus with its plots, whose points are placed once.
+/// A property with its plots, whose points are placed once.
 pub struct FittedMaterial {
-    pub report: MaterialReport,
+    pub report: PropertyReport,
+    pub sections: PropertySections,
     plots: [PlacedPlot; 2],
+    /// Of numbers that share their lines.
+    tables: Vec<NumberTable>,
     pub(super) to_store: MaterialToStore,
 }
 
+/// Lines of numbers of the same names.
+struct NumberTable {
+    columns: Vec<Column>,
+    rows: Vec<TableRow>,
+}
+
 impl FittedMaterial {
-    pub(super) fn of(request: &MaterialRequest, report: MaterialReport) -> Self {
+    pub(super) fn of(request: &PropertyRequest, report: PropertyReport) -> Self {
+        let sections = sections(&report);
         Self {
-            plots: material_plots(&report).map(PlacedPlot::from),
+            plots: property_plots(&report).map(PlacedPlot::from),
+            tables: number_tables(&sections.numbers),
             to_store: MaterialToStore::of(request, &report),
+            sections,
             report,
         }
     }
 }
 
-/// Draws the loading with its law, and the residuals beneath on the same depths.
-pub(super) fn plots_ui(ui: &mut Ui, fitted: &FittedMaterial) {
-    let [loading, residuals] = &fitted.plots;
-    heading_ui(ui, "Loading and law");
-    legend_ui(ui, &[&loading.plot]);
-    let look = PlotLook { link: Some("material_depth"), ..PlotLook::default() };
-    let height = LOADING_SHARE * ui.available_height();
-    ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-        loading.ui(ui, "material_loading", look);
-    });
-    if fitted.report.noise_n.is_some() {
-        quiet_ui(ui, "residuals, with lines at the noise of the force");
-    } else {
-        quiet_ui(ui, "residuals");
-    }
-    residuals.ui(ui, "material_residuals", look);
+fn number_tables(lines: &[NumberLine]) -> Vec<NumberTable> {
+    let heads = |line: &&NumberLine| -> Vec<String> {
+        line.numbers.iter().map(NumberInPrint::head).collect()
+    };
+    let several: Vec<&NumberLine> = lines.iter().filter(|line| line.numbers.len() > 1).collect();
+    let table = |lines: &[&NumberLine]| {
+        let numbers = lines.first().map(heads).unwrap_or_default();
+        let numbers = numbers.iter().map(|head| Column::numbers(head, 142.0));
+        let cells = |line: &&NumberLine| {
+            let numbers = line.numbers.iter().map(NumberInPrint::cell);
+            let cells = [line.name.clone()].into_iter().chain(numbers).collect();
+            TableRow { cells, ..TableRow::default() }
+        };
+        NumberTable {
+            columns: [Column::words("", 64.0)].into_iter().chain(numbers).collect(),
+            rows: lines.iter().map(cells).collect(),
+        }
+    };
+    several.chunk_by(|a, b| heads(a) == heads(b)).map(table).collect()
 }
 
-/// Draws the number, beside it what it assumes, how far the law holds, and the budget.
-pub(super) fn number_ui(ui: &mut Ui, report: &MaterialReport) {
-    section_ui(ui, "Young's modulus");
-    ui.add(Label::new(RichText::new(modulus_words(report)).heading().strong()).wrap());
-    sentence_ui(ui, interval_words(report));
-    if let Some(lack) = report.lack_of_fit {
-        alarm_ui(ui, format!("lack of fit: {}", lack_words(lack)));
+/// Draws the plots beneath each other on the same abscissa, then the tables.
+pub(super) fn plots_ui(ui: &mut Ui, fitted: &FittedMaterial) {
+    let [upper, lower] = &fitted.plots;
+    let all = ui.available_height();
+    let lines: usize = fitted.tables.iter().map(|table| table.rows.len() + 1).sum();
+    let scale = (TABLES_SHARE_MAX * all / (TABLE_LINE * lines as f32)).min(1.0);
+    let tables = if lines > 0 { scale * TABLE_LINE * lines as f32 } else { 0.0 };
+    let share = if lines > 0 { UPPER_SHARE_WITH_TABLES } else { UPPER_SHARE };
+    // Bounds along the abscissa are remembered by this name.
+    let look = PlotLook { link: Some(fitted.sections.title), ..PlotLook::default() };
+    ui.allocate_ui(vec2(ui.available_width(), share * (all - tables)), |ui| {
+        heading_ui(ui, &upper.plot.title);
+        legend_ui(ui, &[&upper.plot]);
+        upper.ui(ui, &upper.plot.title, look);
+    });
+    let rest = vec2(ui.available_width(), ui.available_height() - tables);
+    ui.allocate_ui(rest, |ui| {
+        quiet_ui(ui, &lower.plot.title);
+        lower.ui(ui, &lower.plot.title, look);
+    });
+    for table in &fitted.tables {
+        let height = scale * TABLE_LINE * (table.rows.len() + 1) as f32;
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+            let name = &table.columns.last().map_or("", |column| &column.head);
+            table_ui(ui, name, &table.columns, &table.rows);
+        });
+    }
+}
+
+/// Draws the numbers, beside them what they assume, how far the law holds, and the budget.
+pub(super) fn numbers_ui(ui: &mut Ui, fitted: &FittedMaterial) {
+    let sections = &fitted.sections;
+    section_ui(ui, sections.title);
+    for line in &sections.numbers {
+        let [number] = line.numbers.as_slice() else { continue };
+        if line.name != sections.title {
+            quiet_ui(ui, &line.name);
+        }
+        ui.add(Label::new(RichText::new(number.words()).heading().strong()).wrap());
+        sentence_ui(ui, number.interval_words());
+    }
+    if !fitted.tables.is_empty() {
+        quiet_ui(ui, "in the tables: numbers with their 95 % intervals");
+    }
+    for (name, words) in &sections.warnings {
+        alarm_ui(ui, format!("{name}: {words}"));
     }
     section_ui(ui, "Assumptions");
-    for (name, words) in assumptions(report) {
+    for (name, words) in &sections.assumptions {
         fact_ui(ui, name, words);
     }
-    sentence_ui(ui, RELAXES);
+    sections.remarks.iter().for_each(|remark| sentence_ui(ui, *remark));
     section_ui(ui, "How far the law holds");
-    for row in &report.validity {
+    for row in &sections.validity {
         let value = significant(row.value, 3);
         let share = significant(100.0 * row.value / row.max, 2);
         sentence_ui(ui, format!("{} {value}, {share} % of the limit {}", row.ratio, row.max));
     }
     section_ui(ui, "Uncertainty budget");
-    quiet_ui(ui, "source, standard uncertainty, share of the variance");
-    for row in &report.budget {
-        sentence_ui(ui, format!("{}: {} kPa, {:.0} %", row.source, budget_kpa(row), row.percent));
+    quiet_ui(ui, "standard uncertainty from each source, the largest first");
+    for row in &sections.budget {
+        let (source, parts) = row.split_first().map_or(("", &[][..]), |(one, rest)| (one, rest));
+        sentence_ui(ui, format!("{source}: {}", parts.join(", ")));
     }
-    if report.not_included.is_empty() {
+    if sections.not_included.is_empty() {
         placeholder_ui(ui, "all known sources are included");
     } else {
-        sentence_ui(ui, format!("not included: {}", report.not_included.join(", ")));
+        sentence_ui(ui, format!("not included: {}", sections.not_included.join(", ")));
     }
-    report.notes.iter().for_each(|note| quiet_ui(ui, note));
+    fitted.report.notes().iter().for_each(|note| quiet_ui(ui, note));
 }

@@ -1,6 +1,9 @@
 //! What is typed becomes the request of the command line, and what is wrong is said at its field.
 
+use super::property::PropertyChoice;
 use super::*;
+use palpate_analysis::property::Property;
+use palpate_indentation::Indenter;
 
 /// The press of the guide.
 fn punch() -> MaterialForm {
@@ -22,7 +25,8 @@ fn typed_values_reach_the_request() {
     form.contact = ErrorChoice::Stated;
     form.force_zero = ErrorChoice::Free;
     form.check();
-    let request = form.request().unwrap();
+    let PropertyRequest { press: request, property } = form.request().unwrap();
+    assert_eq!(property, Property::Modulus);
     assert_eq!(request.source, Path::new("session"));
     assert_eq!(request.indenter, Indenter::FlatPunch { radius_mm: quantity([6.0, 0.02]) });
     assert_eq!(request.thickness_mm, Some(quantity([60.0, 0.5])));
@@ -36,7 +40,7 @@ fn typed_values_reach_the_request() {
     form.is_depth_limited = false;
     form.depth_max.text = "deep".into();
     form.check();
-    assert_eq!(form.request().unwrap().depth_max_mm, None);
+    assert_eq!(form.request().unwrap().press.depth_max_mm, None);
 }
 
 #[test]
@@ -75,10 +79,10 @@ fn a_measured_thickness_is_the_session_s_until_another_one_is_typed() {
     form.check();
     assert_eq!(form.thickness.texts(), ["12.3457", "0.2"]);
     // To the last digit, and as the session's edits have it.
-    assert_eq!(form.request().unwrap().thickness_mm, None);
+    assert_eq!(form.request().unwrap().press.thickness_mm, None);
     form.thickness.value.text = "13".into();
     form.check();
-    assert_eq!(form.request().unwrap().thickness_mm, Some(quantity([13.0, 0.2])));
+    assert_eq!(form.request().unwrap().press.thickness_mm, Some(quantity([13.0, 0.2])));
     // What was typed stays where the next session measured none; what was measured does not.
     form.take_thickness(None);
     assert_eq!(form.thickness.texts(), ["13", "0.2"]);
