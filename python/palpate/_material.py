@@ -1,4 +1,4 @@
-"""Young's modulus of a press by a contact law."""
+"""Moduli of a press by a contact law."""
 from __future__ import annotations
 
 import json
@@ -6,6 +6,7 @@ import numbers
 import os
 from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
 
+from . import _fit
 from ._native import PalpateError, fit_material
 from ._report import Report
 
@@ -23,11 +24,24 @@ _INDENTERS: Dict[str, Dict[str, str]] = {
     "pyramid-3": {"shape": "pyramid", "faces": "three"},
     "pyramid-4": {"shape": "pyramid", "faces": "four"},
 }
-_WORDS = {"law": ("hertz", "sneddon", "layer"), "base": ("bonded", "frictionless")}
+_WORDS = {
+    "law": ("hertz", "sneddon", "layer"),
+    "base": ("bonded", "frictionless"),
+    "property": ("modulus", "unloading", "relaxation", "dynamic"),
+}
+#: Options that belong to some properties only.
+_OWN: Dict[str, Tuple[str, ...]] = {
+    "depth_max": ("modulus",),
+    "zero_error": ("modulus", "unloading"),
+    "law": ("modulus", "relaxation", "dynamic"),
+    "terms": ("relaxation",),
+    "frequency": ("dynamic",),
+    "moving_mass": ("dynamic",),
+}
 
 
 class Material(Report):
-    """A modulus with all it rests on: a mapping with the content of ``palpate material --json``.
+    """Moduli with all they rest on: a mapping with the content of ``palpate material --json``.
 
     >>> known = {"thickness": (60.0, 0.5), "poisson": (0.49, 0.01), "contact_error": "free"}
     >>> found = palpate.open("demo").material("flat-punch", radius=(6.00, 0.02), depth_max=0.9, **known)
@@ -41,27 +55,33 @@ class Material(Report):
         self,
         report: Dict[str, Any],
         text: str,
-        curve: "Tuple[Optional[np.ndarray], ...]" = (None, None, None),
+        curve: "Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]" = None,
         notes: Sequence[str] = (),
     ) -> None:
         self._report = report
         self._text = text
-        #: The loading that was fitted: depths from the contact in mm, forces and those of the law in N; None where the
-        #: modulus was read from a session.
-        self.depth, self.force, self.law_force = curve
+        #: The loading or unloading that was fitted: depths from the contact in mm, forces and those of the law in N; None
+        #: where the modulus was read from a session, and for relaxation and dynamic moduli.
+        self.depth, self.force, self.law_force = curve or (None, None, None)
         #: Remarks on the data.
         self.notes: List[str] = list(notes)
 
     @property
     def modulus_kpa(self) -> float:
-        """Young's modulus in kPa."""
-        return 1e3 * self._report["modulus_mpa"]
+        """Young's modulus in kPa; relaxation and dynamic moduli have none."""
+        return 1e3 * self._young("modulus_mpa")
 
     @property
     def total95_kpa(self) -> Tuple[float, float]:
         """Its 95 % interval in kPa, in which a lack of fit counts as noise that lasts."""
-        low, high = self._report["total95_mpa"]
+        low, high = self._young("total95_mpa")
         return 1e3 * low, 1e3 * high
+
+    def _young(self, field: str) -> Any:
+        if field not in self._report:
+            kind = self._report["property"]
+            raise PalpateError(f"the property {kind} has no single Young's modulus; take its numbers from the mapping")
+        return self._report[field]
 
     def to_dict(self) -> Dict[str, Any]:
         """The report as a plain dictionary, as in JSON."""
@@ -116,10 +136,17 @@ def _word(word: str, what: str) -> str:
     return word
 
 
+def _check_own(name: str, **given: Any) -> None:
+    for option, own in _OWN.items():
+        if given[option] is not None and name not in own:
+            raise PalpateError(f"{option} belongs to the property {' or '.join(own)}; leave it out")
+
+
 def material(
     source: "str | os.PathLike[str]",
     indenter: str,
     *,
+    property: str = "modulus",
     radius: Optional[Quantity] = None,
     half_angle: Optional[Quantity] = None,
     tip_radius: Optional[Quantity] = None,
@@ -128,10 +155,13 @@ def material(
     poisson: Quantity,
     poisson_measured: bool = False,
     base: str = "bonded",
-    law: str = "layer",
+    law: Optional[str] = None,
     depth_max: Optional[float] = None,
     contact_error: Union[None, str, float] = None,
     zero_error: Union[None, str, float] = None,
+    terms: Optional[int] = None,
+    frequency: Optional[float] = None,
+    moving_mass: Optional[Quantity] = None,
     analysis: Optional[str] = None,
     include_rejected: bool = False,
     compliance: Optional[str] = None,
@@ -139,28 +169,44 @@ def material(
     by: Optional[str] = None,
     reason: str = "",
 ) -> Material:
-    """Young's modulus of a press, of a session's folder or a table, as ``palpate material`` gives it.
+    """Moduli of a press, of a session's folder or a table, as ``palpate material`` gives them.
 
-    The options are those of the command. Lengths in mm, a half angle in degrees and Poisson's ratio are a number that is
-    taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is the one that the session
-    measured. ``contact_error`` and ``zero_error`` are ``"free"``, or a standard uncertainty in mm and in N. ``save`` stores
-    the modulus with the session under that name.
+    ``property`` is ``"modulus"`` (Young's modulus of the loading), ``"unloading"`` (of the unloading), ``"relaxation"`` (the
+    shear relaxation modulus of ramp and hold, with the creep compliance) or ``"dynamic"`` (storage and loss modulus of
+    sines). The options are those of the command. Lengths in mm, a half angle in degrees, Poisson's ratio and the moving mass in
+    g are a number that is taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is the
+    one that the session measured, and without ``law`` it is that of a layer. ``contact_error`` and ``zero_error`` are
+    ``"free"``, or a standard uncertainty in mm and in N. ``terms`` belongs to a relaxation modulus, ``frequency`` in Hz and
+    ``moving_mass`` to dynamic moduli. ``save`` stores the result with the session under that name.
 
     >>> palpate.material("demo", "sphere", poisson=0.5)
     Traceback (most recent call last):
         ...
     palpate.PalpateError: a sphere needs its radius; give it, with its standard uncertainty
     """
+    _check_own(
+        _word(property, "property"),
+        depth_max=depth_max,
+        zero_error=zero_error,
+        law=law,
+        terms=terms,
+        frequency=frequency,
+        moving_mass=moving_mass,
+    )
     request = {
         "indenter": json.dumps(_indenter(indenter, radius, half_angle, tip_radius, chamfer)),
         "thickness": None if thickness is None else json.dumps(_quantity(thickness, "thickness")),
         "poisson": json.dumps(_quantity(poisson, "poisson")),
         "poisson_measured": bool(poisson_measured),
         "base": json.dumps(_word(base, "base")),
-        "law": json.dumps(_word(law, "law")),
+        "law": json.dumps(_word("layer" if law is None else law, "law")),
         "depth_max": None if depth_max is None else _number(depth_max, "depth_max"),
         "contact_error": _error_source(contact_error, "contact_error"),
         "zero_error": _error_source(zero_error, "zero_error"),
+        "property": property,
+        "terms": None if terms is None else _fit.check_whole(terms, "terms"),
+        "frequency": None if frequency is None else _number(frequency, "frequency"),
+        "moving_mass": None if moving_mass is None else json.dumps(_quantity(moving_mass, "moving_mass")),
         "analysis": analysis,
         "include_rejected": bool(include_rejected),
         "compliance": None if compliance is None else os.fspath(compliance),

@@ -105,7 +105,7 @@ class Session:
 
     @property
     def moduli(self) -> Dict[str, Material]:
-        """Moduli that are stored with the session, by the name of their analysis."""
+        """Moduli of every property that are stored with the session, by the name of their analysis."""
         stored = [one for one in json.loads(self._native.analyses()) if one["analysis"] == "material"]
         return {one["name"]: Material(one["results"], one["words"]) for one in stored}
 
@@ -190,7 +190,7 @@ class Session:
         return made
 
     def material(self, indenter: str, **options: Any) -> Material:
-        """Young's modulus of the press by a contact law; the options are those of :func:`palpate.material`.
+        """Moduli of the press by a contact law; the options are those of :func:`palpate.material`.
 
         >>> palpate.open("demo").material("flat-punch", radius=6, poisson=0.49, thickness=60)
         Traceback (most recent call last):
