@@ -1,4 +1,6 @@
 """Moduli of a press are those of the command line."""
+import shutil
+
 import numpy as np
 import palpate
 import pytest
@@ -121,9 +123,16 @@ def test_saved_modulus_is_stored_with_the_session(command, session):
     assert dict(stored) == dict(made) and repr(stored) == repr(made)
     (known,) = command("info", session)["analyses"]
     assert (known["name"], known["analysis"], known["by"]) == ("stiffness", "material", "Ada")
-    cone = {"half_angle": 70, "thickness": 60, "poisson": 0.49}
-    unloading = opened.material("cone", property="unloading", **cone, save="way back")
-    assert dict(opened.moduli["way back"]) == dict(unloading)
+
+
+def test_every_saved_property_is_read_back(recorded, tmp_path):
+    path = shutil.copytree(recorded.parent / "every-motion", tmp_path / "every motion")
+    opened = palpate.open(path)
+    cone = {"half_angle": 80, "thickness": 50000, "poisson": 0.49}
+    for name in ["unloading", "relaxation", "dynamic"]:
+        found = opened.material("cone", property=name, **cone, save=name)
+        assert dict(opened.moduli[name]) == dict(found) and repr(opened.moduli[name]) == repr(found)
+    assert opened.moduli["unloading"].modulus_kpa > 0
 
 
 def test_what_cannot_be_is_refused_in_one_sentence(recorded):

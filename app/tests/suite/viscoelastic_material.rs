@@ -343,3 +343,36 @@ fn worked_examples_of_the_guide_print_what_it_shows() {
     }
     assert_eq!(shown, 14);
 }
+
+#[test]
+fn every_saved_property_is_printed_on_the_report_and_its_moduli_are_searched() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let session = at.join("library/press");
+    std::fs::create_dir_all(&session).unwrap();
+    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/sessions/every-motion");
+    std::fs::copy(Path::new(recorded).join("000.mcap"), session.join("000.mcap")).unwrap();
+    let cone =
+        "material library/press --indenter cone --half-angle 80 --poisson 0.49 --thickness 50000";
+    let mut words = Vec::new();
+    for property in ["unloading", "relaxation", "dynamic"] {
+        let line = format!("{cone} --property {property} --save my-{property}");
+        let text = stdout(&typed(at, &line));
+        words.extend(text.lines().next().map(str::to_owned));
+    }
+    let relaxation = answer(&typed(at, &format!("{cone} --property relaxation --json")));
+    let equilibrium = number(&relaxation, "/equilibrium_mpa/value");
+    for (condition, count) in [
+        (format!("equilibrium_mpa>{}", 0.9 * equilibrium), 1),
+        (format!("equilibrium_mpa>{}", 1.1 * equilibrium), 0),
+    ] {
+        let found = answer(&crate::support::palpate(at, &["find", "--json", &condition]));
+        assert_eq!(found["sessions"].as_array().unwrap().len(), count, "{condition}: {found}");
+    }
+    stdout(&typed(at, "report library/press --html page.html"));
+    let page = std::fs::read_to_string(at.join("page.html")).unwrap();
+    for words in words {
+        let printed = words.replace('\'', "&apos;");
+        assert!(page.contains(&printed), "{printed}");
+    }
+}

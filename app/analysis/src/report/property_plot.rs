@@ -54,7 +54,10 @@ fn press_plots(
         whole.iter().map(|[depth, force]| [per_mm * depth, per_n * force]).collect();
     whole.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let rest = PlotSeries::dots("rest", Ink::Quiet, 1.4, thin(whole.iter().copied(), COLUMNS));
-    let depth = || PlotAxis::linear(&format!("depth from contact ({length})"));
+    // Both plots show the same depths, whichever part was fitted.
+    let ends: Vec<f64> = whole.first().into_iter().chain(whole.last()).map(|one| one[0]).collect();
+    let depth =
+        || PlotAxis::linear(&format!("depth from contact ({length})")).with_visible_values(&ends);
     let series = [
         PlotSeries::dots(measured, Ink::Series, 1.6, points(per_n, |one| one.force_n)),
         PlotSeries::line(fitted, Ink::Limit, 1.8, points(per_n, |one| one.law_n)),
@@ -129,7 +132,7 @@ fn dynamic_plots(report: &DynamicReport) -> [Plot; 2] {
         // One frequency alone has room on both sides.
         let [low, high] = [0.8 * ends[0], 1.25 * ends[1]];
         let x = PlotAxis::logarithmic("frequency (Hz)").with_visible_values(&[low, high]);
-        Plot::new(title, x, PlotAxis::linear(y).with_visible_values(&[0.0]))
+        Plot::new(title, x, PlotAxis::linear(y))
     };
     let with_intervals = |name: &str, ink: Ink, of: &dyn Fn(&DynamicModuli) -> UncertainNumber| {
         let value = |sine: &DynamicModuli| [sine.frequency_hz, of(sine).value];
@@ -152,19 +155,23 @@ fn dynamic_plots(report: &DynamicReport) -> [Plot; 2] {
         with_intervals("G'", storage, &|sine| sine.shear_storage_mpa.scaled(KPA_PER_MPA)),
         with_intervals("G''", loss, &|sine| sine.shear_loss_mpa.scaled(KPA_PER_MPA)),
     ];
-    let predicted = [
-        predicted("G' predicted from the relaxation before", storage, 0),
-        predicted("G'' predicted from the relaxation before", loss, 1),
-    ];
+    let predicted = [predicted("G' predicted", storage, 0), predicted("G'' predicted", loss, 1)];
     let moduli = shear.into_iter().flatten().chain(predicted.into_iter().flatten());
     [
-        axes("Shear storage and loss modulus", "modulus (kPa)").with(moduli),
-        axes("Loss over storage modulus", "tan delta").with(with_intervals(
+        from_zero(axes("Shear storage and loss modulus", "modulus (kPa)").with(moduli)),
+        from_zero(axes("Loss over storage modulus", "tan delta").with(with_intervals(
             "tan delta",
             ratio,
             &|sine| sine.tan_delta,
-        )),
+        ))),
     ]
+}
+
+/// With zero in sight, and room above the highest point.
+fn from_zero(plot: Plot) -> Plot {
+    let heights = plot.series.iter().flat_map(|one| &one.points).map(|point| point[1]);
+    let highest = heights.fold(0.0, f64::max);
+    Plot { y: plot.y.clone().with_visible_values(&[0.0, 1.1 * highest]), ..plot }
 }
 
 #[cfg(test)]

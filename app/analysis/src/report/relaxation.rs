@@ -30,7 +30,7 @@ pub(super) fn sections(report: &RelaxationReport) -> PropertySections {
         ("record", record_words(report)),
     ]);
     let choice = report.term_choice.as_ref();
-    assumptions.extend(choice.map(|choice| ("number of terms".to_owned(), choice_words(choice))));
+    assumptions.extend(choice.map(|choice| ("terms".to_owned(), choice_words(choice))));
     PropertySections {
         title: "Relaxation modulus",
         numbers: number_lines(report),

@@ -16,8 +16,11 @@ use palpate_figures::uncertain::significant;
 const UPPER_SHARE: f32 = 0.64;
 const UPPER_SHARE_WITH_TABLES: f32 = 0.54;
 /// Height in points of a line of a table; of all of them, the share of the page that they get at most.
-const TABLE_LINE: f32 = 28.0;
+const TABLE_LINE: f32 = 30.0;
 const TABLES_SHARE_MAX: f32 = 0.4;
+
+/// Width in points of a letter of a cell.
+const LETTER: f32 = 6.6;
 
 /// A property with its plots, whose points are placed once.
 pub struct FittedMaterial {
@@ -54,17 +57,21 @@ fn number_tables(lines: &[NumberLine]) -> Vec<NumberTable> {
     };
     let several: Vec<&NumberLine> = lines.iter().filter(|line| line.numbers.len() > 1).collect();
     let table = |lines: &[&NumberLine]| {
-        let numbers = lines.first().map(heads).unwrap_or_default();
-        let numbers = numbers.iter().map(|head| Column::numbers(head, 142.0));
         let cells = |line: &&NumberLine| {
             let numbers = line.numbers.iter().map(NumberInPrint::cell);
             let cells = [line.name.clone()].into_iter().chain(numbers).collect();
             TableRow { cells, ..TableRow::default() }
         };
-        NumberTable {
-            columns: [Column::words("", 64.0)].into_iter().chain(numbers).collect(),
-            rows: lines.iter().map(cells).collect(),
-        }
+        let rows: Vec<TableRow> = lines.iter().map(cells).collect();
+        let column = |(index, head): (usize, String)| {
+            let cells = rows.iter().filter_map(|row| row.cells.get(index));
+            let letters = cells.chain([&head]).map(|text| text.chars().count()).max();
+            let width = LETTER * letters.unwrap_or(0) as f32;
+            if index == 0 { Column::words(&head, width) } else { Column::numbers(&head, width) }
+        };
+        let heads = lines.first().map(heads).unwrap_or_default();
+        let heads = [String::new()].into_iter().chain(heads);
+        NumberTable { columns: heads.enumerate().map(column).collect(), rows }
     };
     several.chunk_by(|a, b| heads(a) == heads(b)).map(table).collect()
 }
