@@ -28,12 +28,14 @@ _WORDS = {
     "law": ("hertz", "sneddon", "layer"),
     "base": ("bonded", "frictionless"),
     "property": ("modulus", "unloading", "relaxation", "dynamic"),
+    "family": ("prony", "fractional"),
 }
 #: Options that belong to some properties only.
 _OWN: Dict[str, Tuple[str, ...]] = {
     "depth_max": ("modulus",),
     "zero_error": ("modulus", "unloading"),
     "law": ("modulus", "relaxation", "dynamic"),
+    "family": ("relaxation",),
     "terms": ("relaxation",),
     "frequency": ("dynamic",),
     "moving_mass": ("dynamic",),
@@ -159,6 +161,7 @@ def material(
     depth_max: Optional[float] = None,
     contact_error: Union[None, str, float] = None,
     zero_error: Union[None, str, float] = None,
+    family: Optional[str] = None,
     terms: Optional[int] = None,
     frequency: Optional[float] = None,
     moving_mass: Optional[Quantity] = None,
@@ -176,8 +179,8 @@ def material(
     sines). The options are those of the command. Lengths in mm, a half angle in degrees, Poisson's ratio and the moving mass in
     g are a number that is taken as exact, or a pair of a number and its standard uncertainty. Without ``thickness`` it is the
     one that the session measured, and without ``law`` it is that of a layer. ``contact_error`` and ``zero_error`` are
-    ``"free"``, or a standard uncertainty in mm and in N. ``terms`` belongs to a relaxation modulus, ``frequency`` in Hz and
-    ``moving_mass`` to dynamic moduli. ``save`` stores the result with the session under that name.
+    ``"free"``, or a standard uncertainty in mm and in N. ``family`` (``"prony"`` or ``"fractional"``) and
+    ``terms`` belong to a relaxation modulus, ``frequency`` in Hz and ``moving_mass`` to dynamic moduli. ``save`` stores the result with the session under that name.
 
     >>> palpate.material("demo", "sphere", poisson=0.5)
     Traceback (most recent call last):
@@ -189,6 +192,7 @@ def material(
         depth_max=depth_max,
         zero_error=zero_error,
         law=law,
+        family=family,
         terms=terms,
         frequency=frequency,
         moving_mass=moving_mass,
@@ -204,6 +208,7 @@ def material(
         "contact_error": _error_source(contact_error, "contact_error"),
         "zero_error": _error_source(zero_error, "zero_error"),
         "property": property,
+        "family": None if family is None else _word(family, "family"),
         "terms": None if terms is None else _fit.check_whole(terms, "terms"),
         "frequency": None if frequency is None else _number(frequency, "frequency"),
         "moving_mass": None if moving_mass is None else json.dumps(_quantity(moving_mass, "moving_mass")),

@@ -9,7 +9,7 @@ use palpate_analysis::press_modulus::FittedPoint;
 use palpate_analysis::property::{Property, PropertyReport, PropertyRequest, find_property};
 use palpate_analysis::report::property::property_text;
 use palpate_analysis::session_actions::{Attribution, MaterialToStore};
-use palpate_indentation::PoissonBasis;
+use palpate_indentation::{PoissonBasis, RelaxationFamily};
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
 use std::path::PathBuf;
@@ -28,6 +28,7 @@ pub struct MaterialOptions {
     contact_error: Option<String>,
     zero_error: Option<String>,
     property: String,
+    family: Option<String>,
     terms: Option<usize>,
     frequency: Option<f64>,
     moving_mass: Option<String>,
@@ -81,13 +82,30 @@ impl MaterialOptions {
         Ok(match self.property.as_str() {
             "modulus" => Property::Modulus,
             "unloading" => Property::Unloading,
-            "relaxation" => Property::Relaxation { term_count: self.terms },
+            "relaxation" => Property::Relaxation { family: self.family()? },
             "dynamic" => Property::Dynamic {
                 frequency_hz: self.frequency,
                 moving_mass_g: self.moving_mass.as_deref().map(read).transpose()?,
             },
             other => return Err(refused(format!("'{other}' is not a property"))),
         })
+    }
+}
+
+impl MaterialOptions {
+    fn family(&self) -> PyResult<Option<RelaxationFamily>> {
+        match (self.family.as_deref(), self.terms) {
+            (Some("fractional"), None) => Ok(Some(RelaxationFamily::Fractional)),
+            (Some("fractional"), Some(_)) => {
+                Err(refused("terms belongs to the family prony; leave it out"))
+            }
+            (None | Some("prony"), terms) => {
+                Ok(terms.map(|terms| RelaxationFamily::Prony { terms }))
+            }
+            (Some(other), _) => Err(refused(format!(
+                "'{other}' is not a family of relaxation moduli; choose prony or fractional"
+            ))),
+        }
     }
 }
 

@@ -18,8 +18,8 @@ use crate::material::{
 };
 use crate::recordings::is_session;
 use crate::relaxation::{
-    NoiseError, RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber,
-    relaxation,
+    NoiseError, RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm,
+    UncertainNumber, relaxation,
 };
 use crate::source::{RecordStretch, SourceError};
 use palpate_indentation::{

@@ -5,7 +5,7 @@ use crate::compliance::ComplianceCorrections;
 use crate::material::{ErrorSource, MaterialRequest};
 use crate::property::{Property, PropertyRequest, find_property};
 use crate::report::property::property_text;
-use palpate_indentation::{Base, ContactLaw, Indenter, PoissonBasis, Quantity};
+use palpate_indentation::{Base, ContactLaw, Indenter, PoissonBasis, Quantity, RelaxationFamily};
 use std::fmt::Write;
 
 const EQUILIBRIUM_MPA: f64 = 0.004;

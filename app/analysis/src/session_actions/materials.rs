@@ -6,6 +6,7 @@ use crate::analysed_session;
 use crate::material_lake::error_setting;
 use crate::property::{Property, PropertyReport, PropertyRequest};
 use crate::report::property::property_text;
+use palpate_indentation::RelaxationFamily;
 use palpate_sessions::analyses::{Analysis, AnalysisContent, MATERIAL_VERSION};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -33,8 +34,12 @@ impl MaterialToStore {
         });
         match request.property {
             Property::Modulus | Property::Unloading => {}
-            // The number of terms that was found stands in the report.
-            Property::Relaxation { family } => settings["is_family_given"] = json!(family.is_some()),
+            Property::Relaxation { family } => {
+                settings["terms"] = match family {
+                    Some(RelaxationFamily::Prony { terms }) => json!(terms),
+                    _ => Value::Null,
+                };
+            }
             Property::Dynamic { frequency_hz, .. } => {
                 settings["frequency_hz"] = json!(frequency_hz);
             }

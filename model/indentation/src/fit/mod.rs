@@ -28,6 +28,7 @@ use crate::viscoelastic::{
     DepthHistory, HistoryError, PowerLaw, RelaxationMode, RelaxationModulus,
 };
 use search::{Fitted, Record};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// A relaxation modulus and how well it is known.
@@ -87,7 +88,7 @@ pub enum RelaxationFitError {
 }
 
 /// What a relaxation modulus is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RelaxationFamily {
     /// So many exponentials.
     Prony { terms: usize },

@@ -6,6 +6,7 @@ use crate::widgets::{
 };
 use eframe::egui::Ui;
 use palpate_analysis::property::Property;
+use palpate_indentation::RelaxationFamily;
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,14 +25,15 @@ const PROPERTIES: [(PropertyChoice, &str); 4] = [
     (PropertyChoice::Dynamic, "dynamic moduli"),
 ];
 
-/// Of a Prony series, up to as many as are tried.
-const TERM_COUNTS: [(Option<usize>, &str); 6] = [
+/// Exponentials up to as many as are tried, and the fractional Zener model.
+const FAMILIES: [(Option<RelaxationFamily>, &str); 7] = [
     (None, "as many as are seen"),
-    (Some(1), "1"),
-    (Some(2), "2"),
-    (Some(3), "3"),
-    (Some(4), "4"),
-    (Some(5), "5"),
+    (Some(RelaxationFamily::Prony { terms: 1 }), "1"),
+    (Some(RelaxationFamily::Prony { terms: 2 }), "2"),
+    (Some(RelaxationFamily::Prony { terms: 3 }), "3"),
+    (Some(RelaxationFamily::Prony { terms: 4 }), "4"),
+    (Some(RelaxationFamily::Prony { terms: 5 }), "5"),
+    (Some(RelaxationFamily::Fractional), "of a fractional Zener model"),
 ];
 
 impl PropertyChoice {
@@ -53,7 +55,7 @@ impl PropertyChoice {
 #[serde(default)]
 pub(super) struct PropertyForm {
     pub choice: PropertyChoice,
-    term_count: Option<usize>,
+    family: Option<RelaxationFamily>,
     is_one_sine: bool,
     frequency: QuantityField,
     has_moving_mass: bool,
@@ -64,7 +66,7 @@ impl Default for PropertyForm {
     fn default() -> Self {
         Self {
             choice: PropertyChoice::default(),
-            term_count: None,
+            family: None,
             is_one_sine: false,
             frequency: QuantityField::typed("1".into()),
             has_moving_mass: false,
@@ -86,7 +88,7 @@ impl PropertyForm {
         Ok(match self.choice {
             PropertyChoice::Modulus => Property::Modulus,
             PropertyChoice::Unloading => Property::Unloading,
-            PropertyChoice::Relaxation => Property::Relaxation { term_count: self.term_count },
+            PropertyChoice::Relaxation => Property::Relaxation { family: self.family },
             PropertyChoice::Dynamic => {
                 let frequency = || self.frequency.named_value("frequency");
                 let mass = || self.moving_mass.named_values("moving mass").map(quantity);
@@ -108,7 +110,7 @@ impl PropertyForm {
         match self.choice {
             PropertyChoice::Modulus | PropertyChoice::Unloading => {}
             PropertyChoice::Relaxation => {
-                choice_ui(ui, "terms", &mut self.term_count, &TERM_COUNTS);
+                choice_ui(ui, "terms", &mut self.family, &FAMILIES);
             }
             PropertyChoice::Dynamic => {
                 tick_box(ui, &mut self.is_one_sine, "the whole record is one sine");
