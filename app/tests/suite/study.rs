@@ -1,6 +1,6 @@
 //! Animals and specimens typed once, in sessions, edits, searches, lakes and the table of a study.
 
-use crate::support::{answer, assert_refused, assert_says, json, palpate, short_run, succeeded};
+use crate::support::{answer, assert_prints, assert_refused, json, palpate, short_run, succeeded};
 use std::fs;
 use std::path::Path;
 
@@ -105,7 +105,7 @@ fn entries_are_added_later_beside_the_log_and_found_in_searches_and_lakes() {
     assert_eq!(of_folder["sessions"][0]["session_id"], of_lake["sessions"][0]["session_id"]);
     let first = &of_folder["problems"][0];
     assert_eq!((&first["problem"], &first["animal"]), (&"one-animal".into(), &"b".into()));
-    assert_says(&palpate(at, &["study", "lake"]), "all sessions are of animal 'b'");
+    assert_prints(&palpate(at, &["study", "lake"]), "all sessions are of animal 'b'");
 }
 
 #[test]

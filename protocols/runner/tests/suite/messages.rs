@@ -2,6 +2,7 @@
 
 use palpate_runner::programme::{CalibrationSessionError, ProgrammeRunError, ProgressError};
 use palpate_runner::replay::ReplayError;
+use palpate_runner::study::StudyError;
 use palpate_test_support::assert_messages;
 
 #[test]
@@ -31,5 +32,19 @@ fn programme_errors_have_their_words() {
         ProgrammeRunError::Ended { task: task(), repeat: 2, ending: "stop".into(), reason: "by hand".into() } => ["'ramp'", "repeat 2", "stop", "by hand"],
         ProgrammeRunError::Calibrating { task: task(), source: incomplete() } => ["'ramp'", "s-1"],
         ProgrammeRunError::NoRunner => ["incomplete"],
+    }
+}
+
+#[test]
+fn study_errors_have_their_words() {
+    let contradiction = StudyError::Contradiction {
+        key: "animal.sex".into(),
+        given: "male".into(),
+        known: "female".into(),
+        subject: "animal 'pig-3'".into(),
+        line: 3,
+    };
+    assert_messages! {
+        contradiction => ["animal.sex is 'male'", "line 3 of study.toml", "'female'", "'pig-3'"],
     }
 }
