@@ -227,7 +227,7 @@ impl SessionMetadata {
         Ok(())
     }
 
-    /// Sets an entry that was checked before.
+    /// Sets an entry that was checked before. Null, which only edits have, says that the session lacks the entry.
     pub fn put(&mut self, name: &str, value: Value) {
         self.values.insert(name.to_owned(), value);
     }
@@ -243,9 +243,11 @@ impl SessionMetadata {
 
     /// All entries as `KEY=VALUE`, in the order of [`lines`](Self::lines), with commas between them.
     pub fn pairs(&self) -> String {
-        let lines = self.lines().into_iter();
-        let pairs: Vec<String> = lines.map(|(name, value)| format!("{name}={value}")).collect();
-        pairs.join(", ")
+        let pair = |(name, value): (&str, String)| match self.get(name) {
+            Some(Value::Null) => format!("no {name}"),
+            _ => format!("{name}={value}"),
+        };
+        self.lines().into_iter().map(pair).collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -279,11 +281,12 @@ impl SessionLabels {
             "operator" => self.operator = words(),
             SPECIMEN => self.specimen = words(),
             "indenter" => self.indenter = words(),
+            name if value.is_null() => drop(self.about.values.remove(name)),
             name => self.about.put(name, value),
         }
     }
 
-    /// Takes over entries that were checked before; operator, specimen and indenter may be among them.
+    /// Takes over entries that were checked before; operator, specimen and indenter may be among them. Null removes one.
     pub fn take(&mut self, entries: &SessionMetadata) {
         entries.iter().for_each(|(name, value)| self.put(name, value.clone()));
     }

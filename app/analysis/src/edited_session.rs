@@ -142,11 +142,13 @@ fn correct_labels(manifest: &mut Manifest, edits: &Edits) -> Vec<String> {
     let mut labels = recorded.clone();
     edits.apply_to_labels(&mut labels);
     let note = |key: &MetadataKey| {
-        let (was, now) = (recorded.value(key.name)?, labels.value(key.name)?);
-        let edit = edits.about(key.name).filter(|_| was != now)?;
-        let (was, now) = (plain_value(&was), plain_value(&now));
-        let (name, by, reason) = (key.name, &edit.by, &edit.reason);
-        Some(format!("{name} was corrected from '{was}' to '{now}' by {by} ({reason})"))
+        let (was, now) = (recorded.value(key.name)?, labels.value(key.name));
+        let edit = edits.about(key.name).filter(|_| now.as_ref() != Some(&was))?;
+        let (name, was, by, reason) = (key.name, plain_value(&was), &edit.by, &edit.reason);
+        Some(match now.as_ref().map(plain_value) {
+            Some(now) => format!("{name} was corrected from '{was}' to '{now}' by {by} ({reason})"),
+            None => format!("{name} '{was}' was removed by {by} ({reason})"),
+        })
     };
     let notes = METADATA_KEYS.iter().filter_map(note).collect();
     manifest.set_labels(labels);

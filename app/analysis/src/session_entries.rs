@@ -3,10 +3,13 @@
 use crate::edits::{EditFailure, EditTarget};
 use crate::session_actions::Attribution;
 use crate::study_table::{StudyProblem, StudyTable};
-use palpate_model::metadata::{METADATA_KEYS, MetadataError, SessionLabels, SessionMetadata};
+use palpate_model::metadata::{
+    ANIMAL, ANIMAL_PREFIX, METADATA_KEYS, MetadataError, SPECIMEN, SessionLabels, SessionMetadata,
+};
 use palpate_runner::study::{Study, StudyError};
 use palpate_sessions::{EditChange, Manifest, SessionSummary};
 use serde::Serialize;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -72,21 +75,86 @@ fn completed(
     study: &Study,
 ) -> Result<SessionLabels, String> {
     let mut after = before.clone();
+    after.take(&outdated(before, entries, study));
     after.take(entries);
     study.complete(&mut after).map_err(|err| err.to_string())?;
     after.check().map_err(|err: MetadataError| err.to_string())?;
     Ok(after)
 }
 
-/// The entries that are new or have another value.
+/// Entries to remove, because they describe another animal or specimen than the session is of now: all of an animal,
+/// and what the study says of a specimen.
+fn outdated(before: &SessionLabels, entries: &SessionMetadata, study: &Study) -> SessionMetadata {
+    let mut outdated = SessionMetadata::default();
+    let specimen = entries.get(SPECIMEN).and_then(Value::as_str);
+    let specimen = specimen.filter(|name| *name != before.specimen);
+    if let (Some(_), Some((_, of_study))) = (specimen, study.specimen(&before.specimen)) {
+        let is_copied =
+            |(name, value): &(&str, &Value)| before.value(name).as_ref() == Some(*value);
+        of_study.iter().filter(is_copied).for_each(|(name, _)| outdated.put(name, Value::Null));
+    }
+    let of_specimen = specimen.and_then(|name| study.specimen(name)).map(|(animal, _)| animal);
+    let animal = entries.get(ANIMAL).and_then(Value::as_str).or(of_specimen);
+    let was = before.value(ANIMAL);
+    if animal.is_some() && was.is_some() && animal != was.as_ref().and_then(Value::as_str) {
+        let of_animal = before.about.iter().filter(|(name, _)| name.starts_with(ANIMAL_PREFIX));
+        of_animal.for_each(|(name, _)| outdated.put(name, Value::Null));
+    }
+    outdated
+}
+
+/// The entries that are new, have another value or are removed.
 fn changes(before: &SessionLabels, after: &SessionLabels) -> SessionMetadata {
     let mut changes = SessionMetadata::default();
     for key in METADATA_KEYS {
-        if let Some(value) = after.value(key.name)
-            && before.value(key.name).as_ref() != Some(&value)
-        {
-            changes.put(key.name, value);
+        let value = after.value(key.name);
+        if value != before.value(key.name) {
+            changes.put(key.name, value.unwrap_or_default());
         }
     }
     changes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(pairs: &[&str]) -> SessionLabels {
+        let mut labels = SessionLabels::default();
+        pairs.iter().for_each(|pair| labels.set_pair(pair).unwrap());
+        labels
+    }
+
+    #[test]
+    fn another_specimen_has_nothing_of_the_animal_and_the_specimen_before() {
+        let study = Study::parse(
+            "palpate-study = 1\n[animal.a]\nsex = 'male'\nage_days = 180\nspecimens = ['a1']\n[animal.b]\nsex = 'female'\nspecimens = ['b1']\n[specimen.a1]\nsite = 'left'\nthickness_mm = 9\n",
+        )
+        .unwrap();
+        let mut before = labels(&["specimen=a1", "specimen.thickness_mm=11"]);
+        study.complete(&mut before).unwrap();
+        let mut entries = SessionMetadata::default();
+        entries.set(SPECIMEN, "b1").unwrap();
+        let after = completed(&before, &entries, &study).unwrap();
+        // What was measured in the session stays.
+        let expected =
+            ["specimen=b1", "specimen.thickness_mm=11", "animal.name=b", "animal.sex=female"];
+        assert_eq!(after, labels(&expected));
+        let changes = changes(&before, &after);
+        assert_eq!(
+            changes.pairs(),
+            "specimen=b1, animal.name=b, no animal.age_days, animal.sex=female, no specimen.site"
+        );
+        // The edit makes of the labels before what they are after, also from its JSON.
+        let text = serde_json::to_string(&changes).unwrap();
+        let mut edited = before.clone();
+        edited.take(&serde_json::from_str(&text).unwrap());
+        assert_eq!(edited, after);
+        // A specimen that the study does not know keeps its animal: only its name was wrong.
+        let mut renamed = SessionMetadata::default();
+        renamed.set(SPECIMEN, "a-1").unwrap();
+        let after = completed(&before, &renamed, &study).unwrap();
+        assert_eq!(after.value(ANIMAL), Some("a".into()));
+        assert_eq!(after.value("animal.age_days"), Some(180.0.into()));
+    }
 }

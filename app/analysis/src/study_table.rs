@@ -87,14 +87,14 @@ pub enum StudyProblem {
         "{first} and {second} are both repeat {repeat} of specimen '{specimen}'; number the repeats of one series and site from 1"
     )]
     RepeatTwice { specimen: String, repeat: u64, first: String, second: String },
-    #[error("{} of {of} sessions lack {entry}: {}; add it to them", sessions.len(), names(sessions))]
+    #[error("{entry} is missing in {} of {of} sessions: {}; add it there", sessions.len(), names(sessions))]
     Missing { entry: &'static str, sessions: Vec<String>, of: usize },
     #[error(
         "all sessions are of animal '{animal}', so they say nothing of other animals; add sessions of others"
     )]
     OneAnimal { animal: String },
     #[error(
-        "no {group} has two {members}, so differences between {members} cannot be told from those between {group}s; measure more {members} of a {group}"
+        "no {group} has two {members}, so differences between {members} cannot be told from those between {group}s; measure several {members} of each {group}"
     )]
     NothingNested { group: &'static str, members: &'static str },
     #[error(

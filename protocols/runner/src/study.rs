@@ -88,6 +88,12 @@ impl Study {
         }
     }
 
+    /// The animal of a specimen, and the entries of the specimen.
+    pub fn specimen(&self, name: &str) -> Option<(&str, &SessionMetadata)> {
+        let (animal, own) = self.specimens.get(name.trim())?;
+        Some((animal, &own.entries))
+    }
+
     /// Adds the entries of the specimen and its animal that are not set; returns them.
     ///
     /// What is said of an animal must agree. What is said of a specimen may differ in a session, where it counts.
