@@ -1,6 +1,6 @@
 //! A master curve as people read it: shift factors and laws first, then the curve.
 
-use super::material::{indenter_words, kpa, law_words, not_included_line, specimen_words};
+use super::material::{indenter_words, kpa, law_words, specimen_words};
 use crate::dynamic::{
     MasterCurveReport, MasterPoint, PairReport, SweepReport, WilliamsLandelFerryReport,
 };
@@ -21,7 +21,9 @@ pub fn master_curve_text(report: &MasterCurveReport) -> String {
     lines.push(format!("law              {}", law_words(report.law)));
     lines.push(format!("indenter         {}", indenter_words(&report.indenter)));
     lines.push(format!("specimen         {}", specimen_words(&report.specimen)));
-    lines.extend(not_included_line(&report.not_included));
+    if !report.not_included.is_empty() {
+        lines.push(format!("not included     {}", report.not_included.join(", ")));
+    }
     lines.push(SHIFT.into());
     lines.join("\n")
 }

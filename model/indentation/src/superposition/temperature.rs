@@ -89,7 +89,8 @@ impl ShiftFactors {
         let bend: Vec<f64> = line.iter().map(|one| one * one).collect();
         let start = self.whitening.triangle(&[&line, &bend, &self.ln_shifts]);
         // A third temperature bends the line.
-        let (Some(_), Some(start)) = (start.solve(), start.combined(&[vec![(0, 1.0)]]).solve()) else {
+        let (Some(_), Some(start)) = (start.solve(), start.combined(&[vec![(0, 1.0)]]).solve())
+        else {
             return Err(LawRefusal::TooFewTemperatures);
         };
         let [mut p, mut q] = [start[0], 0.0];

@@ -1,7 +1,7 @@
 //! Sweeps of bodies with known shift factors.
 
 use super::*;
-use crate::viscoelastic::{PronySeries, PronyTerm};
+use crate::viscoelastic::{RelaxationMode, RelaxationModulus};
 use palpate_model::random::SplitMix;
 use std::f64::consts::{LN_10, PI, TAU};
 
@@ -16,8 +16,9 @@ fn frequencies() -> Vec<f64> {
 
 fn prony(frequency: f64) -> [f64; 2] {
     let terms = [(0.02, 30.0), (0.03, 3.0), (0.03, 0.3), (0.03, 0.03), (0.04, 0.003)];
-    let terms = terms.map(|(modulus_mpa, time_secs)| PronyTerm { modulus_mpa, time_secs });
-    PronySeries { equilibrium_mpa: 0.01, terms: terms.to_vec() }.dynamic_moduli(frequency)
+    let terms = terms.map(|(modulus_mpa, time_secs)| RelaxationMode { modulus_mpa, time_secs });
+    RelaxationModulus { equilibrium_mpa: 0.01, terms: terms.to_vec(), exponent: 1.0 }
+        .dynamic_moduli(frequency)
 }
 
 /// A fractional Zener body `G + (G0 - G) z / (1 + z)`, where `z = (i w tau)^0.4`.
@@ -198,8 +199,9 @@ fn sweeps_that_are_not_one_curve_are_refused() {
     let stiffer = sweep(|frequency| prony(frequency).map(|modulus| 1.5 * modulus), 37.0, 0.0);
     // With one relaxation time, no shift is found at all.
     let one_term = |frequency: f64| {
-        let terms = vec![PronyTerm { modulus_mpa: 0.01, time_secs: 1.0 }];
-        PronySeries { equilibrium_mpa: 1e-4, terms }.dynamic_moduli(0.5 * frequency)
+        let terms = vec![RelaxationMode { modulus_mpa: 0.01, time_secs: 1.0 }];
+        RelaxationModulus { equilibrium_mpa: 1e-4, terms, exponent: 1.0 }
+            .dynamic_moduli(0.5 * frequency)
     };
     let larger = |frequency: f64| one_term(frequency).map(|modulus| 1.5 * modulus);
     let sweeps = [sweep(one_term, 20.0, 0.0), sweep(larger, 37.0, 0.0)];

@@ -1,6 +1,5 @@
 //! What is typed becomes the request of the command line, and what is wrong is said at its field.
 
-use super::property::PropertyChoice;
 use super::*;
 use palpate_analysis::property::Property;
 use palpate_indentation::Indenter;
