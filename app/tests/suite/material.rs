@@ -1,6 +1,6 @@
 //! `palpate material` as a user meets it.
 
-use crate::support::{assert_refused, json, palpate, stdout, typed};
+use crate::support::{assert_refused, json, palpate, stderr, stdout, typed};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
@@ -173,6 +173,34 @@ fn moduli_of_a_lake_are_those_of_its_sessions_and_made_once() {
         2,
         "needs a lake",
     );
+}
+
+/// The same press a thousandth as large, as that of an atomic force microscope.
+#[test]
+fn depth_of_a_small_press_is_suggested_in_as_many_digits() {
+    let at = tempfile::tempdir().unwrap();
+    hertz_table(at.path(), "press.csv", [0.0125, 1.0, 0.45, 0.0]);
+    let large = std::fs::read_to_string(at.path().join("press.csv")).unwrap();
+    let small = large.lines().map(|row| match row.split(',').collect::<Vec<_>>()[..] {
+        [t, depth, force] if t != "t_s" => {
+            let [depth, force] = [depth, force].map(|text| text.parse::<f64>().unwrap());
+            format!("{t},{},{}\n", 1e-3 * depth, 1e-6 * force)
+        }
+        _ => format!("{row}\n"),
+    });
+    std::fs::write(at.path().join("small.csv"), small.collect::<String>()).unwrap();
+    let refused = |table: &str, radius: &str| {
+        let options = "--poisson 0.45 --law hertz --contact-error 0 --zero-error 0 --thickness 50";
+        let line = format!("material {table} --indenter sphere --radius {radius} {options}");
+        let words = stderr(&typed(at.path(), &line));
+        let (_, depth) = words.split_once("give --depth-max ").unwrap_or_else(|| panic!("{words}"));
+        let depth = depth.split(' ').next().unwrap();
+        let taken = typed(at.path(), &format!("{line} --depth-max {depth}"));
+        assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
+        depth.parse::<f64>().unwrap()
+    };
+    let [large, small] = [refused("press.csv", "1"), refused("small.csv", "0.001")];
+    assert!((1e3 * small / large - 1.0).abs() < 2e-3, "{large} {small}");
 }
 
 #[test]
