@@ -22,7 +22,7 @@ pub enum SessionEntriesError {
     #[error("{}: {reason}", session.display())]
     Session { session: PathBuf, reason: String },
     #[error(transparent)]
-    Contradiction(StudyProblem),
+    Contradiction(Box<StudyProblem>),
 }
 
 /// What was written beside a session: nothing where it had all entries.
@@ -56,7 +56,7 @@ pub fn enter(
     };
     let table = StudyTable::of(&planned.iter().map(named).collect::<Vec<_>>());
     if let Some(problem) = table.problems.into_iter().find(StudyProblem::is_contradiction) {
-        return Err(SessionEntriesError::Contradiction(problem));
+        return Err(SessionEntriesError::Contradiction(Box::new(problem)));
     }
     let mut entered = Vec::new();
     for (target, _, entries) in planned {
