@@ -72,9 +72,10 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
 
 fn failure(err: PopulationError) -> Failure {
     match err {
-        PopulationError::Design(_) | PopulationError::Parameter(_) | PopulationError::Read(_) => {
-            Failure::usage(err)
-        }
+        PopulationError::Design(_)
+        | PopulationError::Parameter(_)
+        | PopulationError::InSession { .. }
+        | PopulationError::Read(_) => Failure::usage(err),
         err => Failure::failed(err),
     }
 }

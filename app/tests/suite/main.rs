@@ -21,6 +21,7 @@ mod material;
 mod migrations;
 mod newer;
 mod plan;
+mod population;
 mod programme;
 mod protocol;
 mod queue;

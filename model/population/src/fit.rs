@@ -1,5 +1,6 @@
 //! Means, effects and spreads of a population, and how well they are known.
 
+use crate::likelihood::ShiftEstimate;
 use crate::search::{Coordinate, Coordinates, Criterion, Optimum};
 use crate::study::{NestedStudy, Study, StudyError};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -151,7 +152,7 @@ impl Fitter<'_> {
         let effects = &optimum.evaluation.effects;
         let shifts = self.nested.shifts(&factors, effects).ok_or(StudyError::NoOptimum)?;
         let sessions = shifts.last().into_iter().flatten().enumerate();
-        let modes = sessions.map(|(k, (shift, _))| shift + self.nested.session_mean(k, effects));
+        let modes = sessions.map(|(k, one)| &one.shift + self.nested.session_mean(k, effects));
         Ok(PopulationFit {
             effects: self.effects(&optimum).ok_or(StudyError::NoOptimum)?,
             effect_covariance: optimum.evaluation.covariance.clone(),
@@ -267,14 +268,15 @@ impl Fitter<'_> {
         [low, high].map(|end| end.map(|end| end * self.coordinates().scales[parameter]))
     }
 
-    fn groups(&self, shifts: &[Vec<(DVector<f64>, DMatrix<f64>)>]) -> Vec<GroupShift> {
+    fn groups(&self, shifts: &[Vec<ShiftEstimate>]) -> Vec<GroupShift> {
         let levels = self.study.levels.iter().zip(&self.nested.names).zip(shifts);
         let groups = levels.flat_map(|((level, names), shifts)| {
-            names.iter().zip(shifts).map(|(group, (shift, covariance))| GroupShift {
+            names.iter().zip(shifts).map(|(group, one)| GroupShift {
                 level: level.clone(),
                 group: group.clone(),
-                shifts: shift.iter().copied().collect(),
-                std_errors: covariance
+                shifts: one.shift.iter().copied().collect(),
+                std_errors: one
+                    .covariance
                     .diagonal()
                     .iter()
                     .map(|value| value.max(0.0).sqrt())

@@ -99,6 +99,13 @@ pub(crate) struct Evaluation {
     pub covariance: DMatrix<f64>,
 }
 
+/// The most probable shift of a group, with those it belongs to.
+#[derive(Clone, Debug)]
+pub(crate) struct ShiftEstimate {
+    pub shift: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
 /// Sums over the members of every group at given spreads.
 struct Sums {
     /// Of each level but the sessions' own.
@@ -290,15 +297,19 @@ impl NestedStudy {
         &self,
         factors: &[SpreadFactor],
         effects: &DVector<f64>,
-    ) -> Option<Vec<Vec<(DVector<f64>, DMatrix<f64>)>>> {
+    ) -> Option<Vec<Vec<ShiftEstimate>>> {
         let sums = self.sums(factors)?;
         let count = self.parameters;
-        let mut above = vec![(DVector::zeros(count), DMatrix::zeros(count, count))];
+        let none = ShiftEstimate {
+            shift: DVector::zeros(count),
+            covariance: DMatrix::zeros(count, count),
+        };
+        let mut above = vec![none];
         let mut all = Vec::with_capacity(self.levels());
         for (level, forms) in sums.groups.iter().enumerate() {
             let factor = &factors[level];
             let own = forms.iter().zip(&self.parents[level]).map(|(form, parent)| {
-                let (shift, covariance) = &above[*parent];
+                let ShiftEstimate { shift, covariance } = &above[*parent];
                 member(form, factor, &self.extended(shift, effects), covariance)
             });
             let own = own.collect::<Option<Vec<_>>>()?;
@@ -307,15 +318,18 @@ impl NestedStudy {
         }
         let factor = &factors[self.parents.len()];
         let sessions = self.sessions.iter().enumerate().map(|(index, session)| {
-            let (shift, covariance) = &above[self.owner[index]];
+            let ShiftEstimate { shift, covariance } = &above[self.owner[index]];
             let mean = self.session_mean(index, effects);
             match &session.evidence {
-                Evidence::Exact => Some((session.vector() - mean, DMatrix::zeros(count, count))),
+                Evidence::Exact => Some(ShiftEstimate {
+                    shift: session.vector() - mean,
+                    covariance: DMatrix::zeros(count, count),
+                }),
                 Evidence::Information(information) => {
                     let residual = shift + mean - session.vector();
-                    let (own, covariance) = member(information, factor, &residual, covariance)?;
+                    let own = member(information, factor, &residual, covariance)?;
                     // The form's first argument is the residual, so that only the change of it is the shift's.
-                    Some((shift + (own - &residual), covariance))
+                    Some(ShiftEstimate { shift: shift + (own.shift - &residual), ..own })
                 }
             }
         });
@@ -341,12 +355,13 @@ fn member(
     factor: &SpreadFactor,
     extended: &DVector<f64>,
     above: &DMatrix<f64>,
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+) -> Option<ShiftEstimate> {
     let (root, count) = (&factor.root, factor.signs.len());
     let step = Integration::of(form, factor)?;
     let change = root * step.weights.tr_mul(extended);
     let shift = extended.rows(0, count) - change;
     let own = root * &step.inverse * root.transpose();
     let keeps = DMatrix::identity(count, count) - root * step.weights.rows(0, count).transpose();
-    Some((shift, own + &keeps * above * keeps.transpose()))
+    let covariance = own + &keeps * above * keeps.transpose();
+    Some(ShiftEstimate { shift, covariance })
 }

@@ -175,7 +175,8 @@ fn shifts_are_those_of_the_covariance_of_all() {
         keep.view_mut((at, at), (2, 2)).copy_from(&(&along * along.transpose()));
     }
     let solution = (&keep * matrix * &keep).pseudo_inverse(1e-10).unwrap() * (&keep * right);
-    for (index, (shift, _)) in shifts[2].iter().enumerate() {
+    for (index, one) in shifts[2].iter().enumerate() {
+        let shift = &one.shift;
         let site = nested.owner[index];
         let own = [nested.parents[1][site], starts[1] + site, starts[2] + index];
         for k in 0..2 {

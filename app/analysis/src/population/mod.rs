@@ -68,16 +68,25 @@ pub enum PopulationError {
     NothingFitted { reason: String },
     #[error(transparent)]
     Parameter(FitError),
+    #[error("{session}: {reason}")]
+    InSession { session: String, reason: FitError },
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
     #[error("the population was not found, because the command was interrupted")]
     Ended,
 }
 
-/// One session's record, and the fit's start.
+/// The record of one session of the table.
 struct Curve {
+    row: usize,
     samples: Vec<FitSample>,
     signal: Option<Signal>,
+}
+
+/// The sessions that could be fitted, and the reasons of the others.
+struct StudyCurves {
+    curves: Vec<Curve>,
+    not_fitted: BTreeMap<String, String>,
 }
 
 /// Finds the population. `progress` hears of fitted sessions.
@@ -88,9 +97,9 @@ pub fn population(
     let names = parameter_names(request)?;
     let table = read_study(request.paths)?;
     let design = Design::of(&table, request.levels, request.effects)?;
-    let (curves, left_out) = read_curves(request, &table, progress)?;
-    let kept: Vec<usize> = curves.iter().map(|(row, _)| *row).collect();
-    let records = curves.iter().map(|(_, curve)| SignalRecord {
+    let StudyCurves { curves, not_fitted } = read_curves(request, &table, progress)?;
+    let kept: Vec<usize> = curves.iter().map(|curve| curve.row).collect();
+    let records = curves.iter().map(|curve| SignalRecord {
         name: "the record",
         samples: &curve.samples,
         signal: curve.signal.as_ref(),
@@ -99,11 +108,18 @@ pub fn population(
     let solutions = records
         .iter()
         .map(|record| FitSolution::fit_signals(&[*record], &request.recipe.options, &[]));
-    let solutions = solutions.collect::<Result<Vec<_>, _>>().map_err(PopulationError::Parameter)?;
+    let in_session = |place: usize| {
+        let session = table.rows[kept[place]].session.clone();
+        |reason: FitError| PopulationError::InSession { session, reason }
+    };
+    let solutions = solutions.enumerate().map(|(place, one)| one.map_err(in_session(place)));
+    let solutions = solutions.collect::<Result<Vec<_>, _>>()?;
     let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
-    let likelihoods = solutions.iter().map(|one| CurveLikelihood::of(one, 0, &wanted));
-    let mut likelihoods =
-        likelihoods.collect::<Result<Vec<_>, _>>().map_err(PopulationError::Parameter)?;
+    let likelihoods = solutions
+        .iter()
+        .enumerate()
+        .map(|(place, one)| CurveLikelihood::of(one, 0, &wanted).map_err(in_session(place)));
+    let mut likelihoods = likelihoods.collect::<Result<Vec<_>, _>>()?;
     let study = study(&names, &design, &table.rows, &kept, &mut likelihoods);
     let options =
         PopulationOptions { is_correlated: request.is_correlated, has_spread_intervals: true };
@@ -128,7 +144,7 @@ pub fn population(
         effects: fit.effects.iter().map(EffectRow::of).collect(),
         spreads: fit.spreads.iter().map(SpreadRow::of).collect(),
         groups: fit.groups,
-        not_fitted: left_out,
+        not_fitted,
         notes: notes(&design, &table, rounds),
     })
 }
@@ -203,49 +219,53 @@ fn read_curves(
     request: &PopulationRequest<'_>,
     table: &StudyTable,
     progress: &dyn Progress,
-) -> Result<(Vec<(usize, Curve)>, BTreeMap<String, String>), PopulationError> {
+) -> Result<StudyCurves, PopulationError> {
     let lake = match request.paths {
         [lake] if is_lake(lake) => Some((lake.as_path(), list_sessions(lake)?)),
         _ => None,
     };
     let is_ending = AtomicBool::new(false);
-    let (mut curves, mut left_out, mut row) = (Vec::new(), BTreeMap::new(), 0);
-    let one = |row: &StudyRow| curve(request.recipe, lake.as_ref(), row);
-    in_order(request.jobs, &table.rows, &is_ending, one, |event| match event {
+    let (mut curves, mut not_fitted) = (Vec::new(), BTreeMap::new());
+    let rows: Vec<usize> = (0..table.rows.len()).collect();
+    let mut names = table.rows.iter().map(|row| row.session.clone());
+    let one = |row: &usize| {
+        let (samples, signal) = read_curve(request.recipe, lake.as_ref(), &table.rows[*row])?;
+        Ok::<_, String>(Curve { row: *row, samples, signal })
+    };
+    in_order(request.jobs, &rows, &is_ending, one, |event| match event {
         WorkEvent::Done(count) => {
             if progress.report(count, table.rows.len(), "").is_break() {
                 is_ending.store(true, Ordering::Relaxed);
             }
         }
         WorkEvent::Next(answer) => {
-            let session = table.rows[row].session.clone();
+            let session = names.next().unwrap_or_default();
             match answer {
-                Ok(Ok(curve)) => curves.push((row, curve)),
-                Ok(Err(reason)) => drop(left_out.insert(session, reason)),
+                Ok(Ok(curve)) => curves.push(curve),
+                Ok(Err(reason)) => drop(not_fitted.insert(session, reason)),
                 Err(WorkFailure::NotBegun) => {}
                 Err(WorkFailure::Died) => {
                     let reason = "the fit ended unexpectedly; report this with the session";
-                    left_out.insert(session, reason.to_owned());
+                    not_fitted.insert(session, reason.to_owned());
                 }
             }
-            row += 1;
         }
     })
     .map_err(PopulationError::Threads)?;
     if is_ending.load(Ordering::Relaxed) {
         return Err(PopulationError::Ended);
     }
-    if let (true, Some((session, reason))) = (curves.is_empty(), left_out.first_key_value()) {
+    if let (true, Some((session, reason))) = (curves.is_empty(), not_fitted.first_key_value()) {
         return Err(PopulationError::NothingFitted { reason: format!("{session}: {reason}") });
     }
-    Ok((curves, left_out))
+    Ok(StudyCurves { curves, not_fitted })
 }
 
-fn curve(
+fn read_curve(
     recipe: &FitRecipe,
     lake: Option<&(&Path, Vec<LakeSession>)>,
     row: &StudyRow,
-) -> Result<Curve, String> {
+) -> Result<(Vec<FitSample>, Option<Signal>), String> {
     let words = |err: SourceError| err.to_string();
     let fitted: SourceFit = match lake {
         None => recipe.fit(Path::new(&row.session)).map_err(words)?,
@@ -258,5 +278,5 @@ fn curve(
         }
     };
     fitted.result.map_err(|err| err.to_string())?;
-    Ok(Curve { samples: fitted.samples, signal: fitted.signal })
+    Ok((fitted.samples, fitted.signal))
 }

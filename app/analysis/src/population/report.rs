@@ -119,7 +119,7 @@ impl PopulationReport {
             "parameter | mean or effect | median or factor | 95 % interval | degrees of freedom | p",
             effects,
         );
-        text.push('\n');
+        text.push_str("\n\n");
         let spreads = self.spreads.iter().map(|row| {
             let end = |end: Option<f64>| end.map_or("open".to_owned(), percent);
             let [low, high] = row.spread.interval;

@@ -46,13 +46,12 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
         let estimates = solution.estimates(record);
         let (mut best, mut widening) = (Vec::new(), Vec::new());
         for (&name, &parameter) in names.iter().zip(&parameters) {
-            let value = values[parameter];
-            let bad = |reason| FitError::BadValue { name: name.to_owned(), value, reason };
+            let (value, name) = (values[parameter], name.to_owned());
             if solution.system.fixed(record, parameter).is_some() {
-                return Err(bad("a likelihood needs parameters that are fitted"));
+                return Err(FitError::NotFitted { name });
             }
             if value <= 0.0 {
-                return Err(bad("its logarithm needs a value above zero; choose other parameters"));
+                return Err(FitError::NoLogarithm { name, value });
             }
             best.push(value.ln());
             widening.push(estimates[parameter].map_or(1.0, |one| one.inflation.sqrt()));

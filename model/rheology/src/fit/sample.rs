@@ -74,6 +74,14 @@ pub enum FitError {
     UnknownParameter { name: String, known: String },
     #[error("{name} cannot be fixed at {value}; {reason}")]
     BadValue { name: String, value: f64, reason: &'static str },
+    #[error(
+        "{name} is {value:.4}, which has no logarithm; leave it out of the parameters, or take another family"
+    )]
+    NoLogarithm { name: String, value: f64 },
+    #[error(
+        "{name} is fixed, so that the record says nothing of it; leave it out of the parameters"
+    )]
+    NotFitted { name: String },
     #[error("{family}: {reason}")]
     Unsupported { family: String, reason: String },
     #[error(

@@ -49,16 +49,10 @@ fn its_slope_is_that_of_fits_with_fixed_parameters() {
     let solution = FitSolution::of(&samples, &FitOptions::default()).unwrap();
     let report = solution.report();
     let mut likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
-    let inflation: Vec<f64> = {
-        let at_best = likelihood.expand(&likelihood.best().to_vec()).unwrap();
-        (0..2).map(|k| at_best.covariance[k][k]).collect()
-    };
-    let at: Vec<f64> = likelihood
-        .best()
-        .iter()
-        .zip(&inflation)
-        .map(|(best, variance)| best + 3.0 * variance.sqrt())
-        .collect();
+    let best = likelihood.best().to_vec();
+    let at_best = likelihood.expand(&best).unwrap();
+    let shifted = best.iter().zip(&at_best.covariance).enumerate();
+    let at: Vec<f64> = shifted.map(|(k, (best, row))| best + 3.0 * row[k].sqrt()).collect();
     let found = likelihood.expand(&at).unwrap();
     let squares = |at: &[f64]| {
         let mut options = FitOptions::default();
@@ -80,9 +74,9 @@ fn its_slope_is_that_of_fits_with_fixed_parameters() {
         -(shifted(1e-5) - shifted(-1e-5)) / 2e-5 / (2.0 * variance)
     };
     let slopes = [slope(0), slope(1)];
-    for k in 0..2 {
-        let step = found.centre[k] - at[k];
-        let expected: f64 = (0..2).map(|j| found.covariance[k][j] * slopes[j]).sum();
+    for ((centre, row), at) in found.centre.iter().zip(&found.covariance).zip(&at) {
+        let step = centre - at;
+        let expected: f64 = row.iter().zip(&slopes).map(|(share, slope)| share * slope).sum();
         assert!((step / expected - 1.0).abs() < 0.05, "{step} {expected}");
     }
 }
@@ -94,7 +88,7 @@ fn a_parameter_that_has_no_logarithm_is_refused() {
     options.fix("mu1", 0.01).unwrap();
     let solution = FitSolution::of(&samples, &options).unwrap();
     let refused = CurveLikelihood::of(&solution, 0, &NAMES).unwrap_err();
-    assert!(matches!(refused, FitError::BadValue { .. }), "{refused}");
+    assert!(matches!(refused, FitError::NotFitted { .. }), "{refused}");
     let unknown = CurveLikelihood::of(&solution, 0, &["mu9"]).unwrap_err();
     assert!(matches!(unknown, FitError::UnknownParameter { .. }), "{unknown}");
 }
