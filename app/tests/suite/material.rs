@@ -190,7 +190,8 @@ fn depth_of_a_small_press_is_suggested_in_as_many_digits() {
     });
     std::fs::write(at.path().join("small.csv"), small.collect::<String>()).unwrap();
     let refused = |table: &str, radius: &str| {
-        let options = "--poisson 0.45 --law hertz --contact-error 0 --zero-error 0 --thickness 50";
+        let options =
+            "--poisson 0.45 --law hertz --contact-error 0 --zero-error 0 --thickness 5000";
         let line = format!("material {table} --indenter sphere --radius {radius} {options}");
         let words = stderr(&typed(at.path(), &line));
         let (_, depth) = words.split_once("give --depth-max ").unwrap_or_else(|| panic!("{words}"));

@@ -29,6 +29,8 @@ pub(super) fn sections(report: &RelaxationReport) -> PropertySections {
         ("specimen", specimen_words(&report.specimen)),
         ("record", record_words(report)),
     ]);
+    let fractional = "of the fractional Zener model: relaxation and creep by the Mittag-Leffler function of the exponent";
+    assumptions.extend(report.exponent.map(|_| ("term".to_owned(), fractional.to_owned())));
     let choice = report.term_choice.as_ref();
     assumptions.extend(choice.map(|choice| ("terms".to_owned(), choice_words(choice))));
     PropertySections {
