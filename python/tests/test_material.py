@@ -57,8 +57,8 @@ def same_as_command(command, found, *words):
 
 
 #: A flat punch, of which the force is `4 R / (1 - nu) G d`, and its options.
-PUNCH = {"radius": 3, "thickness": 400, "poisson": 0.45, "law": "sneddon"}
-PUNCH_WORDS = ["--indenter", "flat-punch", "--radius", 3, "--thickness", 400, "--poisson", 0.45, "--law", "sneddon"]
+PUNCH = {"radius": 3, "thickness": 800, "poisson": 0.45, "law": "sneddon"}
+PUNCH_WORDS = ["--indenter", "flat-punch", "--radius", 3, "--thickness", 800, "--poisson", 0.45, "--law", "sneddon"]
 PER_MM = 4 * 3 / (1 - 0.45)
 NOISE = 1e-6 * np.sin(12.9898 * np.arange(4001) ** 2)
 
@@ -68,9 +68,9 @@ def test_modulus_of_an_unloading_is_the_one_that_made_it(command, tmp_path):
     # Sneddon's cone.
     force = 2 / np.pi * 0.0125 / (1 - 0.45**2) * np.tan(np.radians(75)) * depth**2
     table = write_table(tmp_path / "back.csv", 0.01 * np.arange(401), depth, force)
-    cone = {"half_angle": 75, "thickness": 500, "poisson": (0.45, 0.01), "contact_error": 0}
+    cone = {"half_angle": 75, "thickness": 5000, "poisson": (0.45, 0.01), "contact_error": 0}
     found = palpate.material(table, "cone", property="unloading", **cone)
-    words = ["--indenter", "cone", "--half-angle", 75, "--thickness", 500, "--poisson", "0.45±0.01", "--contact-error", 0]
+    words = ["--indenter", "cone", "--half-angle", 75, "--thickness", 5000, "--poisson", "0.45±0.01", "--contact-error", 0]
     same_as_command(command, found, "--property", "unloading", *words)
     assert found.modulus_kpa == pytest.approx(12.5, rel=1e-5)
     low, high = found.total95_kpa

@@ -215,7 +215,7 @@ fn every_property_has_its_entries_its_numbers_and_what_they_assume() {
     for (name, text) in [
         ("session", table.display().to_string().as_str()),
         ("radius", "3"),
-        ("thickness", "400"),
+        ("thickness", "800"),
         ("Poisson", "0.45"),
     ] {
         flow.type_into(name, text);

@@ -7,11 +7,12 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 15] = [
+const PACKAGES: [&str; 16] = [
     "model",
     "model/rheology",
     "model/haptics",
     "model/indentation",
+    "model/population",
     "drivers",
     "drivers/emulators",
     "sessions",

@@ -42,7 +42,7 @@ fn found(
         corrections: ComplianceCorrections::none(None),
         law: ContactLaw::Sneddon,
         indenter,
-        thickness_mm: Some(exact(500.0)),
+        thickness_mm: Some(exact(800.0)),
         base: Base::Bonded,
         poisson_ratio: exact(0.45),
         poisson_basis: PoissonBasis::Assumed,
