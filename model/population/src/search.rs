@@ -9,12 +9,13 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use std::cell::RefCell;
 
 const STEPS_MAX: u64 = 200;
-/// Of a search that Newton's steps follow, or that looks for a place in an interval: the criterion is then within a
-/// millionth of the lowest.
+/// Of a search that Newton's steps follow, or that looks for a place in an interval, for each root of a session: curvatures
+/// grow with the number of sessions, so that the criterion is then within a millionth of the lowest.
 const GRADIENT: f64 = 1e-4;
-/// Steps of Newton after the search, and the expected fall of the criterion, as a share of it, that ends them: rounding.
+/// Steps of Newton after the search. One that is expected to let the criterion fall by less than this share of it, near its
+/// rounding, is the last and is taken whole: what it leaves is its square.
 const NEWTON_STEPS_MAX: usize = 12;
-const FALL_MIN: f64 = 1e-14;
+const FALL_MIN: f64 = 1e-12;
 /// Share of a coordinate's scale over which gradients are differenced: the cube root of the rounding error.
 const DIFFERENCE: f64 = 1e-5;
 
@@ -172,7 +173,8 @@ impl Criterion<'_> {
         let search = Search { criterion: self, free, start, best };
         let rows = inverse_curvature.row_iter().map(|row| row.iter().copied().collect());
         let solver = BFGS::new(MoreThuenteLineSearch::new());
-        let solver = solver.with_tolerance_grad(GRADIENT).ok()?;
+        let tolerance = GRADIENT * (self.study.sessions.len() as f64).sqrt();
+        let solver = solver.with_tolerance_grad(tolerance).ok()?;
         let inside: Vec<f64> = free.iter().map(|&k| start[k]).collect();
         let executor = Executor::new(&search, solver).configure(|state| {
             state.param(inside).inv_hessian(rows.collect::<Vec<Vec<f64>>>()).max_iters(STEPS_MAX)
@@ -194,12 +196,17 @@ impl Criterion<'_> {
             };
             let step = factor.solve(&gradient);
             let fall = 0.5 * step.dot(&gradient);
+            let moved = |share: f64| -> Vec<f64> {
+                at.iter().zip(&step).map(|(at, by)| at - share * by).collect()
+            };
             if fall <= FALL_MIN * (1.0 + evaluation.criterion.abs()) {
+                let at = moved(1.0);
+                let evaluation = self.evaluate(&at)?;
                 return Some(Optimum { at, evaluation, curvature });
             }
             let mut share = 1.0;
             loop {
-                let next: Vec<f64> = at.iter().zip(&step).map(|(at, by)| at - share * by).collect();
+                let next = moved(share);
                 match self.evaluate(&next) {
                     Some(better) if better.criterion < evaluation.criterion => {
                         (at, evaluation) = (next, better);
