@@ -174,7 +174,8 @@ fn shifts_are_those_of_the_covariance_of_all() {
         let at = 2 * (starts[1] + site);
         keep.view_mut((at, at), (2, 2)).copy_from(&(&along * along.transpose()));
     }
-    let solution = (&keep * matrix * &keep).pseudo_inverse(1e-10).unwrap() * (&keep * right);
+    let covariance = (&keep * matrix * &keep).pseudo_inverse(1e-10).unwrap();
+    let solution = &covariance * (&keep * right);
     for (index, one) in shifts[2].iter().enumerate() {
         let shift = &one.shift;
         let site = nested.owner[index];
@@ -182,6 +183,9 @@ fn shifts_are_those_of_the_covariance_of_all() {
         for k in 0..2 {
             let expected: f64 = own.iter().map(|one| solution[2 * one + k]).sum();
             assert!((shift[k] - expected).abs() < 1e-8, "{} {expected}", shift[k]);
+            let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (2 * a + k, 2 * b + k)));
+            let variance: f64 = pairs.map(|pair| covariance[pair]).sum();
+            assert!((one.covariance[(k, k)] / variance - 1.0).abs() < 1e-6, "{variance}");
         }
     }
 }
