@@ -5,9 +5,9 @@ options(contrasts = c("contr.treatment", "contr.treatment"))
 
 from_nlme <- c("Oats", "Machines", "Rail", "ergoStool", "Alfalfa", "Orthodont")
 data(list = from_nlme, package = "nlme")
-data(list = c("Pastes", "Dyestuff", "Dyestuff2", "cake", "sleepstudy"), package = "lme4")
+data(list = c("Pastes", "Dyestuff2", "cake", "sleepstudy"), package = "lme4")
 
-# Values of lme4 are searched until its own derivative-free optimiser moves by less than a millionth of the answer.
+# lme4 searches without derivatives: until the region in which it looks is so small.
 tight <- lmerControl(optimizer = "bobyqa", optCtrl = list(rhoend = 1e-10, maxfun = 1e6),
                      check.conv.singular = "ignore")
 lme_tight <- lmeControl(tolerance = 1e-12, msTol = 1e-12, msMaxIter = 1000, maxIter = 1000, opt = "nlminb")

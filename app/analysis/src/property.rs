@@ -1,4 +1,4 @@
-//! The properties of a material that a press shows, asked for and answered in one way for every front end.
+//! The properties of a material that a press shows, found in one way for every front end.
 
 use crate::dynamic::{DynamicError, DynamicReport, DynamicRequest, dynamic};
 use crate::material::{MaterialError, MaterialReport, MaterialRequest, material};
@@ -8,7 +8,7 @@ use palpate_indentation::{Quantity, RelaxationFamily};
 use serde::Serialize;
 use thiserror::Error;
 
-/// A property with what is asked of it alone.
+/// A property with the options that are its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Property {
     /// Young's modulus of the loading.

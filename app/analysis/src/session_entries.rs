@@ -32,7 +32,8 @@ pub struct EnteredSession {
     pub entries: SessionMetadata,
 }
 
-/// Sets entries of all sessions, completed by the study of the library. A refusal writes nothing.
+/// Sets entries of all sessions, completed by the study of the library. A contradiction changes none of them; where a session
+/// cannot be written, those before it have their edit.
 pub fn enter(
     sessions: &[PathBuf],
     entries: &SessionMetadata,
@@ -44,6 +45,13 @@ pub fn enter(
     for session in sessions {
         let target = EditTarget::read(session)?;
         let mut manifest = SessionSummary::read(session).map_err(EditFailure::from)?.manifest;
+        let is_same = |(_, other, _): &(EditTarget, Manifest, SessionMetadata)| {
+            other.session_id == manifest.session_id
+        };
+        if planned.iter().any(is_same) {
+            let reason = "the session is given twice; give it once".to_owned();
+            return Err(SessionEntriesError::Session { session: session.clone(), reason });
+        }
         let mut before = manifest.labels();
         target.edits.apply_to_labels(&mut before);
         let after = completed(&before, entries, &study)

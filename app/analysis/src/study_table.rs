@@ -3,7 +3,7 @@
 
 use crate::daily::needs_daily_check;
 use crate::recordings::{RecordingsError, find_sessions};
-use crate::report::text::table;
+use crate::report::text::{counted, table};
 use crate::source::SourceError;
 use palpate_model::metadata::{
     ANIMAL, ANIMAL_PREFIX, METADATA_KEYS, SPECIMEN, SessionLabels, plain_value,
@@ -94,7 +94,7 @@ pub enum StudyProblem {
     )]
     OneAnimal { animal: String },
     #[error(
-        "no {group} has two {members}, so differences between {members} cannot be told from those between {group}s; measure several {members} of each {group}"
+        "no {group} has two {members}, so differences between {members} cannot be separated from those between {group}s; measure several {members} of each {group}"
     )]
     NothingNested { group: &'static str, members: &'static str },
     #[error(
@@ -199,13 +199,9 @@ impl StudyTable {
         let head = head.into_iter().chain(known.iter().copied()).chain(["session"]);
         let head = head.collect::<Vec<_>>().join(" | ");
         let mut text = table(&head, self.rows.iter().map(|row| row.cells(&known)));
-        let counted = |count: usize| match count {
-            1 => "1 session".to_owned(),
-            count => format!("{count} sessions"),
-        };
-        text += &format!("\n{}", counted(self.rows.len()));
+        text += &format!("\n{}", counted(self.rows.len(), "session"));
         if !self.left_out.is_empty() {
-            let left_out = counted(self.left_out.len());
+            let left_out = counted(self.left_out.len(), "session");
             text += &format!("; {left_out} rejected or without a specimen left out");
         }
         for problem in &self.problems {

@@ -1,8 +1,8 @@
-//! `palpate population`: means, effects and spreads of the bodies of a study.
+//! `palpate population`: means, effects and standard deviations of the parameters of a study.
 
 use super::fit::jobs;
 use super::output::Output;
-use super::{Failure, compliance};
+use super::{Failure, compliance, study};
 use clap::Args;
 use palpate_analysis::fit::{FitChoice, FitRecipe};
 use palpate_analysis::population::{
@@ -12,27 +12,24 @@ use palpate_analysis::source::{RecordStretch, SourceSelection};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Estimate the population that the specimens of a study come from: medians, effects and spreads by level
+/// Estimate the population that the specimens of a study come from: medians, effects and standard deviations by level
 #[derive(Debug, Args)]
 pub struct PopulationArgs {
     /// Session folders and folders of sessions, or one lake
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
-    /// Model family of the bodies; without it the modified Kelvin model
+    /// Model family; without it the modified Kelvin model
     #[arg(long, value_name = "KEY")]
     family: Option<String>,
-    /// Parameters of the population, as in tau_eps,mu1; without it all of the body
+    /// Parameters of the population, as in tau_eps,mu1; without it all of the model
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     parameters: Vec<String>,
-    /// Levels of groups from the outermost, as in animal,specimen,site; without it all that the sessions tell apart
+    /// Levels of groups from the outermost, as in animal,specimen,site; without it all that the sessions can separate
     #[arg(long, value_name = "LEVELS", value_delimiter = ',')]
     by: Vec<String>,
     /// An entry of the sessions that may move the mean, such as animal.treatment; may be repeated
     #[arg(long, value_name = "ENTRY")]
     effect: Vec<String>,
-    /// Let parameters of a group be correlated
-    #[arg(long)]
-    correlated: bool,
     /// Take each session's best values and their covariance instead of its curve
     #[arg(long)]
     two_stage: bool,
@@ -58,7 +55,6 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
         parameters: &args.parameters,
         levels: &args.by,
         effects: &args.effect,
-        is_correlated: args.correlated,
         method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
         jobs: jobs(args.jobs),
     };
@@ -72,10 +68,11 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
 
 fn failure(err: PopulationError) -> Failure {
     match err {
+        PopulationError::Read(err) => study::failure(err),
         PopulationError::Design(_)
         | PopulationError::Parameter(_)
-        | PopulationError::InSession { .. }
-        | PopulationError::Read(_) => Failure::usage(err),
+        | PopulationError::ParameterTwice { .. }
+        | PopulationError::InSession { .. } => Failure::usage(err),
         err => Failure::failed(err),
     }
 }

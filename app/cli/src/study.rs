@@ -33,7 +33,7 @@ pub(super) fn run(args: &StudyArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn failure(err: StudyReadError) -> Failure {
+pub(super) fn failure(err: StudyReadError) -> Failure {
     match err {
         StudyReadError::Recordings(err) => sources_failure(err),
         StudyReadError::Lake(err @ (LakeError::NoLake { .. } | LakeError::Newer { .. })) => {

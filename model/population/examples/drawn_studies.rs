@@ -1,4 +1,4 @@
-//! How often the intervals of a drawn population hold the truth: `drawn_studies STUDIES` prints a line for each number of
+//! Coverage probability of the intervals of a drawn population: `drawn_studies STUDIES` prints a line for each number of
 //! animals, each with three sites of two repeats, half of the animals treated.
 //!
 //! With `heavy` animals scatter by Student's t with three degrees of freedom, with `one-bad` one specimen in each study is
@@ -49,6 +49,7 @@ fn study(animals: usize, effect: f64, trouble: Trouble, random: &mut SplitMix) -
             for _ in 0..REPEATS {
                 let noise = SPREADS[2] * random.normal() + NOISE * random.normal();
                 study.sessions.push(StudySession {
+                    name: format!("session {}", study.sessions.len() + 1),
                     groups: vec![format!("animal {animal}"), format!("site {site}")],
                     design: vec![1.0, treated],
                     values: vec![MEAN + effect * treated + at + noise],
@@ -75,17 +76,17 @@ struct Tally {
 
 impl Tally {
     fn count(&mut self, fit: &PopulationFit, effect: f64) {
-        let holds = |[low, high]: [f64; 2], truth: f64| usize::from(low <= truth && truth <= high);
+        let covers = |[low, high]: [f64; 2], truth: f64| usize::from(low <= truth && truth <= high);
         let [mean, treated] = [0, 1].map(|k| &fit.effects[k]);
-        self.mean += holds(mean.interval, MEAN);
-        self.effect += holds(treated.interval, effect);
+        self.mean += covers(mean.interval, MEAN);
+        self.effect += covers(treated.interval, effect);
         self.widths[0] += mean.interval[1] - mean.interval[0];
         self.widths[1] += treated.interval[1] - treated.interval[0];
-        for (k, spread) in fit.spreads.iter().enumerate() {
-            let [low, high] = spread.interval;
+        for (k, one) in fit.standard_deviations.iter().enumerate() {
+            let [low, high] = one.interval;
             let ends = [low.unwrap_or(0.0), high.unwrap_or(f64::INFINITY)];
-            self.spreads[k] += holds(ends, SPREADS[k]);
-            self.zeros[k] += usize::from(spread.is_zero);
+            self.spreads[k] += covers(ends, SPREADS[k]);
+            self.zeros[k] += usize::from(one.is_zero);
         }
     }
 }
@@ -99,7 +100,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Some("one-bad") => Trouble::OneBad,
         _ => Trouble::None,
     };
-    let options = PopulationOptions { is_correlated: false, has_spread_intervals: true };
+    let options = PopulationOptions { has_deviation_intervals: true };
     for animals in ANIMALS {
         let mut random = SplitMix::seeded(animals as u64);
         let (mut tally, mut false_positives) = (Tally::default(), 0);
@@ -113,7 +114,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let share = |count: usize| 100.0 * count as f64 / studies as f64;
         let [animal, site, repeat] = tally.spreads.map(share);
         println!(
-            "{animals:2} animals: mean {:.1} %, effect {:.1} %, spreads of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; zero {:?}; widths {:.3} {:.3}",
+            "{animals:2} animals: mean {:.1} %, effect {:.1} %, standard deviations of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; zero {:?}; widths {:.3} {:.3}",
             share(tally.mean),
             share(tally.effect),
             share(false_positives),

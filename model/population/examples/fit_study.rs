@@ -13,9 +13,7 @@ struct StudyText {
     effects: Vec<String>,
     sessions: Vec<SessionText>,
     #[serde(default)]
-    has_spread_intervals: bool,
-    #[serde(default)]
-    is_correlated: bool,
+    has_deviation_intervals: bool,
 }
 
 #[derive(Deserialize)]
@@ -30,7 +28,7 @@ struct SessionText {
 #[expect(clippy::print_stdout, reason = "an example prints its result")]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let text: StudyText = serde_json::from_reader(std::io::stdin())?;
-    let session = |one: SessionText| {
+    let session = |(index, one): (usize, SessionText)| {
         let evidence = match one.information {
             None => Evidence::Exact,
             Some(rows) => Evidence::Information(SymmetricMatrix::from_fn(
@@ -39,18 +37,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 |row, column| rows[row][column],
             )),
         };
-        StudySession { groups: one.groups, design: one.design, values: one.values, evidence }
+        let name = format!("session {}", index + 1);
+        StudySession { name, groups: one.groups, design: one.design, values: one.values, evidence }
     };
     let study = Study {
         parameters: text.parameters,
         effects: text.effects,
         levels: text.levels,
-        sessions: text.sessions.into_iter().map(session).collect(),
+        sessions: text.sessions.into_iter().enumerate().map(session).collect(),
     };
-    let options = PopulationOptions {
-        is_correlated: text.is_correlated,
-        has_spread_intervals: text.has_spread_intervals,
-    };
+    let options = PopulationOptions { has_deviation_intervals: text.has_deviation_intervals };
     let fit = fit_population(&study, options)?;
     println!("{}", serde_json::to_string(&fit)?);
     Ok(())

@@ -1,15 +1,14 @@
 //! The population of whole curves: each session enters with its likelihood where the population expects its body.
 
-use crate::fit::{PopulationFit, PopulationOptions, fit_population};
+use crate::fit::most_probable;
 use crate::study::{Evidence, Study, StudyError};
 use nalgebra::{Cholesky, DMatrix};
 
-/// Rounds at most, and the largest change of a session's most probable body that ends them, in standard deviations of what
-/// the session tells by itself.
+/// Rounds at most, and the largest change of the centre of a session's expansion that ends them, in its standard deviations.
 const ROUNDS_MAX: usize = 30;
 const CHANGE: f64 = 1e-4;
 
-/// What a session's curve tells around a body: the normal distribution with its slope and curvature there.
+/// The likelihood of a session's curve around a model: the normal distribution with its slope and curvature there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurveEvidence {
     /// Logarithms of the parameters.
@@ -17,45 +16,48 @@ pub struct CurveEvidence {
     pub covariance: DMatrix<f64>,
 }
 
-/// A population of curves, and how it was found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CurvePopulation {
-    pub fit: PopulationFit,
-    /// The study with what the curves told last.
-    pub study: Study,
+impl CurveEvidence {
+    /// The evidence of a session; `None` where the covariance is none.
+    #[must_use]
+    pub fn evidence(&self) -> Option<Evidence> {
+        Some(Evidence::Information(Cholesky::new(self.covariance.clone())?.inverse()))
+    }
+}
+
+/// How the curves of a study were expanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CurveRounds {
     pub rounds: usize,
+    /// False where the expansions still moved, or one of the last round failed.
     pub is_converged: bool,
 }
 
-/// The population of a study whose sessions' curves tell more than a value and its covariance: in turn, the curves are
-/// expanded around the most probable body of each session, and the population is found of what they tell there (Lindstrom &
-/// Bates, Biometrics 46 (1990) 673-687). `expand` gets the place of a session and the logarithms of a body; without an answer
-/// what the session told before stands. `heard` is called after each round.
-pub fn fit_curves(
-    mut study: Study,
-    options: PopulationOptions,
-    mut expand: impl FnMut(usize, &[f64]) -> Option<CurveEvidence>,
-    mut heard: impl FnMut(usize),
-) -> Result<CurvePopulation, StudyError> {
-    let plain = PopulationOptions { has_spread_intervals: false, ..options };
-    let (mut rounds, mut is_converged) = (0, false);
-    while rounds < ROUNDS_MAX && !is_converged {
-        let fit = fit_population(&study, plain)?;
+/// Expands the curves of a study's sessions around what the population says of each, and finds the population from these
+/// expansions, in turn until nothing changes (Lindstrom & Bates, Biometrics 46 (1990) 673-687). `expand` gets the most probable
+/// parameters of all sessions, in logarithms; a session without an answer keeps the expansion that it had.
+pub fn expand_curves<E: From<StudyError>>(
+    study: &mut Study,
+    mut expand: impl FnMut(&[Vec<f64>]) -> Result<Vec<Option<CurveEvidence>>, E>,
+) -> Result<CurveRounds, E> {
+    for rounds in 1..=ROUNDS_MAX {
+        let modes = most_probable(study)?;
+        let modes: Vec<Vec<f64>> = modes.iter().map(|one| one.as_slice().to_vec()).collect();
         let mut largest = 0.0f64;
-        for (index, (session, mode)) in study.sessions.iter_mut().zip(&fit.modes).enumerate() {
-            let Some(told) = expand(index, mode.as_slice()) else { continue };
-            let Some(factor) = Cholesky::new(told.covariance.clone()) else { continue };
-            let deviations = told.covariance.diagonal().map(f64::sqrt);
-            let pairs = told.centre.iter().zip(&session.values).zip(&deviations);
-            largest =
-                pairs.fold(largest, |most, ((new, old), sd)| most.max((new - old).abs() / sd));
-            session.values = told.centre;
-            session.evidence = Evidence::Information(factor.inverse());
+        for (session, found) in study.sessions.iter_mut().zip(expand(&modes)?) {
+            let evidence = found.as_ref().and_then(CurveEvidence::evidence);
+            let (Some(found), Some(evidence)) = (found, evidence) else {
+                largest = f64::INFINITY;
+                continue;
+            };
+            let deviations = found.covariance.diagonal().map(f64::sqrt);
+            let pairs = found.centre.iter().zip(&session.values).zip(&deviations);
+            let changes = pairs.map(|((new, old), deviation)| (new - old).abs() / deviation);
+            largest = changes.fold(largest, f64::max);
+            (session.values, session.evidence) = (found.centre, evidence);
         }
-        rounds += 1;
-        is_converged = largest < CHANGE;
-        heard(rounds);
+        if largest < CHANGE {
+            return Ok(CurveRounds { rounds, is_converged: true });
+        }
     }
-    let fit = fit_population(&study, options)?;
-    Ok(CurvePopulation { fit, study, rounds, is_converged })
+    Ok(CurveRounds { rounds: ROUNDS_MAX, is_converged: false })
 }

@@ -1,23 +1,27 @@
-//! Means, effects and spreads of a population, and how well they are known.
+//! Means, effects and standard deviations of a population, and how well they are known.
 
-use crate::likelihood::ShiftEstimate;
-use crate::search::{Coordinate, Coordinates, Criterion, Optimum};
+use crate::likelihood::{ShiftEstimate, SpreadFactor};
+use crate::search::{Coordinates, Criterion, Optimum};
 use crate::study::{NestedStudy, Study, StudyError};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use std::cell::RefCell;
 
-/// A spread below this share of the scatter of the values is zero.
+/// A standard deviation below this share of the scatter of the values is zero.
 const ZERO: f64 = 1e-4;
-/// Share of a coordinate's scale over which the covariance of the effects is differenced.
+/// Share of a coordinate's scale over which the covariance of the effects is differenced: the cube root of the rounding error.
 const SLOPE_STEP: f64 = 1e-5;
 /// More degrees of freedom are as good as a normal distribution.
 const FREEDOM_MAX: f64 = 1e9;
-/// Coverage of every interval.
+/// Coverage probability of every interval.
 pub const COVERAGE: f64 = 0.95;
-/// How far out an end of an interval is looked for, in widths of what the curvature says.
+/// How often the place where the upper end of an interval is looked for grows by half: to more than a billion scales.
 const ENDS_MAX: i32 = 60;
+/// The smallest place where it is looked for, over the scale.
+const END_MIN: f64 = 0.1;
+/// An end of an interval is right to this share of itself: three digits are printed.
+const END_TOLERANCE: f64 = 1e-3;
 
 /// What a mean or an effect is known to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,7 +30,7 @@ pub struct EffectEstimate {
     pub parameter: String,
     /// In logarithms of the parameter.
     pub value: f64,
-    /// With spreads of zero or more; the interval takes that without this bound, where a spread is zero.
+    /// With variances of zero or more; where one is zero the interval is that without this bound.
     pub std_error: f64,
     /// Degrees of freedom by Satterthwaite (Biometrics Bulletin 2 (1946) 110-114).
     pub freedom: f64,
@@ -36,27 +40,27 @@ pub struct EffectEstimate {
     pub p_value: f64,
 }
 
-/// How far groups of a level scatter.
+/// The standard deviation between the groups of a level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct LevelDeviation {
     pub level: String,
     pub parameter: String,
-    /// Standard deviation of the logarithm.
+    /// Of the logarithm.
     pub value: f64,
     /// Ends of the 95 % interval by the profile of the restricted likelihood; no upper end where none was found.
     pub interval: [Option<f64>; 2],
     /// Share of the variance of one session, without its own noise.
     pub share: f64,
-    /// Whether the best value is zero: the sessions show no scatter of this level.
+    /// Whether the best value is zero: the sessions show no differences between groups of this level.
     pub is_zero: bool,
 }
 
-/// How far one group is from the mean of its like.
+/// How far one group is from the group that it belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GroupShift {
     pub level: String,
     pub group: String,
-    /// Most probable shift of each parameter, in logarithms, of the group with those it belongs to.
+    /// Most probable shift of each parameter, in logarithms.
     pub shifts: Vec<f64>,
     pub std_errors: Vec<f64>,
 }
@@ -65,28 +69,18 @@ pub struct GroupShift {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PopulationFit {
     pub effects: Vec<EffectEstimate>,
-    /// Covariance of the effects, those of the first column for all parameters first.
-    #[serde(skip)]
-    pub effect_covariance: DMatrix<f64>,
-    pub spreads: Vec<Spread>,
-    /// Factor of the covariance of each level.
-    #[serde(skip)]
-    pub factors: Vec<DMatrix<f64>>,
-    /// Minus twice the logarithm of the restricted likelihood, but for what no spread changes.
-    pub criterion: f64,
+    pub standard_deviations: Vec<LevelDeviation>,
     pub groups: Vec<GroupShift>,
-    /// The most probable parameters of each session, in logarithms.
-    #[serde(skip)]
-    pub modes: Vec<DVector<f64>>,
+    /// Whether the intervals of the effects keep the bound on variances although one of them is zero, since without it no
+    /// optimum was found.
+    pub is_bounded: bool,
 }
 
-/// What is asked of a fit.
+/// Options of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PopulationOptions {
-    /// Whether shifts of different parameters may be correlated.
-    pub is_correlated: bool,
-    /// Whether intervals of spreads are looked for, which needs most of the time.
-    pub has_spread_intervals: bool,
+    /// Whether intervals of standard deviations are found, which takes most of the time.
+    pub has_deviation_intervals: bool,
 }
 
 /// The population of a study by restricted maximum likelihood (Patterson & Thompson, Biometrika 58 (1971) 545-554).
@@ -95,22 +89,35 @@ pub fn fit_population(
     options: PopulationOptions,
 ) -> Result<PopulationFit, StudyError> {
     let nested = study.nested()?;
-    let coordinates = Coordinates::of(&nested, options.is_correlated);
-    let fitter = Fitter {
-        study,
-        nested: &nested,
-        criterion: Criterion { study: &nested, coordinates: &coordinates },
-    };
-    fitter.fit(options)
+    let coordinates = Coordinates::of(&nested);
+    let optimum = optimum(&nested, &coordinates)?;
+    let criterion = Criterion { study: &nested, coordinates: &coordinates };
+    Fitter { study, nested: &nested, criterion, optimum }.fit(options)
 }
 
-/// The covariance of the effects and how it changes with the spreads.
+/// The most probable parameters of each session in their population, in logarithms.
+pub(crate) fn most_probable(study: &Study) -> Result<Vec<DVector<f64>>, StudyError> {
+    let nested = study.nested()?;
+    let coordinates = Coordinates::of(&nested);
+    let Optimum { at, evaluation, .. } = optimum(&nested, &coordinates)?;
+    let shifts = nested.shifts(&coordinates.factors(&at), &evaluation.effects);
+    let sessions = shifts.and_then(|mut shifts| shifts.pop()).ok_or(StudyError::NoOptimum)?;
+    let mean = |session| nested.session_mean(session, &evaluation.effects);
+    Ok(sessions.into_iter().enumerate().map(|(k, one)| one.whole + mean(k)).collect())
+}
+
+fn optimum(nested: &NestedStudy, coordinates: &Coordinates) -> Result<Optimum, StudyError> {
+    let criterion = Criterion { study: nested, coordinates };
+    criterion.minimum(&coordinates.start()).ok_or(StudyError::NoOptimum)
+}
+
+/// The covariance of the effects and how it changes with the standard deviations.
 struct Judgement {
     covariance: DMatrix<f64>,
-    /// By each coordinate of the spreads.
+    /// By each coordinate of the standard deviations.
     slopes: Vec<DMatrix<f64>>,
     /// Covariance of these coordinates.
-    spread_covariance: DMatrix<f64>,
+    coordinate_covariance: DMatrix<f64>,
 }
 
 impl Judgement {
@@ -126,7 +133,7 @@ impl Judgement {
         Some(Self {
             covariance: optimum.evaluation.covariance.clone(),
             slopes: (0..optimum.at.len()).map(slope).collect::<Option<_>>()?,
-            spread_covariance: inverse_of_the_known(&optimum.curvature) * 2.0,
+            coordinate_covariance: Cholesky::new(optimum.curvature.clone())?.inverse() * 2.0,
         })
     }
 }
@@ -135,6 +142,7 @@ struct Fitter<'a> {
     study: &'a Study,
     nested: &'a NestedStudy,
     criterion: Criterion<'a>,
+    optimum: Optimum,
 }
 
 impl Fitter<'_> {
@@ -142,39 +150,36 @@ impl Fitter<'_> {
         self.criterion.coordinates
     }
 
+    fn factors(&self) -> Vec<SpreadFactor> {
+        self.coordinates().factors(&self.optimum.at)
+    }
+
     fn fit(&self, options: PopulationOptions) -> Result<PopulationFit, StudyError> {
-        let start = self.coordinates().start();
-        if self.criterion.evaluate(&start).is_none() {
-            return Err(StudyError::Effects { effects: self.study.effects.join(", ") });
-        }
-        let optimum = self.criterion.minimum(&start).ok_or(StudyError::NoOptimum)?;
-        let factors = self.coordinates().factors(&optimum.at);
-        let effects = &optimum.evaluation.effects;
-        let shifts = self.nested.shifts(&factors, effects).ok_or(StudyError::NoOptimum)?;
-        let sessions = shifts.last().into_iter().flatten().enumerate();
-        let modes = sessions.map(|(k, one)| &one.shift + self.nested.session_mean(k, effects));
+        let shifts = self.nested.shifts(&self.factors(), &self.optimum.evaluation.effects);
+        let unbounded = self.has_zero().then(|| self.without_bounds()).flatten();
+        let is_bounded = self.has_zero() && unbounded.is_none();
+        let judged = unbounded.or_else(|| Judgement::of(&self.criterion, &self.optimum));
         Ok(PopulationFit {
-            effects: self.effects(&optimum).ok_or(StudyError::NoOptimum)?,
-            effect_covariance: optimum.evaluation.covariance.clone(),
-            spreads: self.spreads(&optimum, options.has_spread_intervals),
-            criterion: optimum.evaluation.criterion,
-            groups: self.groups(&shifts),
-            modes: modes.collect(),
-            factors: factors.into_iter().map(|factor| factor.root).collect(),
+            effects: judged
+                .and_then(|judged| self.effects(&judged))
+                .ok_or(StudyError::NoOptimum)?,
+            standard_deviations: self.deviations(options.has_deviation_intervals),
+            groups: self.groups(&shifts.ok_or(StudyError::NoOptimum)?),
+            is_bounded,
         })
     }
 
-    fn effects(&self, optimum: &Optimum) -> Option<Vec<EffectEstimate>> {
-        let judged = self.judge(optimum)?;
+    fn effects(&self, judged: &Judgement) -> Option<Vec<EffectEstimate>> {
+        let evaluation = &self.optimum.evaluation;
         let mut found = Vec::new();
         for (j, effect) in self.study.effects.iter().enumerate() {
             for (k, parameter) in self.study.parameters.iter().enumerate() {
                 let index = j * self.study.parameters.len() + k;
-                let value = optimum.evaluation.effects[index];
+                let value = evaluation.effects[index];
                 let variance = judged.covariance[(index, index)];
                 let slopes = judged.slopes.iter().map(|slope| slope[(index, index)]);
                 let slopes = DVector::from_iterator(judged.slopes.len(), slopes);
-                let uncertainty = (&judged.spread_covariance * &slopes).dot(&slopes);
+                let uncertainty = (&judged.coordinate_covariance * &slopes).dot(&slopes);
                 let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, FREEDOM_MAX);
                 let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
                 let half = student.inverse_cdf(0.5 + 0.5 * COVERAGE) * variance.sqrt();
@@ -182,7 +187,7 @@ impl Fitter<'_> {
                     effect: effect.clone(),
                     parameter: parameter.clone(),
                     value,
-                    std_error: optimum.evaluation.covariance[(index, index)].sqrt(),
+                    std_error: evaluation.covariance[(index, index)].sqrt(),
                     freedom,
                     interval: [value - half, value + half],
                     p_value: 2.0 * student.cdf(-(value / variance.sqrt()).abs()),
@@ -192,66 +197,54 @@ impl Fitter<'_> {
         Some(found)
     }
 
-    /// By what intervals of means and effects are judged: where a spread is zero, by variances that may be below zero. A bound
-    /// would make them too narrow or too wide by turns (Stroup & Littell, Conference on Applied Statistics in Agriculture, 2002).
-    fn judge(&self, optimum: &Optimum) -> Option<Judgement> {
-        let has_zero = optimum.at.iter().any(|value| value.abs() < ZERO);
-        let free = has_zero.then(|| self.without_bounds(optimum)).flatten();
-        free.or_else(|| Judgement::of(&self.criterion, optimum))
+    fn has_zero(&self) -> bool {
+        self.optimum.at.iter().any(|value| value.abs() < ZERO)
     }
 
-    fn without_bounds(&self, optimum: &Optimum) -> Option<Judgement> {
-        let (coordinates, start) = self.coordinates().signed(&optimum.at)?;
+    /// By what intervals of means and effects are judged where a variance is zero: by variances that may be below zero. The
+    /// bound would make them too narrow or too wide by turns (Stroup & Littell, Conference on Applied Statistics in Agriculture,
+    /// 2002).
+    fn without_bounds(&self) -> Option<Judgement> {
+        let (coordinates, start) = self.coordinates().signed(&self.optimum.at);
         let criterion = Criterion { study: self.nested, coordinates: &coordinates };
         Judgement::of(&criterion, &criterion.minimum(&start)?)
     }
 
-    fn spreads(&self, optimum: &Optimum, has_intervals: bool) -> Vec<Spread> {
-        let factors = self.coordinates().factors(&optimum.at);
-        let variance = |level: usize, k: usize| factors[level].root.row(k).norm_squared();
-        let mut spreads = Vec::new();
-        for (level, name) in self.study.levels.iter().enumerate() {
-            for (k, parameter) in self.study.parameters.iter().enumerate() {
-                let value = variance(level, k).sqrt();
-                let all: f64 = (0..factors.len()).map(|other| variance(other, k)).sum();
-                let is_zero = value < ZERO * self.coordinates().scales[k];
-                let interval = match has_intervals {
-                    true => self.spread_interval(optimum, level, k),
-                    false => [None, None],
-                };
-                spreads.push(Spread {
+    fn deviations(&self, has_intervals: bool) -> Vec<LevelDeviation> {
+        let parameters = self.study.parameters.iter().enumerate();
+        let size = |level: usize, k: usize| self.optimum.at[self.coordinates().place(level, k)];
+        let variance = |level: usize, k: usize| size(level, k).powi(2);
+        let levels = self.study.levels.iter().enumerate();
+        let each = levels.flat_map(|(level, name)| {
+            parameters.clone().map(move |(k, parameter)| {
+                let all: f64 = (0..self.study.levels.len()).map(|other| variance(other, k)).sum();
+                let is_zero = size(level, k).abs() < ZERO;
+                let value = size(level, k).abs() * self.coordinates().scales[k];
+                LevelDeviation {
                     level: name.clone(),
                     parameter: parameter.clone(),
                     value: if is_zero { 0.0 } else { value },
-                    interval,
+                    interval: if has_intervals { self.interval(level, k) } else { [None, None] },
                     share: if all > 0.0 { variance(level, k) / all } else { 0.0 },
                     is_zero,
-                });
-            }
-        }
-        spreads
+                }
+            })
+        });
+        each.collect()
     }
 
-    /// Ends of an interval of a spread, where the profile of the criterion has risen by the quantile of chi squared with one
-    /// degree of freedom (Venzon & Moolgavkar, Applied Statistics 37 (1988) 87-94).
-    fn spread_interval(
-        &self,
-        optimum: &Optimum,
-        level: usize,
-        parameter: usize,
-    ) -> [Option<f64>; 2] {
-        let own = Coordinate { level, row: parameter, column: parameter };
-        let Some(held) = self.coordinates().all.iter().position(|one| *one == own) else {
-            return [None, None];
-        };
+    /// Ends of an interval of a standard deviation, where the profile of the criterion has risen by the quantile of chi squared
+    /// with one degree of freedom (Venzon & Moolgavkar, Applied Statistics 37 (1988) 87-94).
+    fn interval(&self, level: usize, parameter: usize) -> [Option<f64>; 2] {
+        let kept = self.coordinates().place(level, parameter);
         let limit = ChiSquared::new(1.0).map_or(f64::NAN, |one| one.inverse_cdf(COVERAGE));
-        let lowest = optimum.evaluation.criterion;
+        let lowest = self.optimum.evaluation.criterion;
         // Each place starts from the one before.
-        let start = RefCell::new(optimum.at.clone());
+        let start = RefCell::new(self.optimum.at.clone());
         let rise = |value: f64| {
             let mut start = start.borrow_mut();
-            start[held] = value;
-            match self.criterion.profile(&start, held, &optimum.curvature) {
+            start[kept] = value;
+            match self.criterion.profile(&start, kept, &self.optimum.curvature) {
                 Some((criterion, at)) => {
                     *start = at;
                     criterion - lowest - limit
@@ -259,11 +252,11 @@ impl Fitter<'_> {
                 None => f64::INFINITY,
             }
         };
-        let best = optimum.at[held].abs();
+        let best = self.optimum.at[kept].abs();
         let low = if rise(0.0) <= 0.0 { Some(0.0) } else { crossing(0.0, best, rise) };
-        start.borrow_mut().clone_from(&optimum.at);
-        let outwards = (0..ENDS_MAX).map(|k| best.max(0.1) * 1.5f64.powi(k));
-        let outside = outwards.skip(1).find(|value| rise(*value) > 0.0);
+        start.borrow_mut().clone_from(&self.optimum.at);
+        let outwards = (1..ENDS_MAX).map(|k| best.max(END_MIN) * 1.5f64.powi(k));
+        let outside = outwards.into_iter().find(|value| rise(*value) > 0.0);
         let high = outside.and_then(|outside| crossing(outside, best, rise));
         [low, high].map(|end| end.map(|end| end * self.coordinates().scales[parameter]))
     }
@@ -271,36 +264,33 @@ impl Fitter<'_> {
     fn groups(&self, shifts: &[Vec<ShiftEstimate>]) -> Vec<GroupShift> {
         let levels = self.study.levels.iter().zip(&self.nested.names).zip(shifts);
         let groups = levels.flat_map(|((level, names), shifts)| {
-            names.iter().zip(shifts).map(|(group, one)| GroupShift {
-                level: level.clone(),
-                group: group.clone(),
-                shifts: one.shift.iter().copied().collect(),
-                std_errors: one
-                    .covariance
-                    .diagonal()
-                    .iter()
-                    .map(|value| value.max(0.0).sqrt())
-                    .collect(),
+            names.iter().zip(shifts).map(|(group, one)| {
+                let variances = one.own_covariance.diagonal();
+                GroupShift {
+                    level: level.clone(),
+                    group: group.clone(),
+                    shifts: one.own.iter().copied().collect(),
+                    std_errors: variances.iter().map(|value| value.max(0.0).sqrt()).collect(),
+                }
             })
         });
         groups.collect()
     }
 }
 
-/// Where a function changes sign between a point where it is above zero and one where it is not, to a thousandth of the
-/// distance and of the value, by the secant with halving of the end that stays (the Illinois method of Dowell & Jarratt,
-/// BIT 11 (1971) 168-174).
+/// Where a function changes sign between a point where it is above zero and one where it is not, by the secant with halving of
+/// the end that stays (the Illinois method of Dowell & Jarratt, BIT 11 (1971) 168-174).
 fn crossing(outside: f64, inside: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
     let (mut above, mut below) = ((outside, of(outside)), (inside, of(inside)));
     let mut before = None;
     for _ in 0..60 {
         let (width, size) = (above.0 - below.0, above.0.abs().max(below.0.abs()));
-        if width.abs() <= 1e-3 * size {
+        if width.abs() <= END_TOLERANCE * size {
             return Some(0.5 * (above.0 + below.0));
         }
         let share = if above.1.is_finite() { below.1 / (below.1 - above.1) } else { 0.5 };
         // Not nearer to an end than half of the tolerance, so that both ends close in.
-        let edge = 5e-4 * size / width.abs();
+        let edge = 0.5 * END_TOLERANCE * size / width.abs();
         let middle = below.0 + share.clamp(edge, 1.0 - edge) * width;
         let value = of(middle);
         // An end that stays twice counts half.
@@ -314,19 +304,4 @@ fn crossing(outside: f64, inside: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
         before = side;
     }
     None
-}
-
-/// The inverse over the coordinates whose curvature says something: that of a spread of zero says nothing of how well the
-/// spread is known, and no effect's covariance changes with it to first order.
-fn inverse_of_the_known(curvature: &DMatrix<f64>) -> DMatrix<f64> {
-    match Cholesky::new(curvature.clone()) {
-        Some(factor) => factor.inverse(),
-        None => {
-            let eigen = curvature.clone().symmetric_eigen();
-            let top = eigen.eigenvalues.amax();
-            let inverse =
-                eigen.eigenvalues.map(|value| if value > 1e-9 * top { 1.0 / value } else { 0.0 });
-            &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
-        }
-    }
 }

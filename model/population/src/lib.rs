@@ -1,8 +1,8 @@
-//! From the bodies of single sessions to the population that they come from.
+//! From the parameters of single sessions to the population that their specimens come from.
 //!
-//! A body of one session is a vector of logarithms of parameters with an uncertainty. Bodies scatter from animal to animal,
-//! within an animal from specimen to specimen, and so on down to the repeat; [`fit_population`] finds how far, and the means
-//! and effects of covariates, from all sessions together. It never reads a file, a port or a clock and starts no thread.
+//! The parameters of one session are a vector of logarithms with an uncertainty. They scatter from animal to animal, within an
+//! animal from specimen to specimen, and so on down to the repeat; [`fit_population`] finds how far, and the means and effects of
+//! covariates, from all sessions together. It never reads a file, a port or a clock and starts no thread.
 //!
 //! Start at [`Study`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
@@ -15,9 +15,10 @@ mod study;
 #[cfg(test)]
 mod tests;
 
-pub use curves::{CurveEvidence, CurvePopulation, fit_curves};
+pub use curves::{CurveEvidence, CurveRounds, expand_curves};
 pub use fit::{
-    COVERAGE, EffectEstimate, GroupShift, PopulationFit, PopulationOptions, Spread, fit_population,
+    COVERAGE, EffectEstimate, GroupShift, LevelDeviation, PopulationFit, PopulationOptions,
+    fit_population,
 };
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;

@@ -21,13 +21,13 @@ pub(crate) struct SpreadFactor {
 }
 
 impl SpreadFactor {
-    pub fn of(root: DMatrix<f64>) -> Self {
-        let signs = DVector::from_element(root.ncols(), 1.0);
-        Self { root, signs }
-    }
-
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.root * DMatrix::from_diagonal(&self.signs) * self.root.transpose()
+    }
+
+    /// How many variances are below zero.
+    fn negative_count(&self) -> usize {
+        self.signs.iter().filter(|sign| **sign < 0.0).count()
     }
 }
 
@@ -43,17 +43,27 @@ struct Integration {
 }
 
 impl Integration {
-    /// `None` where a variance below zero outweighs what the form says.
+    /// `None` where variances below zero outweigh what the form says: the whole is a covariance as long as as many directions
+    /// are below zero as signs are (Haynsworth, Linear Algebra and its Applications 1 (1968) 73-81).
     fn of(form: &Form, factor: &SpreadFactor) -> Option<Self> {
         let count = factor.signs.len();
         let columns = form.columns(0, count) * &factor.root;
         let mut scaled = factor.root.tr_mul(&columns.rows(0, count));
         (0..count).for_each(|k| scaled[(k, k)] += factor.signs[k]);
-        let scaled = LU::new(scaled);
-        let determinant = scaled.determinant() * factor.signs.product();
-        let inverse = scaled.try_inverse().filter(|_| determinant > 0.0)?;
+        let (inverse, log_determinant) = match factor.negative_count() {
+            0 => {
+                let scaled = Cholesky::new(scaled)?;
+                (scaled.inverse(), log_determinant(&scaled))
+            }
+            negative => {
+                let below = scaled.symmetric_eigenvalues().iter().filter(|one| **one < 0.0).count();
+                let scaled = LU::new(scaled);
+                let inverse = scaled.try_inverse().filter(|_| below == negative)?;
+                (inverse, scaled.determinant().abs().ln())
+            }
+        };
         let weights = &columns * &inverse;
-        Some(Self { columns, weights, inverse, log_determinant: determinant.ln() })
+        Some(Self { columns, weights, inverse, log_determinant })
     }
 
     fn form(&self, form: &Form) -> Form {
@@ -99,11 +109,15 @@ pub(crate) struct Evaluation {
     pub covariance: DMatrix<f64>,
 }
 
-/// The most probable shift of a group, with those it belongs to.
+/// The most probable shift of a group.
 #[derive(Clone, Debug)]
 pub(crate) struct ShiftEstimate {
-    pub shift: DVector<f64>,
-    pub covariance: DMatrix<f64>,
+    /// With those it belongs to: from the effects of its sessions.
+    pub whole: DVector<f64>,
+    pub whole_covariance: DMatrix<f64>,
+    /// From the group that it belongs to.
+    pub own: DVector<f64>,
+    pub own_covariance: DMatrix<f64>,
 }
 
 /// Sums over the members of every group at given spreads.
@@ -124,8 +138,8 @@ impl NestedStudy {
         self.parents.len() + 1
     }
 
-    /// Restricted likelihood and means; `None` where a spread of zero leaves a session impossible, or effects cannot be told
-    /// apart.
+    /// Restricted likelihood and means; `None` where a spread of zero leaves a session impossible, or effects cannot be
+    /// separated.
     pub fn evaluate(&self, factors: &[SpreadFactor]) -> Option<Evaluation> {
         self.means(&self.sums(factors)?)
     }
@@ -300,17 +314,20 @@ impl NestedStudy {
     ) -> Option<Vec<Vec<ShiftEstimate>>> {
         let sums = self.sums(factors)?;
         let count = self.parameters;
-        let none = ShiftEstimate {
-            shift: DVector::zeros(count),
-            covariance: DMatrix::zeros(count, count),
+        let (zero, none) = (DVector::zeros(count), DMatrix::zeros(count, count));
+        let root = ShiftEstimate {
+            whole: zero.clone(),
+            whole_covariance: none.clone(),
+            own: zero,
+            own_covariance: none,
         };
-        let mut above = vec![none];
+        let mut above = vec![root];
         let mut all = Vec::with_capacity(self.levels());
         for (level, forms) in sums.groups.iter().enumerate() {
             let factor = &factors[level];
             let own = forms.iter().zip(&self.parents[level]).map(|(form, parent)| {
-                let ShiftEstimate { shift, covariance } = &above[*parent];
-                member(form, factor, &self.extended(shift, effects), covariance)
+                let above = &above[*parent];
+                member(form, factor, &self.extended(&above.whole, effects), above)
             });
             let own = own.collect::<Option<Vec<_>>>()?;
             all.push(own.clone());
@@ -318,18 +335,18 @@ impl NestedStudy {
         }
         let factor = &factors[self.parents.len()];
         let sessions = self.sessions.iter().enumerate().map(|(index, session)| {
-            let ShiftEstimate { shift, covariance } = &above[self.owner[index]];
-            let mean = self.session_mean(index, effects);
+            let above = &above[self.owner[index]];
+            let residual = session.vector() - self.session_mean(index, effects);
             match &session.evidence {
                 Evidence::Exact => Some(ShiftEstimate {
-                    shift: session.vector() - mean,
-                    covariance: DMatrix::zeros(count, count),
+                    own: &residual - &above.whole,
+                    own_covariance: above.whole_covariance.clone(),
+                    whole: residual,
+                    whole_covariance: DMatrix::zeros(count, count),
                 }),
                 Evidence::Information(information) => {
-                    let residual = shift + mean - session.vector();
-                    let own = member(information, factor, &residual, covariance)?;
-                    // The form's first argument is the residual, so that only the change of it is the shift's.
-                    Some(ShiftEstimate { shift: shift + (own.shift - &residual), ..own })
+                    // The form of a session takes its residual.
+                    member(information, factor, &(&above.whole - residual), above)
                 }
             }
         });
@@ -348,20 +365,26 @@ impl NestedStudy {
     }
 }
 
-/// The shift of a group in its population, given that of the group above with its covariance: the start of `extended` and
-/// the change that the form asks for.
+/// The shift of a group, given that of the group above: `extended` is what the form takes at the shift of the group above.
 fn member(
     form: &Form,
     factor: &SpreadFactor,
     extended: &DVector<f64>,
-    above: &DMatrix<f64>,
+    above: &ShiftEstimate,
 ) -> Option<ShiftEstimate> {
     let (root, count) = (&factor.root, factor.signs.len());
     let step = Integration::of(form, factor)?;
-    let change = root * step.weights.tr_mul(extended);
-    let shift = extended.rows(0, count) - change;
-    let own = root * &step.inverse * root.transpose();
-    let keeps = DMatrix::identity(count, count) - root * step.weights.rows(0, count).transpose();
-    let covariance = own + &keeps * above * keeps.transpose();
-    Some(ShiftEstimate { shift, covariance })
+    let own = root * step.weights.tr_mul(extended) * -1.0;
+    // The group follows the one above by what it does not know itself.
+    let known = root * step.weights.rows(0, count).transpose();
+    let follows = DMatrix::identity(count, count) - &known;
+    let given = root * &step.inverse * root.transpose();
+    let covariance =
+        |share: &DMatrix<f64>| &given + share * &above.whole_covariance * share.transpose();
+    Some(ShiftEstimate {
+        whole: &above.whole + &own,
+        whole_covariance: covariance(&follows),
+        own,
+        own_covariance: covariance(&known),
+    })
 }

@@ -1,7 +1,7 @@
-//! The spreads that explain the sessions best.
+//! The standard deviations that explain the sessions best.
 
 use crate::likelihood::{Evaluation, SpreadFactor};
-use crate::study::NestedStudy;
+use crate::study::{Evidence, NestedStudy};
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::BFGS;
@@ -18,23 +18,19 @@ const NEWTON_STEPS_MAX: usize = 12;
 const FALL_MIN: f64 = 1e-12;
 /// Share of a coordinate's scale over which gradients are differenced: the cube root of the rounding error.
 const DIFFERENCE: f64 = 1e-5;
+/// A search starts no coordinate nearer to zero: the criterion has no slope there, so that it would never leave.
+const START_MIN: f64 = 0.1;
+/// A median absolute deviation of a normal distribution, in standard deviations.
+const MEDIAN_DEVIATION: f64 = 0.6745;
 
-/// One number of a spread: an entry of the factor of a level's covariance, over a scale of its parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Coordinate {
-    pub level: usize,
-    pub row: usize,
-    pub column: usize,
-}
-
-/// The numbers that are searched.
+/// The numbers that are searched: of each level and, within it, each parameter a standard deviation over the scale of the
+/// parameter.
 #[derive(Clone, Debug)]
 pub(crate) struct Coordinates {
-    pub all: Vec<Coordinate>,
     /// Scale of each parameter: how far its values scatter.
     pub scales: Vec<f64>,
     levels: usize,
-    /// Whether a coordinate is a variance, which may be below zero, instead of an entry of a factor.
+    /// Whether a coordinate is a variance, which may be below zero, instead of a standard deviation.
     is_signed: bool,
 }
 
@@ -42,67 +38,74 @@ pub(crate) struct Coordinates {
 const VARIANCE_MIN: f64 = 1e-12;
 
 impl Coordinates {
-    /// Spreads of each parameter by itself, or with all correlations.
-    pub fn of(study: &NestedStudy, is_correlated: bool) -> Self {
-        let levels = study.parents.len() + 1;
-        let parameters = study.parameters;
-        let all = (0..levels).flat_map(|level| {
-            (0..parameters).flat_map(move |row| {
-                let first = if is_correlated { 0 } else { row };
-                (first..=row).map(move |column| Coordinate { level, row, column })
-            })
-        });
-        let scales = (0..parameters).map(|k| {
-            let values = study.sessions.iter().map(|one| one.values[k]);
-            let mean = values.clone().sum::<f64>() / study.sessions.len() as f64;
-            let square = values.map(|value| (value - mean).powi(2)).sum::<f64>();
-            let scale = (square / study.sessions.len() as f64).sqrt();
-            if scale > 0.0 { scale } else { 1.0 }
-        });
-        Self { all: all.collect(), scales: scales.collect(), levels, is_signed: false }
+    pub fn of(study: &NestedStudy) -> Self {
+        let scales = (0..study.parameters).map(|k| scale(study, k)).collect();
+        Self { scales, levels: study.parents.len() + 1, is_signed: false }
+    }
+
+    /// Place of the coordinate of a level and a parameter.
+    pub fn place(&self, level: usize, parameter: usize) -> usize {
+        level * self.scales.len() + parameter
     }
 
     pub fn start(&self) -> Vec<f64> {
         let even = (self.levels as f64).sqrt().recip();
-        self.all.iter().map(|one| if one.row == one.column { even } else { 0.0 }).collect()
+        vec![even; self.levels * self.scales.len()]
     }
 
-    /// The same with variances that may be below zero, and where a place is then; `None` where spreads are correlated.
-    pub fn signed(&self, at: &[f64]) -> Option<(Self, Vec<f64>)> {
-        let is_alone = self.all.iter().all(|one| one.row == one.column);
+    /// The same with variances that may be below zero, and where a place is then.
+    pub fn signed(&self, at: &[f64]) -> (Self, Vec<f64>) {
         let squares = at.iter().map(|value| value * value).collect();
-        is_alone.then(|| (Self { is_signed: true, ..self.clone() }, squares))
+        (Self { is_signed: true, ..self.clone() }, squares)
     }
 
     pub fn factors(&self, at: &[f64]) -> Vec<SpreadFactor> {
-        let parameters = self.scales.len();
-        let none = SpreadFactor::of(DMatrix::zeros(parameters, parameters));
-        let mut factors = vec![none; self.levels];
-        for (one, value) in self.all.iter().zip(at) {
-            let factor = &mut factors[one.level];
-            let size = if self.is_signed { root_of(*value) } else { *value };
-            factor.root[(one.row, one.column)] = size * self.scales[one.row];
-            if self.is_signed && *value < 0.0 {
-                factor.signs[one.row] = -1.0;
+        let level = |at: &[f64]| {
+            let sizes = at.iter().zip(&self.scales).map(|(value, scale)| self.size(*value) * scale);
+            let sign = |value: &f64| if self.is_signed && *value < 0.0 { -1.0 } else { 1.0 };
+            SpreadFactor {
+                root: DMatrix::from_diagonal(&DVector::from_iterator(at.len(), sizes)),
+                signs: DVector::from_iterator(at.len(), at.iter().map(sign)),
             }
-        }
-        factors
+        };
+        at.chunks(self.scales.len()).map(level).collect()
+    }
+
+    /// Of the root of a covariance, over its scale.
+    fn size(&self, value: f64) -> f64 {
+        if self.is_signed { value.abs().max(VARIANCE_MIN).sqrt() } else { value }
     }
 
     fn gradient(&self, at: &[f64], by_factor: &[DMatrix<f64>]) -> Vec<f64> {
-        let slope = |(one, value): (&Coordinate, &f64)| {
-            let slope = by_factor[one.level][(one.row, one.column)] * self.scales[one.row];
-            match self.is_signed {
-                true => slope * value.signum() / (2.0 * root_of(*value)),
-                false => slope,
-            }
-        };
-        self.all.iter().zip(at).map(slope).collect()
+        let slopes =
+            by_factor.iter().flat_map(|one| one.diagonal().iter().copied().collect::<Vec<_>>());
+        let scaled = slopes.zip(self.scales.iter().cycle()).zip(at);
+        scaled
+            .map(|((slope, scale), value)| match self.is_signed {
+                true => slope * scale * value.signum() / (2.0 * self.size(*value)),
+                false => slope * scale,
+            })
+            .collect()
     }
 }
 
-fn root_of(variance: f64) -> f64 {
-    variance.abs().max(VARIANCE_MIN).sqrt()
+/// How far the values of a parameter scatter, by their median absolute deviation: one far off, of a session that hardly
+/// identifies the parameter, does not move it.
+fn scale(study: &NestedStudy, parameter: usize) -> f64 {
+    let is_known = |evidence: &Evidence| match evidence {
+        Evidence::Exact => true,
+        Evidence::Information(information) => information[(parameter, parameter)] > 0.0,
+    };
+    let known = study.sessions.iter().filter(|one| is_known(&one.evidence));
+    let values: Vec<f64> = known.map(|one| one.values[parameter]).collect();
+    let middle = median(values.clone());
+    let deviation = median(values.into_iter().map(|value| (value - middle).abs()).collect());
+    if deviation > 0.0 { deviation / MEDIAN_DEVIATION } else { 1.0 }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or_default()
 }
 
 /// The criterion over the coordinates.
@@ -116,7 +119,7 @@ pub(crate) struct Criterion<'a> {
 pub(crate) struct Optimum {
     pub at: Vec<f64>,
     pub evaluation: Evaluation,
-    /// Second derivatives of the criterion.
+    /// Second derivatives of the criterion, which no direction lets fall.
     pub curvature: DMatrix<f64>,
 }
 
@@ -131,7 +134,7 @@ impl Criterion<'_> {
         Some(self.coordinates.gradient(at, &gradient))
     }
 
-    /// The lowest point.
+    /// The lowest point; `None` where the search ends elsewhere.
     pub fn minimum(&self, start: &[f64]) -> Option<Optimum> {
         let all: Vec<usize> = (0..start.len()).collect();
         // A first step of the size of a coordinate, whatever the number of sessions.
@@ -142,25 +145,27 @@ impl Criterion<'_> {
         self.newton(at)
     }
 
-    /// The lowest criterion with one coordinate held where it is at the start, and the place.
+    /// The lowest criterion with one coordinate kept where it is at the start, and the place.
     pub fn profile(
         &self,
         start: &[f64],
-        held: usize,
+        kept: usize,
         curvature: &DMatrix<f64>,
     ) -> Option<(f64, Vec<f64>)> {
-        let free: Vec<usize> = (0..start.len()).filter(|&k| k != held).collect();
+        let free: Vec<usize> = (0..start.len()).filter(|&k| k != kept).collect();
         if free.is_empty() {
             return Some((self.evaluate(start)?.criterion, start.to_vec()));
         }
-        let own = curvature.clone().remove_row(held).remove_column(held);
-        // Where the curvature is not that of a minimum, as at a spread of zero, its size serves.
+        let own = curvature.clone().remove_row(kept).remove_column(kept);
+        // Where the curvature is not that of a minimum, as at zero, its size serves.
         let size = own.amax().max(1.0);
         let inverse = Cholesky::new(own).map_or_else(
             || DMatrix::identity(free.len(), free.len()) / size,
             |factor| factor.inverse(),
         );
-        self.search(start, &free, &inverse)
+        let mut lifted = start.to_vec();
+        free.iter().for_each(|&k| lifted[k] = lifted[k].abs().max(START_MIN));
+        self.search(&lifted, &free, &inverse)
     }
 
     fn search(
@@ -191,10 +196,7 @@ impl Criterion<'_> {
         for _ in 0..NEWTON_STEPS_MAX {
             let curvature = self.curvature(&at)?;
             let gradient = DVector::from_vec(self.gradient(&at)?);
-            let Some(factor) = Cholesky::new(curvature.clone()) else {
-                return Some(Optimum { at, evaluation, curvature });
-            };
-            let step = factor.solve(&gradient);
+            let step = Cholesky::new(curvature.clone())?.solve(&gradient);
             let fall = 0.5 * step.dot(&gradient);
             let moved = |share: f64| -> Vec<f64> {
                 at.iter().zip(&step).map(|(at, by)| at - share * by).collect()

@@ -4,19 +4,21 @@ use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 use thiserror::Error;
 
-/// What one session tells of the parameters of its body.
+/// What one session knows of the parameters of its body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Evidence {
     /// The values themselves, without an error.
     Exact,
     /// The curvature of the logarithm of the likelihood at the values, with its sign turned: the inverse of their
-    /// covariance. It may be singular, where a curve does not tell a parameter.
+    /// covariance. It may be singular, where a curve does not depend on a parameter.
     Information(DMatrix<f64>),
 }
 
 /// One session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudySession {
+    /// By which a refusal names it.
+    pub name: String,
     /// Names of the groups that it belongs to, the outermost first (animal, specimen, site): one for each level but the last.
     pub groups: Vec<String>,
     /// The value of each effect, one for each column of [`Study::effects`].
@@ -41,34 +43,39 @@ pub struct Study {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum StudyError {
     #[error(
-        "the study has {sessions} sessions for {numbers} means and spreads; give more sessions"
+        "a population with these effects and levels needs {needed} sessions or more, not {found}; add sessions, or leave out effects or levels"
     )]
-    Sessions { sessions: usize, numbers: usize },
-    #[error("the study has one {level} only; its spread needs two or more")]
+    Sessions { found: usize, needed: usize },
+    #[error("the sessions are of one {level}; add sessions of another one")]
     OneGroup { level: String },
     #[error(
-        "each {outer} has one {inner}, so that their spreads cannot be told apart; leave one of both levels out"
+        "each {outer} has one {inner}, so their standard deviations cannot be separated; leave one of the two levels out"
     )]
     SameGroups { outer: String, inner: String },
-    #[error("session {session} has {found} {what}; give {expected}")]
-    Count { session: usize, what: &'static str, found: usize, expected: usize },
+    #[error("{session} has {found} {what}, not {expected}; give {expected}")]
+    Count { session: String, what: &'static str, found: usize, expected: usize },
     #[error(
-        "session {session} has a {what} that is not a finite number; leave the session out or correct it"
+        "{session} has a {what} that is not a finite number; correct it, or leave the session out"
     )]
-    NotFinite { session: usize, what: &'static str },
+    NotFinite { session: String, what: &'static str },
     #[error(
-        "the information of session {session} is not a covariance's inverse; fit the session again"
+        "the information of {session} is not the inverse of a covariance; fit the session again"
     )]
-    Information { session: usize },
+    Information { session: String },
+    #[error("no session determines {parameter}; leave the parameter out")]
+    NoInformation { parameter: String },
     #[error(
-        "the effects {effects} cannot be told apart: one is a sum of the others in every session; leave one out"
+        "the effects {effects} cannot be separated: one is a sum of the others in every session; leave one out"
     )]
     Effects { effects: String },
     #[error(
-        "no spreads were found that explain the sessions; look at the values of single sessions for one far off"
+        "no standard deviations were found that explain the sessions best; leave out a level or a parameter"
     )]
     NoOptimum,
 }
+
+/// Columns of a design of which less than this share is not a sum of the others are such a sum.
+const DEPENDENT: f64 = 1e-9;
 
 /// A study whose groups are numbers.
 #[derive(Clone, Debug)]
@@ -118,34 +125,62 @@ impl Study {
 
     fn check(&self) -> Result<(), StudyError> {
         let count = self.parameters.len();
-        for (session, one) in self.sessions.iter().enumerate() {
+        for one in &self.sessions {
+            let session = || one.name.clone();
             for (what, found, expected) in [
                 ("groups", one.groups.len(), self.levels.len() - 1),
                 ("effects", one.design.len(), self.effects.len()),
                 ("values", one.values.len(), count),
             ] {
                 if found != expected {
-                    return Err(StudyError::Count { session, what, found, expected });
+                    return Err(StudyError::Count { session: session(), what, found, expected });
                 }
             }
             for (what, values) in [("design", &one.design), ("value", &one.values)] {
                 if values.iter().any(|value| !value.is_finite()) {
-                    return Err(StudyError::NotFinite { session, what });
+                    return Err(StudyError::NotFinite { session: session(), what });
                 }
             }
             if let Evidence::Information(information) = &one.evidence {
                 let is_square = information.shape() == (count, count);
                 let is_finite = information.iter().all(|value| value.is_finite());
                 if !is_square || !is_finite || !is_covariance(information) {
-                    return Err(StudyError::Information { session });
+                    return Err(StudyError::Information { session: session() });
                 }
             }
         }
-        let numbers = count * (self.effects.len() + self.levels.len());
-        if self.sessions.len() * count <= numbers {
-            return Err(StudyError::Sessions { sessions: self.sessions.len(), numbers });
+        // One more than the means and standard deviations of a parameter.
+        let needed = self.effects.len() + self.levels.len() + 1;
+        if self.sessions.len() < needed {
+            return Err(StudyError::Sessions { found: self.sessions.len(), needed });
         }
-        Ok(())
+        self.check_information()?;
+        self.check_effects()
+    }
+
+    fn check_information(&self) -> Result<(), StudyError> {
+        let is_known = |k: usize| {
+            self.sessions.iter().any(|one| match &one.evidence {
+                Evidence::Exact => true,
+                Evidence::Information(information) => information[(k, k)] > 0.0,
+            })
+        };
+        match (0..self.parameters.len()).find(|&k| !is_known(k)) {
+            Some(k) => Err(StudyError::NoInformation { parameter: self.parameters[k].clone() }),
+            None => Ok(()),
+        }
+    }
+
+    fn check_effects(&self) -> Result<(), StudyError> {
+        let rows = self.sessions.iter().flat_map(|one| one.design.iter().copied());
+        let design = DMatrix::from_row_iterator(self.sessions.len(), self.effects.len(), rows);
+        // Each column over its size, so that units do not matter.
+        let columns = design.column_iter().map(|column| column.try_normalize(0.0));
+        let scaled = columns.collect::<Option<Vec<_>>>().map(|all| DMatrix::from_columns(&all));
+        match scaled.is_some_and(|scaled| scaled.rank(DEPENDENT) == self.effects.len()) {
+            true => Ok(()),
+            false => Err(StudyError::Effects { effects: self.effects.join(", ") }),
+        }
     }
 
     fn check_levels(&self, study: &NestedStudy) -> Result<(), StudyError> {

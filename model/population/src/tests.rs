@@ -1,7 +1,10 @@
 use crate::likelihood::{Evaluation, SpreadFactor};
 use crate::search::Coordinates;
 use crate::study::NestedStudy;
-use crate::{Evidence, PopulationOptions, Study, StudyError, StudySession, fit_population};
+use crate::{
+    CurveEvidence, Evidence, PopulationOptions, Study, StudyError, StudySession, expand_curves,
+    fit_population,
+};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use palpate_model::random::SplitMix;
 
@@ -16,6 +19,7 @@ fn study(random: &mut SplitMix) -> Study {
                 let shear = random.normal();
                 let information = DMatrix::from_row_slice(2, 2, &[40.0, 9.0, 9.0, 30.0 + shear]);
                 sessions.push(StudySession {
+                    name: format!("{animal} {site} {repeat}"),
                     groups: vec![format!("a{animal}"), format!("s{site}")],
                     design: vec![1.0, f64::from(repeat)],
                     values: vec![
@@ -37,7 +41,10 @@ fn study(random: &mut SplitMix) -> Study {
 
 fn factors() -> Vec<SpreadFactor> {
     [[0.9, 0.0, -0.4, 0.5], [0.4, 0.0, 0.1, 0.0], [0.2, 0.0, 0.05, 0.12]]
-        .map(|entries| SpreadFactor::of(DMatrix::from_row_slice(2, 2, &entries)))
+        .map(|entries| SpreadFactor {
+            root: DMatrix::from_row_slice(2, 2, &entries),
+            signs: DVector::from_element(2, 1.0),
+        })
         .to_vec()
 }
 
@@ -105,7 +112,7 @@ fn the_tree_is_the_covariance_of_all_values_at_once() {
     }
 }
 
-/// Differences over 1e-6 are good to about 1e-8 of a criterion of some tens.
+/// Differences over 1e-5 are good to about 1e-8 of a criterion of some tens, and its third derivatives are of some hundreds.
 #[test]
 fn the_gradient_is_that_of_differences() {
     for exact in [false, true] {
@@ -125,7 +132,7 @@ fn the_gradient_is_that_of_differences() {
                     other[level].root[(row, column)] += by;
                     nested.evaluate(&other).unwrap().criterion
                 };
-                let slope = (shifted(1e-6) - shifted(-1e-6)) / 2e-6;
+                let slope = (shifted(1e-5) - shifted(-1e-5)) / 2e-5;
                 let found = gradient[level][(row, column)];
                 assert!((found - slope).abs() < 1e-6 * slope.abs().max(1.0), "{found} {slope}");
             }
@@ -176,46 +183,143 @@ fn shifts_are_those_of_the_covariance_of_all() {
     }
     let covariance = (&keep * matrix * &keep).pseudo_inverse(1e-10).unwrap();
     let solution = &covariance * (&keep * right);
-    for (index, one) in shifts[2].iter().enumerate() {
-        let shift = &one.shift;
-        let site = nested.owner[index];
-        let own = [nested.parents[1][site], starts[1] + site, starts[2] + index];
-        for k in 0..2 {
-            let expected: f64 = own.iter().map(|one| solution[2 * one + k]).sum();
-            assert!((shift[k] - expected).abs() < 1e-8, "{} {expected}", shift[k]);
-            let pairs = own.iter().flat_map(|a| own.iter().map(move |b| (2 * a + k, 2 * b + k)));
-            let variance: f64 = pairs.map(|pair| covariance[pair]).sum();
-            assert!((one.covariance[(k, k)] / variance - 1.0).abs() < 1e-6, "{variance}");
+    let check = |estimate: (f64, f64), places: &[usize]| {
+        let (shift, variance) = estimate;
+        let expected: f64 = places.iter().map(|&place| solution[place]).sum();
+        assert!((shift - expected).abs() < 1e-8, "{shift} {expected}");
+        let pairs = places.iter().flat_map(|&a| places.iter().map(move |&b| (a, b)));
+        let expected: f64 = pairs.map(|pair| covariance[pair]).sum();
+        assert!(
+            (variance - expected).abs() < 1e-6 * expected.abs() + 1e-12,
+            "{variance} {expected}"
+        );
+    };
+    for (level, shifts) in shifts.iter().enumerate() {
+        for (group, one) in shifts.iter().enumerate() {
+            let own = starts[level] + group;
+            let above = match level {
+                0 => vec![],
+                1 => vec![nested.parents[1][group]],
+                _ => {
+                    let site = nested.owner[group];
+                    vec![nested.parents[1][site], starts[1] + site]
+                }
+            };
+            for k in 0..2 {
+                let whole: Vec<usize> =
+                    above.iter().chain([&own]).map(|place| 2 * place + k).collect();
+                check((one.whole[k], one.whole_covariance[(k, k)]), &whole);
+                check((one.own[k], one.own_covariance[(k, k)]), &[2 * own + k]);
+            }
         }
     }
 }
 
-/// A curve that does not tell a parameter adds nothing to what the others say of it.
+/// A curve that does not depend on a parameter adds nothing to what is known of it from the others.
 #[test]
-fn a_parameter_that_a_session_does_not_tell_is_left_to_the_others() {
+fn a_parameter_that_a_session_does_not_identify_is_left_to_the_others() {
     let mut random = SplitMix::seeded(6);
     let mut study = study(&mut random);
     let open = DMatrix::from_row_slice(2, 2, &[40.0, 0.0, 0.0, 0.0]);
     study.sessions[0].evidence = Evidence::Information(open);
     study.sessions[0].values[1] = 1e6;
-    let far = study.nested().unwrap().evaluate(&factors()).unwrap();
+    let options = PopulationOptions { has_deviation_intervals: true };
+    let far = fit_population(&study, options).unwrap();
     study.sessions[0].values[1] = 0.0;
-    let near = study.nested().unwrap().evaluate(&factors()).unwrap();
-    close(far.criterion, near.criterion);
-    close(far.effects[1], near.effects[1]);
+    let near = fit_population(&study, options).unwrap();
+    assert_eq!(far, near);
+    assert!(far.standard_deviations.iter().any(|one| one.value > 0.0));
+}
+
+/// A balanced study of six animals, three sites of each and two repeats, from its mean squares.
+fn balanced(of_animals: f64, of_sites: f64, of_repeats: f64) -> Study {
+    let sign = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let mut sessions = Vec::new();
+    for animal in 0..6 {
+        for site in 0..3 {
+            for repeat in 0..2 {
+                // Sums of squares over 5, 12 and 18 degrees of freedom.
+                let shift = (of_animals * 5.0 / 36.0).sqrt() * sign(animal)
+                    + (of_sites / 2.0).sqrt() * (site as f64 - 1.0)
+                    + (of_repeats / 2.0).sqrt() * sign(repeat);
+                sessions.push(StudySession {
+                    name: format!("{animal} {site} {repeat}"),
+                    groups: vec![animal.to_string(), site.to_string()],
+                    design: vec![1.0],
+                    values: vec![7.0 + shift],
+                    evidence: Evidence::Exact,
+                });
+            }
+        }
+    }
+    Study {
+        parameters: vec!["modulus".into()],
+        effects: vec!["mean".into()],
+        levels: ["animal", "site", "repeat"].map(String::from).to_vec(),
+        sessions,
+    }
+}
+
+const DEGREES: [f64; 3] = [5.0, 12.0, 18.0];
+
+/// Minus twice the logarithm of the restricted likelihood of a balanced study, by its mean squares (Searle, Casella & McCulloch,
+/// Variance Components, 1992, section 4.6), where the variance of animals is given and the others are the best there.
+fn profile_of_animals(squares: [f64; 3], variance: f64) -> f64 {
+    let criterion = |of_sites: f64, of_repeats: f64| {
+        let sites = of_repeats + 2.0 * of_sites;
+        let expected = [sites + 6.0 * variance, sites, of_repeats];
+        let terms = DEGREES.iter().zip(squares).zip(expected);
+        terms.map(|((count, square), one)| count * (one.ln() + square / one)).sum::<f64>()
+    };
+    // A grid that closes in on the lowest place.
+    let (mut best, mut width) = ((0.5, 1.0), 1.0f64);
+    for _ in 0..60 {
+        let around =
+            |middle: f64| (-4..=4).map(move |k| (middle + f64::from(k) * width / 4.0).max(0.0));
+        let places = around(best.0).flat_map(|a| around(best.1).map(move |b| (a, b.max(1e-6))));
+        best = places.min_by(|a, b| criterion(a.0, a.1).total_cmp(&criterion(b.0, b.1))).unwrap();
+        width *= 0.7;
+    }
+    criterion(best.0, best.1)
+}
+
+/// Where sites differ less than their repeats let expect, their variance is zero at the optimum but not along the profile of the
+/// animals' one; and the mean is judged by the animals alone, as in an analysis of variance.
+#[test]
+fn intervals_of_a_balanced_study_are_those_of_its_mean_squares() {
+    for of_sites in [0.8, 2.0] {
+        let squares = [3.0, of_sites, 1.0];
+        let options = PopulationOptions { has_deviation_intervals: true };
+        let fit = fit_population(&balanced(squares[0], squares[1], squares[2]), options).unwrap();
+        assert_eq!(fit.standard_deviations[1].is_zero, of_sites < 1.0);
+        let lowest = (0..4000).map(|k| profile_of_animals(squares, f64::from(k) * 2.5e-4));
+        let lowest = lowest.fold(f64::INFINITY, f64::min);
+        let [low, high] = fit.standard_deviations[0].interval.map(Option::unwrap);
+        // The 95 % quantile of chi squared with one degree of freedom.
+        let limit = 3.841_459;
+        assert_eq!(low, 0.0);
+        assert!(profile_of_animals(squares, 0.0) - lowest < limit);
+        let rise = profile_of_animals(squares, high * high) - lowest;
+        assert!((rise - limit).abs() < 0.02, "{of_sites}: {high} {rise}");
+        // Student's t of five degrees of freedom at 97.5 %.
+        let half = 2.570_582 * (squares[0] / 36.0).sqrt();
+        let mean = &fit.effects[0];
+        assert!((mean.freedom - 5.0).abs() < 1e-3, "{mean:?}");
+        assert!((mean.interval[1] - 7.0 - half).abs() < 1e-4 && !fit.is_bounded, "{mean:?}");
+    }
 }
 
 #[test]
-fn a_spread_that_is_not_there_is_zero_and_its_interval_starts_there() {
+fn a_standard_deviation_that_is_not_there_is_zero_and_its_interval_starts_there() {
     let mut random = SplitMix::seeded(8);
     let mut study = study(&mut random);
     for (index, session) in study.sessions.iter_mut().enumerate() {
         // Each site has the same mean of its animal: the sites scatter less than their repeats let expect.
         session.values = vec![if index % 2 == 0 { 1.0 } else { -1.0 }, random.normal()];
     }
-    let options = PopulationOptions { has_spread_intervals: true, ..Default::default() };
+    let options = PopulationOptions { has_deviation_intervals: true };
     let fit = fit_population(&study, options).unwrap();
-    let animals = &fit.spreads[0];
+    let animals = &fit.standard_deviations[0];
     assert!(animals.is_zero && animals.value == 0.0, "{animals:?}");
     assert_eq!(animals.interval[0], Some(0.0));
     assert!(animals.interval[1].unwrap() > 0.0);
@@ -238,13 +342,44 @@ fn studies_that_say_nothing_are_refused() {
     let double = refusal(&|study| study.sessions.iter_mut().for_each(|one| one.design[1] = 2.0));
     assert!(matches!(double, StudyError::Effects { .. }), "{double}");
     let open = refusal(&|study| study.sessions[2].values[0] = f64::NAN);
-    assert_eq!(open, StudyError::NotFinite { session: 2, what: "value" });
+    let session = whole.sessions[2].name.clone();
+    assert_eq!(open, StudyError::NotFinite { session, what: "value" });
 }
 
 #[test]
-fn scales_are_the_scatter_of_the_values() {
-    let nested = study(&mut SplitMix::seeded(1)).nested().unwrap();
-    let coordinates = Coordinates::of(&nested, true);
-    assert_eq!(coordinates.all.len(), 9);
-    assert!(coordinates.scales.iter().all(|scale| *scale > 0.0));
+fn a_scale_is_a_median_absolute_deviation_in_standard_deviations() {
+    let mut study = study(&mut SplitMix::seeded(1));
+    let count = study.sessions.len();
+    for (index, session) in study.sessions.iter_mut().enumerate() {
+        // Evenly from -1 to 1, and one far off.
+        let even = 2.0 * index as f64 / (count - 1) as f64 - 1.0;
+        session.values = vec![if index == 0 { 1e9 } else { even }, even];
+    }
+    let scales = Coordinates::of(&study.nested().unwrap()).scales;
+    let expected = 0.5 / 0.6745;
+    assert!(scales.iter().all(|scale| (scale / expected - 1.0).abs() < 0.2), "{scales:?}");
+}
+
+/// Curves whose likelihood is a normal distribution are expanded once, and are the study of their values.
+#[test]
+fn curves_that_are_normal_are_their_values() {
+    let exact = study(&mut SplitMix::seeded(12));
+    let expansion = |session: &StudySession| {
+        let Evidence::Information(information) = &session.evidence else { unreachable!() };
+        let covariance = Cholesky::new(information.clone()).unwrap().inverse();
+        Some(CurveEvidence { centre: session.values.clone(), covariance })
+    };
+    let answers: Vec<_> = exact.sessions.iter().map(expansion).collect();
+    let mut start = exact.clone();
+    start.sessions.iter_mut().for_each(|one| one.values[0] += 0.3);
+    let found = expand_curves(&mut start, |_| Ok::<_, StudyError>(answers.clone())).unwrap();
+    assert!(found.is_converged && found.rounds == 2, "{found:?}");
+    let values =
+        |study: &Study| study.sessions.iter().map(|one| one.values.clone()).collect::<Vec<_>>();
+    assert_eq!(values(&start), values(&exact));
+    // A curve that has no expansion is never settled.
+    let mut open = answers.clone();
+    open[3] = None;
+    let found = expand_curves(&mut start, |_| Ok::<_, StudyError>(open.clone())).unwrap();
+    assert!(!found.is_converged);
 }

@@ -192,6 +192,9 @@ impl Reader {
     }
 
     fn animal(&mut self, name: &str, line: u32, table: &DocumentTable) {
+        if name.trim().is_empty() {
+            self.problems.error(line, "an animal has no name; write for example [animal.pig-3]");
+        }
         if let Some(node) = table.get(SPECIMENS) {
             let wrong =
                 "specimens is not a list of names; write specimens = [\"liver 1\", \"liver 2\"]";
@@ -214,11 +217,21 @@ impl Reader {
     }
 
     fn add_specimen(&mut self, specimen: &str, animal: &str, line: u32) {
+        if specimen.is_empty() {
+            self.problems
+                .error(line, format!("a specimen of animal '{animal}' has no name; name it"));
+            return;
+        }
         if let Some((other, own)) = self.study.specimens.get(specimen) {
             let first = own.line;
-            self.problems.error(line, format!(
-                "specimen '{specimen}' belongs to animal '{animal}' here and to '{other}' on line {first}; remove it from one of them"
-            ));
+            self.problems.error(line, match other == animal {
+                true => format!(
+                    "specimen '{specimen}' of animal '{animal}' is on line {first} too; remove one of them"
+                ),
+                false => format!(
+                    "specimen '{specimen}' belongs to animal '{animal}' here and to '{other}' on line {first}; remove it from one of them"
+                ),
+            });
             return;
         }
         let own = StudyEntries { line, entries: SessionMetadata::default() };

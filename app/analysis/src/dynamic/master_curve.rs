@@ -118,7 +118,7 @@ pub fn master_curve(request: &MasterCurveRequest) -> Result<MasterCurveReport, M
         if measured.iter().any(|one| one.report.source == *path) {
             return Err(MasterCurveError::Twice(path.clone()));
         }
-        let report = measure(*sweep, None).map_err(|reason| MasterCurveError::Sweep {
+        let report = measure(*sweep, false).map_err(|reason| MasterCurveError::Sweep {
             path: path.clone(),
             reason: Box::new(reason),
         })?;

@@ -18,8 +18,7 @@ use crate::material::{
 };
 use crate::recordings::is_session;
 use crate::relaxation::{
-    NoiseError, RelaxationError, RelaxationReport, RelaxationRequest, RelaxationTerm,
-    UncertainNumber, relaxation,
+    NoiseError, RelaxationReport, RelaxationRequest, RelaxationTerm, UncertainNumber, relaxation,
 };
 use crate::source::{RecordStretch, SourceError};
 use palpate_indentation::{
@@ -142,15 +141,11 @@ pub enum DynamicError {
 
 /// The dynamic moduli of the sines of a session, or of a record that is one sine.
 pub fn dynamic(request: DynamicRequest) -> Result<DynamicReport, DynamicError> {
-    let press = request.press;
-    measure(request, Some(relaxation(RelaxationRequest { press, family: None })))
+    measure(request, true)
 }
 
-/// The same beside what the relaxation of the record predicts, where that is asked.
-fn measure(
-    request: DynamicRequest,
-    predicted: Option<Result<RelaxationReport, RelaxationError>>,
-) -> Result<DynamicReport, DynamicError> {
+/// The same, beside what the relaxation of the record predicts or without it.
+fn measure(request: DynamicRequest, is_predicted: bool) -> Result<DynamicReport, DynamicError> {
     let press = request.press;
     check(request)?;
     let PressRecord { read, compliance, specimen } = read_press(press, RecordStretch::RampHold)?;
@@ -168,6 +163,7 @@ fn measure(
         compliance_error_mm_per_n: applied.map(|one| one.std_error_mm_per_n),
         moving_mass_error_g: request.moving_mass_g.map(|mass| mass.standard_uncertainty),
     };
+    let predicted = is_predicted.then(|| relaxation(RelaxationRequest { press, family: None }));
     let (predicted, refused) = match predicted {
         Some(Ok(report)) => (Some(report), None),
         Some(Err(reason)) => (None, Some(reason.to_string())),

@@ -148,17 +148,9 @@ impl SourceFit {
         options: &FitOptions,
         is_systematic: bool,
     ) -> Self {
-        let FitSource { mut samples, signal, calibration, start, offset, mut notes, raw, .. } =
-            source;
         let watch = Stopwatch::start();
-        let corrected = CorrectedRecord { samples: &mut samples, raw: raw.as_ref() };
-        let kept = settle(&mut [corrected], |samples| {
-            let record =
-                SignalRecord { name: "the record", samples: samples[0], signal: signal.as_ref() };
-            let solution = FitSolution::fit_signals(&[record], options, &[])?;
-            Ok(vec![solution.report()])
-        });
-        notes.extend(kept.map(str::to_owned));
+        let FitSource { samples, signal, calibration, start, offset, mut notes, .. } =
+            settled(source, options);
         let record =
             SignalRecord { name: "the record", samples: &samples, signal: signal.as_ref() };
         let solution = FitSolution::fit_signals(&[record], options, &[]);
@@ -228,6 +220,20 @@ impl SourceFit {
         let exact = FitSolution::fit_signals(&[record], options, &[])?;
         wanted.find(&exact, 0, progress)
     }
+}
+
+/// The source with depths that were corrected for machine compliance corrected by the modelled force.
+pub(crate) fn settled(mut source: FitSource, options: &FitOptions) -> FitSource {
+    let FitSource { samples, signal, notes, raw, .. } = &mut source;
+    let corrected = CorrectedRecord { samples, raw: raw.as_ref() };
+    let kept = settle(&mut [corrected], |samples| {
+        let record =
+            SignalRecord { name: "the record", samples: samples[0], signal: signal.as_ref() };
+        let solution = FitSolution::fit_signals(&[record], options, &[])?;
+        Ok(vec![solution.report()])
+    });
+    notes.extend(kept.map(str::to_owned));
+    source
 }
 
 #[must_use]

@@ -11,7 +11,7 @@ pub const LEVELS: [&str; 3] = ["animal", "specimen", "site"];
 /// The innermost level: what is left between two presses on one place.
 const SESSION: &str = "session";
 /// The effect that all sessions have.
-const MEAN: &str = "mean";
+pub(super) const MEAN: &str = "mean";
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DesignError {
@@ -23,7 +23,7 @@ pub enum DesignError {
     UnknownEffect { name: String },
     #[error("{0}")]
     Problem(Box<StudyProblem>),
-    #[error("{} of {of} sessions lack {entry}, the first is {first}; add it to them, or leave out {entry}", .lacking)]
+    #[error("{first} has no {entry}, as {lacking} of {of} sessions; add it, or leave {entry} out")]
     Missing { entry: String, lacking: usize, of: usize, first: String },
     #[error("{entry} is '{value}' in all sessions; leave it out of the effects")]
     Constant { entry: String, value: String },
@@ -57,7 +57,7 @@ pub struct Design {
 }
 
 impl Design {
-    /// Of a study: levels without names are those that the sessions tell apart.
+    /// Of a study; without names of levels, with those that the sessions can separate.
     pub fn of(
         table: &StudyTable,
         levels: &[String],
@@ -85,7 +85,7 @@ impl Design {
             return Err(DesignError::LevelOrder { given: wanted.join(", ") });
         }
         if wanted.is_empty() {
-            // Sites are only told where they are named.
+            // A site is a level where a session names one.
             places = (0..LEVELS.len())
                 .filter(|&k| k < 2 || table.rows.iter().any(|row| name_of(row, k).is_some()))
                 .collect();

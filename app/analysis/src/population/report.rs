@@ -1,16 +1,16 @@
 //! A population as data, and in words.
 
 use super::PopulationMethod;
-use super::design::Design;
-use crate::report::text::table;
-use crate::study_table::StudyRow;
-use palpate_population::{EffectEstimate, GroupShift, Spread};
+use super::design::MEAN;
+use crate::report::text::{counted, table};
+use palpate_figures::uncertain::significant;
+use palpate_population::{EffectEstimate, GroupShift, LevelDeviation, Study};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// A population of bodies. Parameters are found as logarithms: a mean is a median of the parameter in its unit, an effect a
-/// factor, and a spread a standard deviation of the logarithm.
+/// A population. Parameters are found as logarithms: a mean is a median of the parameter in its unit, an effect a factor, and a
+/// standard deviation that of the logarithm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PopulationReport {
     pub model: String,
@@ -22,8 +22,8 @@ pub struct PopulationReport {
     pub sessions: usize,
     pub levels: Vec<LevelRow>,
     pub effects: Vec<EffectRow>,
-    pub spreads: Vec<SpreadRow>,
-    /// How far each group is from the mean, in logarithms.
+    pub standard_deviations: Vec<DeviationRow>,
+    /// How far each group is from the one that it belongs to, in logarithms.
     pub groups: Vec<GroupShift>,
     /// Sessions that could not be fitted, with the reason.
     pub not_fitted: BTreeMap<String, String>,
@@ -38,105 +38,117 @@ pub struct LevelRow {
 }
 
 impl LevelRow {
-    pub(super) fn all(design: &Design, rows: &[StudyRow], kept: &[usize]) -> Vec<Self> {
-        let levels = design.levels();
-        let outer = levels.len() - 1;
-        let rows = levels.into_iter().enumerate().map(|(depth, level)| {
-            let paths = kept
-                .iter()
-                .map(|&row| design.groups(&rows[row])[..=depth.min(outer.max(1) - 1)].to_vec());
-            let groups =
-                if depth == outer { kept.len() } else { paths.collect::<BTreeSet<_>>().len() };
-            Self { level, groups }
-        });
-        rows.collect()
+    pub(super) fn all(study: &Study) -> Vec<Self> {
+        let groups = |depth: usize| {
+            let paths = study.sessions.iter().map(|one| one.groups.get(..=depth));
+            // The last level is the sessions themselves.
+            paths.collect::<Option<BTreeSet<_>>>().map_or(study.sessions.len(), |all| all.len())
+        };
+        let levels = study.levels.iter().enumerate();
+        levels.map(|(depth, level)| Self { level: level.clone(), groups: groups(depth) }).collect()
     }
 }
 
 /// A mean or an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectRow {
-    #[serde(flatten)]
-    pub estimate: EffectEstimate,
+    pub effect: String,
+    pub parameter: String,
+    /// Unit of the parameter; none of a factor.
+    pub unit: Option<String>,
+    /// In logarithms, as `std_error` and `interval`.
+    pub value: f64,
+    pub std_error: f64,
+    pub freedom: f64,
+    pub interval: [f64; 2],
     /// Exponential of the value: the median of the parameter in its unit, or the factor of one unit of the entry.
     pub factor: f64,
     pub factor_interval: [f64; 2],
+    /// Probability of an effect as far from a factor of one, or farther, if there were none; none of a mean.
+    pub p_value: Option<f64>,
 }
 
 impl EffectRow {
-    pub(super) fn of(estimate: &EffectEstimate) -> Self {
+    pub(super) fn of(estimate: &EffectEstimate, unit: Option<String>) -> Self {
+        let is_mean = estimate.effect == MEAN;
         Self {
+            effect: estimate.effect.clone(),
+            parameter: estimate.parameter.clone(),
+            unit: unit.filter(|_| is_mean),
+            value: estimate.value,
+            std_error: estimate.std_error,
+            freedom: estimate.freedom,
+            interval: estimate.interval,
             factor: estimate.value.exp(),
             factor_interval: estimate.interval.map(f64::exp),
-            estimate: estimate.clone(),
+            p_value: (!is_mean).then_some(estimate.p_value),
         }
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let [low, high] = self.factor_interval.map(|end| significant(end, 4));
+        let p_value = match self.p_value {
+            None => "-".to_owned(),
+            Some(p) if p < 0.001 => "< 0.001".to_owned(),
+            Some(p) => format!("{p:.3}"),
+        };
+        let unit = self.unit.as_deref().unwrap_or_default();
+        vec![
+            self.parameter.clone(),
+            self.effect.clone(),
+            format!("{} {unit}", significant(self.factor, 4)).trim_end().to_owned(),
+            format!("{low} to {high}"),
+            format!("{:.1}", self.freedom),
+            p_value,
+        ]
     }
 }
 
-/// A spread.
+/// A standard deviation between the groups of a level.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SpreadRow {
+pub struct DeviationRow {
     #[serde(flatten)]
-    pub spread: Spread,
+    pub estimate: LevelDeviation,
     /// Coefficient of variation of the parameter: standard deviation over mean of a log-normal distribution.
     pub coefficient_of_variation: f64,
 }
 
-impl SpreadRow {
-    pub(super) fn of(spread: &Spread) -> Self {
-        let coefficient_of_variation = spread.value.powi(2).exp_m1().sqrt();
-        Self { spread: spread.clone(), coefficient_of_variation }
+impl DeviationRow {
+    pub(super) fn of(estimate: &LevelDeviation) -> Self {
+        let coefficient_of_variation = estimate.value.powi(2).exp_m1().sqrt();
+        Self { estimate: estimate.clone(), coefficient_of_variation }
+    }
+
+    fn cells(&self) -> Vec<String> {
+        let percent = |value: f64| format!("{:.1} %", 100.0 * value);
+        let end = |end: Option<f64>| end.map_or("open".to_owned(), percent);
+        let [low, high] = self.estimate.interval;
+        vec![
+            self.estimate.parameter.clone(),
+            self.estimate.level.clone(),
+            percent(self.estimate.value),
+            format!("{} to {}", end(low), end(high)),
+            percent(self.estimate.share),
+        ]
     }
 }
 
 impl PopulationReport {
-    /// Tables of means and effects and of spreads, then notes.
+    /// Tables of means and effects and of standard deviations, then notes.
     #[must_use]
     pub fn text(&self) -> String {
-        let groups = self.levels.iter().map(|one| match (one.groups, one.level.as_str()) {
-            (1, level) => format!("1 {level}"),
-            (groups, level) => format!("{groups} {level}s"),
-        });
+        let groups = self.levels.iter().map(|one| counted(one.groups, &one.level));
         let mut text = format!("{}: {}\n\n", self.model, groups.collect::<Vec<_>>().join(", "));
-        let percent = |value: f64| format!("{:.1} %", 100.0 * value);
-        let effects = self.effects.iter().map(|row| {
-            let [low, high] = row.factor_interval;
-            let p_value = match row.estimate.p_value {
-                _ if row.estimate.effect == "mean" => "-".to_owned(),
-                p if p < 0.001 => "< 0.001".to_owned(),
-                p => format!("{p:.3}"),
-            };
-            vec![
-                row.estimate.parameter.clone(),
-                row.estimate.effect.clone(),
-                format!("{:.4}", row.factor),
-                format!("{low:.4} to {high:.4}"),
-                format!("{:.1}", row.estimate.freedom),
-                p_value,
-            ]
-        });
-        text += &table(
-            "parameter | mean or effect | median or factor | 95 % interval | degrees of freedom | p",
-            effects,
-        );
+        let head = "parameter | mean or effect | median or factor | 95 % interval | degrees of freedom | p";
+        text += &table(head, self.effects.iter().map(EffectRow::cells));
         text.push_str("\n\n");
-        let spreads = self.spreads.iter().map(|row| {
-            let end = |end: Option<f64>| end.map_or("open".to_owned(), percent);
-            let [low, high] = row.spread.interval;
-            vec![
-                row.spread.parameter.clone(),
-                row.spread.level.clone(),
-                percent(row.spread.value),
-                format!("{} to {}", end(low), end(high)),
-                percent(row.spread.share),
-            ]
-        });
-        text += &table("parameter | between | spread | 95 % interval | share of variance", spreads);
-        for spread in self.spreads.iter().filter(|row| row.spread.is_zero) {
+        let head = "parameter | between | standard deviation | 95 % interval | share of variance";
+        text += &table(head, self.standard_deviations.iter().map(DeviationRow::cells));
+        for row in self.standard_deviations.iter().filter(|row| row.estimate.is_zero) {
+            let LevelDeviation { parameter, level, .. } = &row.estimate;
             let _ = write!(
                 text,
-                "\n{}: the sessions show no spread between {}s; that is not proof of none",
-                spread.spread.parameter, spread.spread.level
+                "\n{parameter}: no differences between {level}s are seen; that is not proof of none"
             );
         }
         for (session, reason) in &self.not_fitted {

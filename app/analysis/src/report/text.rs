@@ -207,6 +207,15 @@ pub(super) fn head(names: &str) -> Vec<String> {
     names.split('|').map(|name| name.trim().to_owned()).collect()
 }
 
+/// A count and its noun.
+#[must_use]
+pub fn counted(count: usize, noun: &str) -> String {
+    match count {
+        1 => format!("1 {noun}"),
+        _ => format!("{count} {noun}s"),
+    }
+}
+
 /// A table in columns under its head.
 pub(crate) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     in_columns(&std::iter::once(head(names)).chain(rows).collect::<Vec<_>>())

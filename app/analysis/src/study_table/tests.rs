@@ -84,7 +84,7 @@ fn sessions_that_lack_what_others_have_are_named() {
     assert_eq!(lacking(ANIMAL), Some(1));
     assert_eq!(lacking("animal.sex"), Some(1));
     assert_eq!(lacking("specimen.temperature_c"), Some(8));
-    // What nobody entered is no level and no covariate of this study.
+    // An entry that no session has is no level and no covariate of this study.
     assert_eq!(lacking(SITE), None);
     assert_eq!(lacking("animal.age_days"), None);
     let words =

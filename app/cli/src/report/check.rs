@@ -2,8 +2,8 @@
 
 use super::super::Failure;
 use super::super::output::Output;
-use super::counted;
 use palpate_analysis::report::dossier::{FileClaim, claims, compare};
+use palpate_analysis::report::text::counted;
 use palpate_analysis::source::SourceError;
 use palpate_sessions::SessionSummary;
 use serde::Serialize;

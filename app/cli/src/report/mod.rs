@@ -13,6 +13,7 @@ use palpate_analysis::fidelity::of_session;
 use palpate_analysis::report::dossier::{self, ReportError, SessionFigure, SessionReading};
 use palpate_analysis::report::figures::TimeAlignment;
 use palpate_analysis::report::session::fidelity_text;
+use palpate_analysis::report::text::counted;
 use palpate_runner::base::FoundBase;
 use palpate_runner::wall_now;
 use std::path::{Path, PathBuf};
@@ -149,12 +150,4 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
         )
     });
     Ok(())
-}
-
-/// A count and its noun.
-fn counted(count: usize, noun: &str) -> String {
-    match count {
-        1 => format!("1 {noun}"),
-        _ => format!("{count} {noun}s"),
-    }
 }

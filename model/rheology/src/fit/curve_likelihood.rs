@@ -1,6 +1,5 @@
 //! What a record says of its parameters at any values of them, and not only at those that fit it best.
 
-use super::columns::ParameterPoint;
 use super::refine::{GAIN_THIN, StopRule, refine};
 use super::sample::FitError;
 use super::solve::FitSolution;
@@ -19,8 +18,6 @@ pub struct CurveLikelihood<'f, 'a> {
     best: Vec<f64>,
     /// Standard error over that of independent noise.
     widening: Vec<f64>,
-    /// Where the other parameters were last.
-    points: Vec<ParameterPoint>,
 }
 
 /// The normal distribution of the parameters that has the slope and the curvature of a likelihood at one place: what a step
@@ -53,11 +50,13 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
             if value <= 0.0 {
                 return Err(FitError::NoLogarithm { name, value });
             }
+            let Some(estimate) = estimates[parameter] else {
+                return Err(FitError::AtRangeEnd { name });
+            };
             best.push(value.ln());
-            widening.push(estimates[parameter].map_or(1.0, |one| one.inflation.sqrt()));
+            widening.push(estimate.inflation.sqrt());
         }
-        let points = solution.refined.points.clone();
-        Ok(Self { solution, record, parameters, best, widening, points })
+        Ok(Self { solution, record, parameters, best, widening })
     }
 
     /// Logarithms of the parameters at the best fit.
@@ -65,26 +64,25 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
         &self.best
     }
 
-    /// The likelihood around logarithms of the parameters; `None` where the record allows no finite force, or tells none of
-    /// the parameters.
-    pub fn expand(&mut self, logarithms: &[f64]) -> Option<LikelihoodExpansion> {
+    /// The likelihood around logarithms of the parameters; `None` where the record allows no finite force, or determines none
+    /// of the parameters.
+    pub fn expand(&self, logarithms: &[f64]) -> Option<LikelihoodExpansion> {
         let (system, record) = (&self.solution.system, self.record);
         let scatter = self.solution.uncertainty().scatter?;
         let apart = self.best.iter().zip(&self.widening).zip(logarithms);
         let inside: Vec<f64> = apart.map(|((best, wide), at)| best + (at - best) / wide).collect();
-        let mut pinned = system.clone();
+        let (mut pinned, mut points) = (system.clone(), self.solution.refined.points.clone());
         for (&parameter, at) in self.parameters.iter().zip(&inside) {
             pinned = pinned.pinned(record, parameter, at.exp());
-            pinned.pin(&mut self.points, record, parameter, at.exp());
+            pinned.pin(&mut points, record, parameter, at.exp());
         }
         if !pinned.unknowns.is_empty() {
-            self.points =
-                refine(&pinned, &self.points, Rows::All, StopRule::Gain(GAIN_THIN))?.points;
+            points = refine(&pinned, &points, Rows::All, StopRule::Gain(GAIN_THIN))?.points;
         }
-        let pass = system.pass(&self.points, Rows::All)?;
+        let pass = system.pass(&points, Rows::All)?;
         let step = pass.joint.solve(system.unknowns.len());
         let combinations = self.parameters.iter().zip(&inside).map(|(&parameter, at)| {
-            let own = system.combination(record, parameter, &self.points[record]);
+            let own = system.combination(record, parameter, &points[record]);
             own.into_iter().map(|share| share * (-at).exp()).collect()
         });
         let combinations: Vec<Vec<f64>> = combinations.collect();

@@ -78,10 +78,12 @@ pub enum FitError {
         "{name} is {value:.4}, which has no logarithm; leave it out of the parameters, or take another family"
     )]
     NoLogarithm { name: String, value: f64 },
-    #[error(
-        "{name} is fixed, so that the record says nothing of it; leave it out of the parameters"
-    )]
+    #[error("{name} is fixed, so the record says nothing of it; leave it out of the parameters")]
     NotFitted { name: String },
+    #[error(
+        "the best {name} lies at an end of its searched range, so the record does not determine it; leave it out of the parameters"
+    )]
+    AtRangeEnd { name: String },
     #[error("{family}: {reason}")]
     Unsupported { family: String, reason: String },
     #[error(

@@ -29,9 +29,8 @@ fn at_the_best_fit_it_is_the_fit() {
         let samples = record(memory);
         let solution = FitSolution::of(&samples, &FitOptions::default()).unwrap();
         let report = solution.report();
-        let mut likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
-        let best = likelihood.best().to_vec();
-        let found = likelihood.expand(&best).unwrap();
+        let likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
+        let found = likelihood.expand(likelihood.best()).unwrap();
         for (k, name) in NAMES.iter().enumerate() {
             let own = report.parameter(name).unwrap();
             let error = own.std_error.unwrap() / own.value;
@@ -42,42 +41,60 @@ fn at_the_best_fit_it_is_the_fit() {
     }
 }
 
-/// Away from it, its slope is that of the sum of squares with the parameters fixed there, found by another fit.
+/// Away from it, its slope is that of the sum of squares with the parameters fixed there, found by another fit; the distance
+/// counts in shares of how much wider the intervals of the fit are than the curvature of that sum says.
 #[test]
 fn its_slope_is_that_of_fits_with_fixed_parameters() {
-    let samples = record(0.0);
-    let solution = FitSolution::of(&samples, &FitOptions::default()).unwrap();
+    for memory in [0.0, 0.8] {
+        check_slope(&record(memory));
+    }
+}
+
+fn check_slope(samples: &[FitSample]) {
+    let solution = FitSolution::of(samples, &FitOptions::default()).unwrap();
     let report = solution.report();
-    let mut likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
-    let best = likelihood.best().to_vec();
-    let at_best = likelihood.expand(&best).unwrap();
-    let shifted = best.iter().zip(&at_best.covariance).enumerate();
-    let at: Vec<f64> = shifted.map(|(k, (best, row))| best + 3.0 * row[k].sqrt()).collect();
-    let found = likelihood.expand(&at).unwrap();
-    let squares = |at: &[f64]| {
+    let likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
+    let best = likelihood.best();
+    let variance =
+        report.rmse_n.powi(2) * samples.len() as f64 / (samples.len() - report.free) as f64;
+    // Half of the sum of squares over the variance: minus the logarithm of the likelihood of independent noise.
+    let criterion = |at: [f64; 2]| {
         let mut options = FitOptions::default();
         for (name, value) in NAMES.iter().zip(at) {
             options.fix(name, value.exp()).unwrap();
         }
-        fit(&samples, &options).unwrap().rmse_n.powi(2) * samples.len() as f64
+        let squares = fit(samples, &options).unwrap().rmse_n.powi(2) * samples.len() as f64;
+        0.5 * squares / variance
     };
-    let spare = (samples.len() - report.free) as f64;
-    let variance = report.rmse_n.powi(2) * samples.len() as f64 / spare;
-    // The covariance times the slope of the logarithm of the likelihood is the step to the centre. Noise without memory is
-    // still widened a little; that is the scale of the coordinates.
-    let slope = |k: usize| {
-        let shifted = |by: f64| {
-            let mut other = at.clone();
-            other[k] += by;
-            squares(&other)
-        };
-        -(shifted(1e-5) - shifted(-1e-5)) / 2e-5 / (2.0 * variance)
+    let errors = NAMES.map(|name| {
+        let own = report.parameter(name).unwrap();
+        own.std_error.unwrap() / own.value
+    });
+    let moved = |from: [f64; 2], by: [f64; 2]| criterion([from[0] + by[0], from[1] + by[1]]);
+    let (middle, [a, b]) = ([best[0], best[1]], errors.map(|error| 0.1 * error));
+    let lowest = criterion(middle);
+    let curvature =
+        |step: [f64; 2]| moved(middle, step) + moved(middle, step.map(|by| -by)) - 2.0 * lowest;
+    let (aa, bb) = (curvature([a, 0.0]) / (a * a), curvature([0.0, b]) / (b * b));
+    let ab = (curvature([a, b]) - curvature([a, -b])) / (4.0 * a * b);
+    let determinant = aa * bb - ab * ab;
+    let independent = [(bb / determinant).sqrt(), (aa / determinant).sqrt()];
+    let widening = [errors[0] / independent[0], errors[1] / independent[1]];
+
+    let inside = [middle[0] + 3.0 * independent[0], middle[1] + 3.0 * independent[1]];
+    let at = [0, 1].map(|k| middle[k] + (inside[k] - middle[k]) * widening[k]);
+    let found = likelihood.expand(&at).unwrap();
+    let step = 1e-3;
+    let slope = |by: [f64; 2]| {
+        let [up, down] = [by, by.map(|by| -by)].map(|by| moved(inside, by));
+        -(up - down) / (2.0 * step)
     };
-    let slopes = [slope(0), slope(1)];
-    for ((centre, row), at) in found.centre.iter().zip(&found.covariance).zip(&at) {
-        let step = centre - at;
+    let slopes = [slope([step, 0.0]) / widening[0], slope([0.0, step]) / widening[1]];
+    // The covariance times the slope of the logarithm of the likelihood is the step to the centre; the curvature of a sum of
+    // squares is that of its slopes to a few percent at this noise.
+    for ((centre, row), at) in found.centre.iter().zip(&found.covariance).zip(at) {
         let expected: f64 = row.iter().zip(&slopes).map(|(share, slope)| share * slope).sum();
-        assert!((step / expected - 1.0).abs() < 0.05, "{step} {expected}");
+        assert!(((centre - at) / expected - 1.0).abs() < 0.05, "{} {expected}", centre - at);
     }
 }
 
