@@ -30,6 +30,7 @@ pub mod locked_protocols;
 pub mod log;
 pub mod manifest;
 mod packed;
+pub mod populations;
 pub mod program_log;
 pub mod raw;
 pub mod record;

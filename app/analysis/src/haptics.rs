@@ -4,6 +4,7 @@
 use super::fit::SourceFit;
 use super::margin::{MarginPoint, margin_curve};
 use super::tick_replay::RecordedTicks;
+use crate::population::{is_member, library_member};
 use crate::source::read;
 use palpate_figures::thin::thin;
 use palpate_haptics::check::{
@@ -40,8 +41,13 @@ pub struct HapticBody {
     pub notes: Vec<String>,
 }
 
-/// The body of a session or a table by its fit, or the source thesis's.
+/// The body of a session or a table by its fit, of a specimen of a population, or the source thesis's.
 pub fn fit_haptic_body(source: &Path) -> Result<HapticBody, String> {
+    if let Some(text) = source.to_str().filter(|text| is_member(text)) {
+        let member = library_member(text).map_err(|err| err.to_string())?;
+        let deepest = Depth(member.depth_max_mm);
+        return Ok(HapticBody { body: member.body, deepest, notes: Vec::new() });
+    }
     if source == Path::new(THESIS) {
         return Ok(HapticBody {
             body: ModifiedKelvin::THESIS,

@@ -11,6 +11,7 @@ use palpate_runner::study::{STUDY_FILE, STUDY_VERSION};
 use palpate_sessions::catalog::{CATALOG_FILE, CATALOG_VERSION};
 use palpate_sessions::document_store::Document;
 use palpate_sessions::locked_protocols::{LOCKED_PROTOCOL_FORMAT, LockedProtocol};
+use palpate_sessions::populations::{POPULATION_FORMAT, PopulationDocument};
 use palpate_sessions::specimen_queue::{QUEUE_FOLDER, QUEUE_VERSION};
 use palpate_sessions::{LINES_VERSION, RECORD_VERSION};
 use serde::Serialize;
@@ -96,6 +97,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             format!("JSON, format {COMPLIANCE_FORMAT}"),
             "'palpate compliance --save'",
             "measure again; the newest counts",
+        ),
+        (
+            "populations",
+            PopulationDocument::FOLDER,
+            format!("JSON, format {POPULATION_FORMAT}"),
+            "'palpate population --save'",
+            "save it under another name; a stored one is never changed",
         ),
         (
             "daily checks",

@@ -1,6 +1,7 @@
 //! A scene in real time, its recording and its replay.
 
 use super::haptics::{LoopMeasurement, fit_haptic_body};
+use super::population::is_member;
 use super::tick_replay::{
     FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
 };
@@ -29,7 +30,8 @@ pub fn read_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), Strin
     if let Some(source) = scene.source.take() {
         // A source is named from where its file is.
         let folder = path.parent().unwrap_or(Path::new(""));
-        let found = fit_haptic_body(&folder.join(&source))?;
+        let source = if is_member(&source) { source.into() } else { folder.join(&source) };
+        let found = fit_haptic_body(&source)?;
         scene.body = found.body;
         notes = found.notes;
     }

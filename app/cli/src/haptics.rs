@@ -101,8 +101,9 @@ impl DeviceArgs {
 /// Arguments of `palpate haptics check`.
 #[derive(Debug, Args)]
 pub struct HapticsCheckArgs {
-    /// A session or table to fit, or 'thesis' for the model of the source thesis
-    #[arg(value_name = "SESSION|thesis")]
+    /// A session or table to fit, 'thesis' for the model of the source thesis, or a specimen of a population,
+    /// population:NAME#NUMBER
+    #[arg(value_name = "SESSION|thesis|SPECIMEN")]
     source: PathBuf,
     #[command(flatten)]
     device: DeviceArgs,
@@ -111,8 +112,9 @@ pub struct HapticsCheckArgs {
 /// Arguments of `palpate haptics run`.
 #[derive(Debug, Args)]
 pub struct HapticsRunArgs {
-    /// A session or table to fit, or 'thesis' for the model of the source thesis
-    #[arg(value_name = "SESSION|thesis")]
+    /// A session or table to fit, 'thesis' for the model of the source thesis, or a specimen of a population,
+    /// population:NAME#NUMBER
+    #[arg(value_name = "SESSION|thesis|SPECIMEN")]
     source: PathBuf,
     #[command(flatten)]
     device: DeviceArgs,
@@ -127,8 +129,9 @@ pub struct HapticsRunArgs {
 /// Arguments of `palpate haptics follow`.
 #[derive(Debug, Args)]
 pub struct HapticsFollowArgs {
-    /// A session or table to fit, or 'thesis' for the model of the source thesis
-    #[arg(value_name = "SESSION|thesis")]
+    /// A session or table to fit, 'thesis' for the model of the source thesis, or a specimen of a population,
+    /// population:NAME#NUMBER
+    #[arg(value_name = "SESSION|thesis|SPECIMEN")]
     source: PathBuf,
     /// Speed of the slider in mm/s
     #[arg(long, default_value_t = 0.75, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM_PER_S")]

@@ -6,11 +6,14 @@ use super::{Failure, compliance, study};
 use clap::Args;
 use palpate_analysis::fit::{FitChoice, FitRecipe};
 use palpate_analysis::population::{
-    PopulationError, PopulationMethod, PopulationRequest, population,
+    PopulationError, PopulationMethod, PopulationReport, PopulationRequest, SavePopulationError,
+    check_new_name, population, save_population,
 };
 use palpate_analysis::source::{RecordStretch, SourceSelection};
+use palpate_sessions::{LibraryError, library_folder};
+use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Estimate the population that the specimens of a study come from: medians, effects and standard deviations by level
 #[derive(Debug, Args)]
@@ -37,6 +40,9 @@ pub struct PopulationArgs {
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
+    /// Save the population in the library under this name, for simulated specimens population:NAME#NUMBER
+    #[arg(long, value_name = "NAME")]
+    save: Option<String>,
     /// Number of sessions fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -58,12 +64,46 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
         method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
         jobs: jobs(args.jobs),
     };
+    let library = args.save.is_some().then(library_folder).transpose().map_err(Failure::usage)?;
+    let place = library.as_deref().zip(args.save.as_deref());
+    if let Some((library, name)) = place {
+        check_new_name(library, name).map_err(save_failure)?;
+    }
     let bar = output.count_bar(0);
     let found = population(&request, &bar).map_err(failure);
     drop(bar);
     let found = found?;
-    output.answer("population", &found, || found.text());
-    Ok(())
+    let saved = place.map(|(library, name)| save_population(library, name, &found)).transpose();
+    // What took long to find is printed even if it cannot be saved.
+    let place = saved.as_ref().ok().and_then(Option::as_ref);
+    let answer = PopulationAnswer {
+        found: &found,
+        id: place.map(|one| one.id.as_str()),
+        file: place.map(|one| one.path.as_path()),
+    };
+    output.answer("population", &answer, || {
+        let saved = place.map(|one| format!("saved as {}, {}", one.id, one.path.display()));
+        [found.text()].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
+    });
+    saved.map(|_| ()).map_err(save_failure)
+}
+
+#[derive(Serialize)]
+struct PopulationAnswer<'a> {
+    #[serde(flatten)]
+    found: &'a PopulationReport,
+    /// Of the saved population.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    file: Option<&'a Path>,
+}
+
+fn save_failure(err: SavePopulationError) -> Failure {
+    match err {
+        SavePopulationError::Library(LibraryError::Io { .. }) => Failure::failed(err),
+        err => Failure::usage(err),
+    }
 }
 
 fn failure(err: PopulationError) -> Failure {

@@ -4,6 +4,7 @@ use super::calibration::source::CalibrationSource;
 use super::truth::write_at_end;
 use super::{Failure, new_file};
 use clap::{Args, Parser};
+use palpate_analysis::population::{is_member, library_member};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
     SimBath, SimCell, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile,
@@ -12,6 +13,7 @@ use palpate_drivers::sim::{
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position, Volts};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
 use std::path::PathBuf;
@@ -56,6 +58,9 @@ pub struct BenchArgs {
     /// Simulated rig: time at which its digital input 1 goes high, in s; 0 for never
     #[arg(long, default_value = "0", value_name = "SECONDS")]
     pub input: SimInput,
+    /// Tissue of a specimen of a population.
+    #[arg(skip)]
+    pub body: Option<ModifiedKelvin>,
 }
 
 impl BenchArgs {
@@ -74,6 +79,7 @@ impl BenchArgs {
             preconditioning: self.preconditioning,
             bath: self.bath,
             input: self.input,
+            body: self.body,
             ..SimSettings::default()
         }
     }
@@ -120,6 +126,27 @@ impl Default for RigArgs {
 }
 
 impl RigArgs {
+    /// The same with the tissue of a specimen, if that is one of a population.
+    pub(super) fn with_specimen(&self, specimen: &str) -> Result<Self, Failure> {
+        let mut args = self.clone();
+        if !is_member(specimen) {
+            return Ok(args);
+        }
+        if palpate_drivers::is_rig_file(&self.rig) {
+            return Err(Failure::usage(format!(
+                "a specimen of a population is simulated, but rig {} is not; give the name of the specimen on it",
+                self.rig
+            )));
+        }
+        if self.bench.stiffness != SimStiffness::default() {
+            return Err(Failure::usage(
+                "--stiffness does not apply to a specimen of a population; leave it out",
+            ));
+        }
+        args.bench.body = Some(library_member(specimen).map_err(Failure::usage)?.body);
+        Ok(args)
+    }
+
     /// The settings of the simulated rig.
     pub fn settings(&self) -> SimSettings {
         SimSettings { clock: self.clock, rate: self.rate, ..self.bench.settings() }

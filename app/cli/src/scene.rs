@@ -6,6 +6,7 @@ use super::new_file;
 use super::output::Output;
 use super::trade::with_bar;
 use clap::{Args, Subcommand};
+use palpate_analysis::population::library_member;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::report::scene::{bench_text, plan_text, played_text};
 use palpate_analysis::scene::{SceneRun, play_scene, read_scene, replay};
@@ -42,6 +43,9 @@ pub struct SceneRunArgs {
     /// What the hand does: poke, press, drag or taps
     #[arg(long, default_value = "poke", value_parser = path, value_name = "PATH")]
     path: ScenePath,
+    /// Tissue of a specimen of a population, population:NAME#NUMBER, instead of that of the scene file
+    #[arg(long, value_name = "SPECIMEN")]
+    specimen: Option<String>,
     /// Duration in s, during which the path repeats; without it the path runs once
     #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: Option<f64>,
@@ -143,6 +147,10 @@ fn run_scene(
         }
     };
     let mut file = read(args.file.as_deref(), output)?;
+    if let Some(specimen) = &args.specimen {
+        file.body = library_member(specimen).map_err(Failure::usage)?.body;
+        file.name.clone_from(specimen);
+    }
     // An impossible scene is refused before anything is measured or written.
     file.scene(COARSEST).map_err(Failure::usage)?;
     let mut after = None;

@@ -62,7 +62,7 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     if let Ok(library) = library_folder() {
         recover::recover_unfinished(&library, output);
     }
-    let bench = rig::open(&args.session.rig)?;
+    let bench = rig::open(&args.session.rig.with_specimen(&args.session.specimen)?)?;
     let description = bench.rig.description().clone();
     args.check(description.speed_max)?;
     let depth_max = Depth(args.depth);

@@ -3,6 +3,7 @@
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{RigWithTruth, SimRig};
 use palpate_model::Newtons;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Write;
 
@@ -31,13 +32,7 @@ fn truth(rig: &SimRig) -> serde_json::Value {
     });
     serde_json::json!({
         "settings": rig.description().settings,
-        "parameters": {
-            "tau_eps": truth.body.tau_eps,
-            "mu1": truth.body.mu[0],
-            "mu2": truth.body.mu[1],
-            "mu3": truth.body.mu[2],
-            "tau_sig": truth.body.tau_sig,
-        },
+        "parameters": BTreeMap::from(truth.body.named()),
         // As a session counts positions once the axis is homed.
         "contact_mm": truth.surface_counted().0,
         "curve_newtons_volts": points.collect::<Vec<_>>(),

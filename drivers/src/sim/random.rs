@@ -16,6 +16,8 @@ pub enum RandomStream {
     Link = 5,
     Fault = 6,
     Cell = 7,
+    /// A specimen of a population.
+    Member = 8,
 }
 
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@ use super::amounts::{
     SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
     SimStiffness, SimThickness,
 };
+use palpate_model::viscoelastic::ModifiedKelvin;
 use std::collections::BTreeMap;
 use std::str::FromStr;
 use thiserror::Error;
@@ -56,7 +57,7 @@ impl SimClock {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SimSettings {
     pub profile: SimProfile,
     pub cell: SimCell,
@@ -76,6 +77,8 @@ pub struct SimSettings {
     pub preconditioning: SimPreconditioning,
     pub bath: SimBath,
     pub input: SimInput,
+    /// Tissue of all specimens, instead of one drawn by the seed.
+    pub body: Option<ModifiedKelvin>,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -101,8 +104,8 @@ impl SimSettings {
 
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
     /// are not the usual ones, `repeat`, `cell`, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
-    /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C)
-    /// and `input` (s).
+    /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C), `input` (s), and the parameters of
+    /// the tissue.
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
             ("profile".to_owned(), self.profile.to_string()),
@@ -130,6 +133,8 @@ impl SimSettings {
         // Usual values are left out: rigs are described as they always were.
         let unusual = amounts.into_iter().filter(|(_, value, usual)| value != usual);
         map.extend(unusual.map(|(name, value, _)| (name.to_owned(), value)));
+        let body = self.body.iter().flat_map(ModifiedKelvin::named);
+        map.extend(body.map(|(name, value)| (name.to_owned(), value.to_string())));
         map
     }
 }
@@ -184,6 +189,7 @@ mod tests {
             preconditioning: "10".parse().unwrap(),
             bath: "37".parse().unwrap(),
             input: "30".parse().unwrap(),
+            body: Some(ModifiedKelvin::THESIS),
         };
         let map = settings.to_map();
         let map: Vec<_> = map.iter().map(|(key, value)| (key.as_str(), value.as_str())).collect();
@@ -193,6 +199,9 @@ mod tests {
             ("clock", "galil"),
             ("compliance", "41"),
             ("input", "30"),
+            ("mu1", "0.05333"),
+            ("mu2", "-0.0086"),
+            ("mu3", "0.0004345"),
             ("noise", "5"),
             ("preconditioning", "10"),
             ("profile", "ideal"),
@@ -201,6 +210,8 @@ mod tests {
             ("seed", "18446744073709551612"),
             ("softening", "40"),
             ("stiffness", "200"),
+            ("tau_eps", "1.023"),
+            ("tau_sig", "0.06"),
             ("thickness", "12.5"),
         ];
         assert_eq!(map, all);

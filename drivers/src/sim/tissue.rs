@@ -78,21 +78,23 @@ pub struct Tissue {
 }
 
 impl Tissue {
-    /// A specimen drawn around the thesis's identified body (its equation 3.5), as stiff as the settings say.
+    /// A specimen drawn around the thesis's identified body (its equation 3.5), as stiff as the settings say, or of the body that
+    /// they give. Its surface is the same with either.
     pub fn new(random: &mut Random, settings: &SimSettings) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
         let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.hundredths();
         let (relaxation, viscosity) =
             (random.around_one(TIME_SPREAD), random.around_one(TIME_SPREAD));
         let thesis = ModifiedKelvin::THESIS;
+        let drawn = ModifiedKelvin {
+            tau_eps: thesis.tau_eps * relaxation,
+            mu: thesis.mu.map(|mu| mu * stiffness),
+            // N*s/mm^2: a force coefficient with a time constant in it.
+            tau_sig: thesis.tau_sig * stiffness * viscosity,
+        };
         Self {
             surface: Position(surface),
-            body: ModifiedKelvin {
-                tau_eps: thesis.tau_eps * relaxation,
-                mu: thesis.mu.map(|mu| mu * stiffness),
-                // N*s/mm^2: a force coefficient with a time constant in it.
-                tau_sig: thesis.tau_sig * stiffness * viscosity,
-            },
+            body: settings.body.unwrap_or(drawn),
             // The probe powers up far outside; the first step places it.
             state: KelvinState::at_rest_from(Depth(-SURFACE_MM)),
             softening: (settings.softening.hundredths() > 0.0).then(|| Softening {

@@ -8,6 +8,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod curves;
+mod draw;
 mod fit;
 mod likelihood;
 mod search;
@@ -16,6 +17,7 @@ mod study;
 mod tests;
 
 pub use curves::{CurveEvidence, CurveRounds, expand_curves};
+pub use draw::MemberDistribution;
 pub use fit::{
     COVERAGE, EffectEstimate, GroupShift, LevelDeviation, PopulationFit, PopulationOptions,
     fit_population,

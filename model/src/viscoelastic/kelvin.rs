@@ -36,14 +36,24 @@ impl ModifiedKelvin {
     pub const THESIS: Self =
         Self { tau_eps: 1.023, mu: [0.05333, -0.0086, 0.0004345], tau_sig: 0.06 };
 
+    /// Its parameters with the names that files and fits have for them.
+    pub const fn named(&self) -> [(&'static str, f64); 5] {
+        let [mu1, mu2, mu3] = self.mu;
+        [
+            ("tau_eps", self.tau_eps),
+            ("mu1", mu1),
+            ("mu2", mu2),
+            ("mu3", mu3),
+            ("tau_sig", self.tau_sig),
+        ]
+    }
+
     /// The body itself if its numbers describe one.
     pub fn checked(self) -> Result<Self, BodyError> {
-        let [mu1, mu2, mu3] = self.mu;
-        let named = [("mu1", mu1), ("mu2", mu2), ("mu3", mu3), ("tau_sig", self.tau_sig)];
         if !(self.tau_eps > 0.0 && self.tau_eps.is_finite()) {
             return Err(BodyError { name: "tau_eps", value: self.tau_eps });
         }
-        match named.into_iter().find(|(_, value)| !value.is_finite()) {
+        match self.named().into_iter().find(|(_, value)| !value.is_finite()) {
             Some((name, value)) => Err(BodyError { name, value }),
             None => Ok(self),
         }

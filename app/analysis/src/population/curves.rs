@@ -20,6 +20,11 @@ pub(super) struct Curve {
 }
 
 impl Curve {
+    /// Greatest depth in mm.
+    pub fn depth_max_mm(&self) -> f64 {
+        self.samples.iter().map(|sample| sample.depth.0).fold(0.0, f64::max)
+    }
+
     pub fn record(&self) -> SignalRecord<'_> {
         SignalRecord { name: "the record", samples: &self.samples, signal: self.signal.as_ref() }
     }

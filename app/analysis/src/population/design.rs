@@ -2,6 +2,7 @@
 
 use crate::study_table::{COVARIATES, StudyProblem, StudyRow, StudyTable};
 use palpate_model::metadata::plain_value;
+use palpate_sessions::populations::PopulationEffect;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use thiserror::Error;
@@ -39,6 +40,7 @@ enum Column {
     Is {
         entry: &'static str,
         value: String,
+        reference: String,
     },
     /// An entry, from its mean over the sessions.
     From {
@@ -159,10 +161,11 @@ impl Design {
             return Err(DesignError::Mixed { entry: entry.to_owned() });
         }
         let mut words = words.into_iter();
-        if let Some(first) = words.next() {
-            self.notes.push(format!("the mean is at {entry} = {first}"));
+        if let Some(reference) = words.next() {
+            self.notes.push(format!("the mean is at {entry} = {reference}"));
+            let column = |value| Column::Is { entry, value, reference: reference.clone() };
+            self.columns.extend(words.map(column));
         }
-        self.columns.extend(words.map(|value| Column::Is { entry, value }));
         Ok(())
     }
 
@@ -177,10 +180,27 @@ impl Design {
     pub fn effects(&self) -> Vec<String> {
         let name = |column: &Column| match column {
             Column::Mean => MEAN.to_owned(),
-            Column::Is { entry, value } => format!("{entry} = {value}"),
+            Column::Is { entry, value, .. } => format!("{entry} = {value}"),
             Column::From { entry, .. } => (*entry).to_owned(),
         };
         self.columns.iter().map(name).collect()
+    }
+
+    /// What the columns behind the first, which is the mean, stand for.
+    #[must_use]
+    pub fn described(&self) -> Vec<PopulationEffect> {
+        let described = |column: &Column| match column {
+            Column::Mean => None,
+            Column::Is { entry, value, reference } => Some(PopulationEffect::Value {
+                entry: (*entry).to_owned(),
+                value: value.clone(),
+                reference: reference.clone(),
+            }),
+            Column::From { entry, mean } => {
+                Some(PopulationEffect::Number { entry: (*entry).to_owned(), mean: *mean })
+            }
+        };
+        self.columns.iter().filter_map(described).collect()
     }
 
     /// Names of the groups of a session.
@@ -196,7 +216,7 @@ impl Design {
     pub fn columns(&self, row: &StudyRow) -> Vec<f64> {
         let value = |column: &Column| match column {
             Column::Mean => 1.0,
-            Column::Is { entry, value } => {
+            Column::Is { entry, value, .. } => {
                 f64::from(u8::from(plain_value(&row.covariates[entry]) == *value))
             }
             Column::From { entry, mean } => row.covariates[entry].as_f64().unwrap_or(*mean) - mean,

@@ -2,10 +2,14 @@
 
 mod curves;
 mod design;
+mod member;
 mod report;
+mod saved;
 
 pub use design::{Design, DesignError};
+pub use member::{MemberError, PopulationMember, draw_member, is_member, library_member};
 pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
+pub use saved::{PopulationOrigin, SavePopulationError, check_new_name, save_population};
 
 use crate::fit::FitRecipe;
 use crate::progress::Progress;
@@ -110,6 +114,8 @@ pub fn population(
     };
     let fit = fit_population(&study, PopulationOptions { has_deviation_intervals: true })?;
     let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
+    let specimen = &known[..known.len().min(options.body_names().len())];
+    let origin = PopulationOrigin::of(&design, &table, (specimen, &names), &curves, &fits);
     let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
     Ok(PopulationReport {
         model: options.family().key(),
@@ -121,6 +127,7 @@ pub fn population(
         standard_deviations: fit.standard_deviations.iter().map(DeviationRow::of).collect(),
         groups: fit.groups,
         not_fitted,
+        origin,
         notes: notes(&design, &table, rounds, fit.is_bounded),
     })
 }

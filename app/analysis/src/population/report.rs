@@ -1,7 +1,7 @@
 //! A population as data, and in words.
 
-use super::PopulationMethod;
 use super::design::MEAN;
+use super::{PopulationMethod, PopulationOrigin};
 use crate::report::text::{counted, table};
 use palpate_figures::uncertain::significant;
 use palpate_population::{EffectEstimate, GroupShift, LevelDeviation, Study};
@@ -28,6 +28,9 @@ pub struct PopulationReport {
     /// Sessions that could not be fitted, with the reason.
     pub not_fitted: BTreeMap<String, String>,
     pub notes: Vec<String>,
+    /// What a saved population has besides.
+    #[serde(skip)]
+    pub origin: PopulationOrigin,
 }
 
 /// A level and its number of groups.

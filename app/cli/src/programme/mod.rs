@@ -52,7 +52,8 @@ pub(super) fn run(
     let mut programme = parse(file, &text).map_err(|err| parse_failure(file, &err))?;
     programme.is_acknowledged |= options.acknowledge;
     apply_labels(&mut programme, options)?;
-    let rig_args = with_settings(&options.rig, &programme.simulated)?;
+    let rig_args = options.rig.with_specimen(&options.specimen)?;
+    let rig_args = with_settings(&rig_args, &programme.simulated)?;
     let bench = super::rig::open(&rig_args)?;
     let planned =
         preview_programme(&programme, &bench)?.map_err(|err| parse_failure(file, &err))?;

@@ -112,7 +112,7 @@ pub struct SessionArgs {
     /// Operator
     #[arg(long, default_value = "")]
     pub(super) operator: String,
-    /// Specimen
+    /// Specimen; on a simulated rig population:NAME#NUMBER is one of a population of the library
     #[arg(long, default_value = "")]
     pub(super) specimen: String,
     /// Indenter; without it the blunt 12 mm probe
@@ -162,7 +162,7 @@ fn read(
     if let Ok(library) = library_folder() {
         super::recover::recover_unfinished(&library, output);
     }
-    let bench = super::rig::open(&options.rig)?;
+    let bench = super::rig::open(&options.rig.with_specimen(&options.specimen)?)?;
     let (protocol, written, _) = super::protocol::load_checked(name, values, &bench, output)?;
     let mut labels = labels(options)?;
     if let Ok(library) = library_folder() {

@@ -194,10 +194,8 @@ const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 /// The parameters of a body as lines that read back to the same bits.
 #[must_use]
 pub fn format_body(body: &ModifiedKelvin) -> String {
-    let ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig } = *body;
-    let values = [tau_eps, mu1, mu2, mu3, tau_sig];
     let line = |(name, value): (&str, f64)| format!("{name} = {value:?}");
-    let lines: Vec<String> = BODY.into_iter().zip(values).map(line).collect();
+    let lines: Vec<String> = body.named().into_iter().map(line).collect();
     lines.join("\n")
 }
 
