@@ -23,8 +23,9 @@ const SECONDS_MAX: f64 = 3600.0;
 /// Arguments of `palpate haptics slave`.
 #[derive(Debug, Args)]
 pub struct SlaveArgs {
-    /// A session or table to fit, or 'thesis' for the model of the source thesis
-    #[arg(value_name = "SESSION|thesis")]
+    /// A session or table to fit, 'thesis' for the model of the source thesis, or a specimen of a population,
+    /// population:NAME#NUMBER
+    #[arg(value_name = "SESSION|thesis|SPECIMEN")]
     source: PathBuf,
     /// Duration in s
     #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]

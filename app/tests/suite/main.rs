@@ -22,6 +22,7 @@ mod migrations;
 mod newer;
 mod plan;
 mod population;
+mod population_member;
 mod programme;
 mod protocol;
 mod queue;

@@ -182,3 +182,193 @@ fn body(population: &PopulationDocument, drawn: &[f64]) -> Result<ModifiedKelvin
     let body = ModifiedKelvin { tau_eps: value("tau_eps")?, mu, tau_sig: value("tau_sig")? };
     Ok(body.checked()?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sessions::populations::{POPULATION_FORMAT, PopulationConstant};
+    use palpate_sessions::save_document;
+    use tempfile::TempDir;
+
+    const MEMBERS: u32 = 2000;
+
+    fn parameter(name: &str, median: f64, deviations: [f64; 2]) -> PopulationParameter {
+        PopulationParameter {
+            name: name.into(),
+            unit: "unit".into(),
+            median,
+            effects: vec![0.4, -0.7, 0.02],
+            standard_deviations: deviations.to_vec(),
+        }
+    }
+
+    fn population() -> PopulationDocument {
+        let treated = |value: &str| PopulationEffect::Value {
+            entry: "animal.treatment".into(),
+            value: value.into(),
+            reference: "control".into(),
+        };
+        PopulationDocument {
+            format: POPULATION_FORMAT,
+            name: "liver".into(),
+            estimated_at: "2026-03-05T10:00:00Z".into(),
+            software_version: "0".into(),
+            family: "series-2".into(),
+            method: "curves".into(),
+            levels: vec!["animal".into(), "session".into()],
+            effects: vec![
+                treated("enzyme"),
+                treated("heat"),
+                PopulationEffect::Number { entry: "animal.age_days".into(), mean: 100.0 },
+            ],
+            parameters: vec![
+                parameter("tau_eps", 1.2, [0.1, 0.2]),
+                parameter("mu1", 0.05, [0.3, 0.1]),
+                parameter("tau_sig", 0.06, [0.0, 0.05]),
+            ],
+            constants: vec![PopulationConstant {
+                name: "mu2".into(),
+                unit: "N/mm^2".into(),
+                value: -0.001,
+            }],
+            depth_max_mm: 12.0,
+            sessions: Vec::new(),
+            supersedes: None,
+        }
+    }
+
+    fn library(population: &PopulationDocument) -> TempDir {
+        let library = tempfile::tempdir().unwrap();
+        save_document(library.path(), population).unwrap();
+        library
+    }
+
+    #[test]
+    fn two_thousand_members_have_the_medians_and_the_standard_deviations_of_their_population() {
+        let population = population();
+        let library = library(&population);
+        let count = f64::from(MEMBERS);
+        let mut scores = vec![Vec::new(); 3];
+        for number in 0..MEMBERS {
+            let text = format!("population:liver#{number}");
+            let member = draw_member(library.path(), &text).unwrap();
+            let ModifiedKelvin { tau_eps, mu: [mu1, mu2, mu3], tau_sig } = member.body;
+            assert_eq!((mu2, mu3, member.depth_max_mm), (-0.001, 0.0, 12.0));
+            for ((scores, value), one) in
+                scores.iter_mut().zip([tau_eps, mu1, tau_sig]).zip(&population.parameters)
+            {
+                let variance: f64 = one.standard_deviations.iter().map(|sd| sd * sd).sum();
+                scores.push((value / one.median).ln() / variance.sqrt());
+            }
+        }
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / count;
+        let product =
+            |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / count;
+        // Each bound is 4.5 standard errors of so many independent standard normal numbers: 1 / sqrt(n) of their mean and of the
+        // product of two, sqrt(2 / n) of the square.
+        let bound = 4.5 / count.sqrt();
+        for (k, one) in scores.iter().enumerate() {
+            assert!(mean(one).abs() < bound, "mean of {k}: {}", mean(one));
+            let square = product(one, one);
+            assert!((square - 1.0).abs() < bound * 2f64.sqrt(), "variance of {k}: {square}");
+            let next = &scores[(k + 1) % 3];
+            assert!(product(one, next).abs() < bound, "{k} with the next: {}", product(one, next));
+            // Neighbouring numbers are unrelated.
+            assert!(product(&one[1..], one).abs() < bound, "{k}: neighbours");
+        }
+    }
+
+    /// A change of these numbers would make another specimen of every `population:NAME#NUMBER` that somebody has used.
+    #[test]
+    fn a_member_is_the_same_on_every_computer_and_follows_text_and_content_alone() {
+        let library_of = library(&population());
+        let drawn = |text: &str| draw_member(library_of.path(), text).unwrap().body;
+        let seventh = drawn("population:liver#7");
+        let known = [0.0, 0.0, -0.001, 0.0, 0.0];
+        for ((name, value), known) in seventh.named().into_iter().zip(known) {
+            // The logarithm and the exponential of another system may round otherwise.
+            assert!((value - known).abs() < 1e-12 * value.abs(), "{name}: {value:?}");
+        }
+        assert_eq!(drawn("population:liver#7"), seventh);
+        assert_ne!(drawn("population:liver#8"), seventh);
+        let mut other = population();
+        other.depth_max_mm = 13.0;
+        let other = library(&other);
+        assert_ne!(draw_member(other.path(), "population:liver#7").unwrap().body, seventh);
+    }
+
+    #[test]
+    fn values_of_effects_move_a_member_by_their_factors() {
+        let library = library(&population());
+        let drawn = |values: &str| {
+            draw_member(library.path(), &format!("population:liver{values}#7")).unwrap().body
+        };
+        let plain = drawn("");
+        for (values, effect) in [
+            ("/animal.treatment=control", 0.0),
+            ("/animal.treatment=enzyme", 0.4),
+            ("/animal.treatment=heat", -0.7),
+            ("/animal.age_days=110", 0.2),
+            ("/animal.age_days=90/animal.treatment=enzyme", 0.2),
+        ] {
+            let moved = drawn(values);
+            for (moved, plain) in [
+                (moved.tau_eps, plain.tau_eps),
+                (moved.mu[0], plain.mu[0]),
+                (moved.tau_sig, plain.tau_sig),
+            ] {
+                // A few roundings of a double.
+                assert!((moved / plain / effect.exp() - 1.0).abs() < 1e-13, "{values}: {moved}");
+            }
+            assert_eq!(moved.mu[1..], plain.mu[1..]);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_refused_in_one_sentence() {
+        let mut maxwell = population();
+        (maxwell.name, maxwell.family) = ("gel".into(), "maxwell".into());
+        let mut lacking = population();
+        lacking.name = "thin".into();
+        lacking.constants.clear();
+        lacking.effects.clear();
+        lacking.parameters.iter_mut().for_each(|one| one.effects.clear());
+        let library = library(&population());
+        for other in [maxwell, lacking] {
+            save_document(library.path(), &other).unwrap();
+        }
+        for (text, says) in [
+            ("population:liver", "is no specimen of a population; write"),
+            ("population:liver#", "whole number from 0"),
+            ("population:liver#-1", "whole number from 0"),
+            ("population:liver#4294967296", "whole number from 0"),
+            ("population:liver/enzyme#1", "ENTRY=VALUE"),
+            ("population:kidney#1", "the library has no population \"kidney\" among its 3"),
+            (
+                "population:liver/animal.sex=m#1",
+                "no effect of animal.sex; give animal.age_days or animal.treatment",
+            ),
+            (
+                "population:thin/animal.sex=m#1",
+                "no effect of animal.sex; it has no effects, so leave it out",
+            ),
+            (
+                "population:liver/animal.treatment=cold#1",
+                "no animal.treatment 'cold'; give control or enzyme or heat",
+            ),
+            ("population:liver/animal.age_days=old#1", "no animal.age_days 'old'; give a number"),
+            (
+                "population:liver/animal.age_days=1/animal.age_days=2#1",
+                "animal.age_days is given twice",
+            ),
+            (
+                "population:gel#1",
+                "family maxwell, which cannot be simulated; estimate one of the family series-1, series-2",
+            ),
+            ("population:thin#1", "no value of mu2"),
+        ] {
+            let err = draw_member(library.path(), text).unwrap_err().to_string();
+            assert!(err.contains(says), "{text}: {err}");
+        }
+    }
+}

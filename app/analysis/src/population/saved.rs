@@ -37,7 +37,7 @@ impl PopulationOrigin {
         curves: &[Curve],
         fits: &[FitSolution<'_>],
     ) -> Self {
-        let values: Vec<Vec<f64>> = fits.iter().map(|fit| fit.values(0)).collect();
+        let values: Vec<Vec<f64>> = fits.iter().map(|fit| fit.values()).collect();
         let others = known.iter().enumerate().filter(|(_, one)| !names.contains(&one.name));
         let constants = others.map(|(k, one)| PopulationConstant {
             name: one.name.clone(),

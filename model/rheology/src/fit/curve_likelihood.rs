@@ -39,7 +39,7 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
         let options = &solution.system.options;
         let parameters = names.iter().map(|name| options.index_of(name));
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
-        let values = solution.values(record);
+        let values = solution.system.physical_values(record, &solution.refined.points[record]);
         let estimates = solution.estimates(record);
         let (mut best, mut widening) = (Vec::new(), Vec::new());
         for (&name, &parameter) in names.iter().zip(&parameters) {

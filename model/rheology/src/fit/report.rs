@@ -196,7 +196,7 @@ impl FitSolution<'_> {
     }
 
     /// Values of all records' parameters and of what is derived from them, one record behind the other.
-    pub(super) fn values(&self) -> Vec<f64> {
+    pub fn values(&self) -> Vec<f64> {
         let each = self.refined.points.iter().enumerate();
         let values = each.flat_map(|(record, point)| {
             let own = self.system.physical_values(record, point);

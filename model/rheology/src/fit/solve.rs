@@ -167,11 +167,6 @@ impl<'a> FitSolution<'a> {
         Self::fit_jointly(&[("the record", samples)], options, &[])
     }
 
-    /// The best values of all parameters of a record in their units, in the order of [`FitOptions::names`].
-    pub fn values(&self, record: usize) -> Vec<f64> {
-        self.system.physical_values(record, &self.refined.points[record])
-    }
-
     /// Fits several records together; [`fit_joint`] says how.
     pub fn fit_jointly(
         records: &[(&'a str, &'a [FitSample])],
