@@ -56,8 +56,8 @@ fn a_fit_of_a_simulated_specimen_finds_the_parameters_that_were_drawn() {
             let one = found.iter().find(|one| one["name"] == name).unwrap();
             let error = one["std_error"].as_f64().unwrap();
             let off = one["value"].as_f64().unwrap() - exact;
-            // Four standard errors are passed once in 16 000 fits, and this one is always the same. Errors are of less than 2 %, so
-            // that the specimen is not mistaken for another: the members differ by 22 %.
+            // Four standard errors are passed once in 16 000 fits, and this one is always the same. Errors are of less than
+            // 2 %, so that the specimen is not mistaken for another: the members differ by 22 %.
             assert!(off.abs() < 4.0 * error && error < 0.02 * exact, "{name} {exact}: {one:#}");
         }
         for name in ["mu2", "mu3"] {
