@@ -271,6 +271,10 @@ mod tests {
             assert!(mean(one).abs() < bound, "mean of {k}: {}", mean(one));
             let square = product(one, one);
             assert!((square - 1.0).abs() < bound * 2f64.sqrt(), "variance of {k}: {square}");
+            // A twentieth of normal numbers is beyond 1.96; the standard error of that share is sqrt(0.05 * 0.95 / n).
+            let beyond = one.iter().filter(|score| score.abs() > 1.96).count();
+            let beyond = beyond as f64 / count - 0.05;
+            assert!(beyond.abs() < bound * 0.0475f64.sqrt(), "beyond 1.96 of {k}: {beyond}");
             let next = &scores[(k + 1) % 3];
             assert!(product(one, next).abs() < bound, "{k} with the next: {}", product(one, next));
             // Neighbouring numbers are unrelated.
