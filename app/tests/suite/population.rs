@@ -32,9 +32,9 @@ fn record_study(at: &Path) {
     }
 }
 
-/// The curves are those of the tissue: medians, effect and spreads are known to a few percent, the noise of short presses.
+/// The curves are those of the tissue: medians, effect and standard deviations are known to a few percent, the noise of short presses.
 #[test]
-fn a_study_has_the_spreads_and_the_effect_of_its_tissues() {
+fn a_study_has_the_deviations_and_the_effect_of_its_tissues() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     record_study(at);
@@ -62,7 +62,7 @@ fn a_study_has_the_spreads_and_the_effect_of_its_tissues() {
         let treated = row("effects", "effect", "animal.treatment = enzyme", "mu1");
         let error = treated["value"].as_f64().unwrap() - effect;
         assert!(error.abs() < 0.05, "{treated:#}");
-        let animals = row("spreads", "level", "animal", "mu1");
+        let animals = row("standard_deviations", "level", "animal", "mu1");
         let ends = [0, 1].map(|end: usize| animals["interval"][end].as_f64().unwrap());
         assert!(ends[0] < spread && spread < ends[1], "{animals:#}");
         let time = row("effects", "effect", "mean", "tau_eps");
@@ -83,11 +83,11 @@ fn what_says_nothing_of_a_population_is_refused_in_one_sentence() {
         assert_refused(&typed(at, &format!("population study{more}")), code, says);
     };
     refused(" --parameters mu9", 2, "the model has no parameter 'mu9'");
-    refused(" --by site", 2, "2 of 2 sessions lack specimen.site");
+    refused(" --by site", 2, "study/one has no specimen.site, as 2 of 2 sessions; add it, or leave specimen.site out");
     refused(" --by specimen,animal", 2, "from the outermost: animal, specimen, site");
-    refused(" --effect animal.sex", 2, "2 of 2 sessions lack animal.sex");
+    refused(" --effect animal.sex", 2, "study/one has no animal.sex, as 2 of 2 sessions");
     refused(" --effect operator", 2, "no entry 'operator'");
-    refused(" --parameters mu1", 1, "the study has 2 sessions for");
+    refused(" --parameters mu1", 1, "sessions or more, not 2");
     succeeded(&short_run(at, "study/three", &["--specimen", "three"]));
-    refused(" --parameters mu1", 2, "1 of 3 sessions lack animal.name");
+    refused(" --parameters mu1", 2, "study/three has no animal.name, as 1 of 3 sessions");
 }

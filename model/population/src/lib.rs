@@ -7,19 +7,25 @@
 //! Start at [`Study`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+mod comparisons;
 mod curves;
 mod fit;
+mod influence;
 mod likelihood;
+mod plan;
 mod search;
 mod study;
 #[cfg(test)]
 mod tests;
 
+pub use comparisons::holm;
 pub use curves::{CurveEvidence, CurveRounds, expand_curves};
 pub use fit::{
-    COVERAGE, EffectEstimate, GroupShift, LevelDeviation, PopulationFit, PopulationOptions,
-    fit_population,
+    COVERAGE, Contrast, EffectEstimate, GroupShift, LevelDeviation, PopulationFit,
+    PopulationOptions, fit_population,
 };
+pub use influence::{Influence, influence};
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;
+pub use plan::{ASSURANCE, PlannedEffect, PlannedStudy, plan_study};
 pub use study::{Evidence, Study, StudyError, StudySession};

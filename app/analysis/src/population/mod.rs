@@ -108,7 +108,10 @@ pub fn population(
             })
         })?),
     };
-    let fit = fit_population(&study, PopulationOptions { has_deviation_intervals: true })?;
+    let fit = fit_population(
+        &study,
+        &PopulationOptions { has_deviation_intervals: true, ..Default::default() },
+    )?;
     let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
     let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
     Ok(PopulationReport {
