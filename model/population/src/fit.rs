@@ -319,11 +319,13 @@ impl Fitter<'_> {
     }
 }
 
-/// Student's t at 97.5 %, by Newton's steps from an approximation: the library's own search does not end for some degrees of
-/// freedom.
+/// Student's t at 97.5 %. The approximation is good to a millionth from 30 degrees of freedom on; below, Newton's steps follow:
+/// the library's own search does not end for some degrees of freedom, and its distribution is rough for many.
 fn quantile(student: &StudentsT) -> f64 {
+    let freedom = student.freedom();
     // Each step squares an error of a hundredth at most.
-    (0..4).fold(student_t975(student.freedom()), |at, _| {
+    let steps = if freedom < 30.0 { 4 } else { 0 };
+    (0..steps).fold(student_t975(freedom), |at, _| {
         at - (student.cdf(at) - (0.5 + 0.5 * COVERAGE)) / student.pdf(at)
     })
 }
@@ -374,7 +376,6 @@ mod tests {
         }
         assert!((at(FREEDOM_MAX) - 1.959_963_985).abs() < 1e-6);
         let all: Vec<f64> = (0..3000).map(|k| at(1.007f64.powi(k).min(FREEDOM_MAX))).collect();
-        // Rounding of the distribution's tail is a hundred millionth.
-        assert!(all.windows(2).all(|pair| pair[1] < pair[0] + 1e-7));
+        assert!(all.windows(2).all(|pair| pair[1] <= pair[0]));
     }
 }
