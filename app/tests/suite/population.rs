@@ -83,7 +83,11 @@ fn what_says_nothing_of_a_population_is_refused_in_one_sentence() {
         assert_refused(&typed(at, &format!("population study{more}")), code, says);
     };
     refused(" --parameters mu9", 2, "the model has no parameter 'mu9'");
-    refused(" --by site", 2, "study/one has no specimen.site, as 2 of 2 sessions; add it, or leave specimen.site out");
+    refused(
+        " --by site",
+        2,
+        "study/one has no specimen.site, as 2 of 2 sessions; add it, or leave specimen.site out",
+    );
     refused(" --by specimen,animal", 2, "from the outermost: animal, specimen, site");
     refused(" --effect animal.sex", 2, "study/one has no animal.sex, as 2 of 2 sessions");
     refused(" --effect operator", 2, "no entry 'operator'");

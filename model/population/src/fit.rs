@@ -75,6 +75,7 @@ pub struct PopulationFit {
     pub contrasts: Vec<EffectEstimate>,
     /// Of each level all parameters.
     pub standard_deviations: Vec<LevelDeviation>,
+    /// Of each level all groups, of the last all sessions.
     pub groups: Vec<GroupShift>,
     /// Whether the intervals of the effects keep the bound on variances although one of them is zero, since without it no
     /// optimum was found.
@@ -303,7 +304,10 @@ impl Fitter<'_> {
     }
 
     fn groups(&self, shifts: &[Vec<ShiftEstimate>]) -> Vec<GroupShift> {
-        let levels = self.study.levels.iter().zip(&self.nested.names).zip(shifts);
+        let sessions: Vec<String> =
+            self.study.sessions.iter().map(|one| one.name.clone()).collect();
+        let names = self.nested.names.iter().chain(std::iter::once(&sessions));
+        let levels = self.study.levels.iter().zip(names).zip(shifts);
         let groups = levels.flat_map(|((level, names), shifts)| {
             names.iter().zip(shifts).map(|(group, one)| {
                 let variances = one.own_covariance.diagonal();

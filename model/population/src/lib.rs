@@ -13,6 +13,7 @@ mod fit;
 mod influence;
 mod likelihood;
 mod plan;
+mod scores;
 mod search;
 mod study;
 #[cfg(test)]
@@ -28,4 +29,5 @@ pub use influence::{Influence, influence};
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;
 pub use plan::{ASSURANCE, PlannedEffect, PlannedStudy, plan_study};
+pub use scores::{NormalScore, normal_scores};
 pub use study::{Evidence, Study, StudyError, StudySession};

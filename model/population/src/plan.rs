@@ -150,6 +150,20 @@ impl Drawing<'_> {
     }
 }
 
+/// Joins levels whose groups have one member each: their standard deviations are one.
+fn separable(mut study: Study, counts: &[usize]) -> Study {
+    for level in (1..counts.len()).rev().filter(|level| counts[*level] == 1) {
+        study.levels.remove(level - 1);
+        // The member of a group is always the first; of sessions their groups stand for them.
+        let last = counts.len() - 1;
+        let place = if level < last { level } else { level - 1 };
+        for session in &mut study.sessions {
+            session.groups.remove(place.min(session.groups.len() - 1));
+        }
+    }
+    study
+}
+
 /// What studies of another size would find of a population: `counts` of groups, from the outermost to sessions, drawn `studies`
 /// times with the effects and the evidence of the sessions of `study` in turn.
 ///
@@ -167,7 +181,7 @@ pub fn plan_study(
     let mut drawing = Drawing { study, fit, counts, random: SplitMix::seeded(seed) };
     let mut found = Vec::new();
     for _ in 0..studies {
-        let drawn = drawing.study(&pattern);
+        let drawn = separable(drawing.study(&pattern), counts);
         found.extend(fit_population(&drawn, &PopulationOptions::default()).ok());
     }
     let effects = fit.effects.iter().enumerate().map(|(k, one)| {
@@ -225,6 +239,14 @@ mod tests {
             let expected = 2.446_912 * root * f64::sqrt(share);
             // The 80 % quantile of 250 roots of chi squared has a standard error of 3 %: four of them.
             assert!((one.half_width / expected - 1.0).abs() < 0.12, "{one:?} {expected}");
+        }
+        // One repeat of each site, then one site of each animal, whose mean squares are those of their variances' sums.
+        for (counts, square) in [([8, 3, 1], 5.0), ([8, 1, 2], 13.0 / 3.0), ([8, 1, 1], 8.0 / 3.0)]
+        {
+            let joined = plan_study(&study, &fit, &counts, studies, 4);
+            let expected = 2.446_912 * (square / joined.sessions as f64 * 8.558_060 / 6.0).sqrt();
+            let found = joined.effects[0].half_width / (expected * f64::sqrt(2.0));
+            assert!((found - 1.0).abs() < 0.12 && joined.studies == studies, "{joined:?} {found}");
         }
         // Four standard errors of a share of five percent.
         assert!((planned.effects[1].power - 0.05).abs() < 0.055, "{planned:?}");

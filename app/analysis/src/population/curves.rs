@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The record of one session.
 pub(super) struct Curve {
-    samples: Vec<FitSample>,
+    pub samples: Vec<FitSample>,
     signal: Option<Signal>,
 }
 

@@ -2,6 +2,7 @@
 
 use crate::study_table::{COVARIATES, StudyProblem, StudyRow, StudyTable};
 use palpate_model::metadata::plain_value;
+use palpate_population::Contrast;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use thiserror::Error;
@@ -52,6 +53,8 @@ enum Column {
 pub struct Design {
     levels: Vec<&'static str>,
     columns: Vec<Column>,
+    /// Values of each entry that is a text, the one that the mean is at first.
+    values: Vec<(&'static str, Vec<String>)>,
     /// What was left out and why, and where the mean is.
     pub notes: Vec<String>,
 }
@@ -66,8 +69,12 @@ impl Design {
         if let Some(problem) = table.problems.iter().find(|one| one.is_contradiction()) {
             return Err(DesignError::Problem(Box::new(problem.clone())));
         }
-        let mut design =
-            Self { levels: Vec::new(), columns: vec![Column::Mean], notes: Vec::new() };
+        let mut design = Self {
+            levels: Vec::new(),
+            columns: vec![Column::Mean],
+            values: Vec::new(),
+            notes: Vec::new(),
+        };
         design.choose_levels(table, levels)?;
         for name in effects {
             design.add_effect(table, name)?;
@@ -158,6 +165,7 @@ impl Design {
         if !numbers.is_empty() {
             return Err(DesignError::Mixed { entry: entry.to_owned() });
         }
+        self.values.push((entry, words.iter().cloned().collect()));
         let mut words = words.into_iter();
         if let Some(first) = words.next() {
             self.notes.push(format!("the mean is at {entry} = {first}"));
@@ -181,6 +189,59 @@ impl Design {
             Column::From { entry, .. } => (*entry).to_owned(),
         };
         self.columns.iter().map(name).collect()
+    }
+
+    /// Names of the values of the first entry that is a text, each with its columns where all others are as the mean is; without
+    /// such an entry one, named so.
+    #[must_use]
+    pub fn kinds(&self, name: &str) -> Vec<(String, Vec<f64>)> {
+        let columns = |of: &dyn Fn(&Column) -> bool| {
+            let value =
+                |column: &Column| f64::from(u8::from(*column == Column::Mean || of(column)));
+            self.columns.iter().map(value).collect()
+        };
+        let Some((entry, values)) = self.values.first() else {
+            return vec![(name.to_owned(), columns(&|_| false))];
+        };
+        let kind = |value: &String| {
+            let is_own = |column: &Column| matches!(column, Column::Is { entry: own, value: one } if own == entry && one == value);
+            (value.clone(), columns(&is_own))
+        };
+        values.iter().map(kind).collect()
+    }
+
+    /// Place of a session among the kinds.
+    #[must_use]
+    pub fn kind_of(&self, row: &StudyRow) -> usize {
+        let place = self.values.first().and_then(|(entry, values)| {
+            let own = plain_value(&row.covariates[entry]);
+            values.iter().position(|value| *value == own)
+        });
+        place.unwrap_or(0)
+    }
+
+    /// The differences between any two values of a text that has three or more, by their entries.
+    #[must_use]
+    pub fn comparisons(&self) -> Vec<(&'static str, Vec<Contrast>)> {
+        let mut found: Vec<(&'static str, Vec<Contrast>)> = Vec::new();
+        for (entry, values) in &self.values {
+            if values.len() < 3 {
+                continue;
+            }
+            let weight = |value: &String, column: &Column| match column {
+                Column::Is { entry: own, value: one } if own == entry && one == value => 1.0,
+                _ => 0.0,
+            };
+            let pairs = (0..values.len()).flat_map(|a| (a + 1..values.len()).map(move |b| (a, b)));
+            let all = pairs.map(|(a, b)| {
+                let (a, b) = (&values[a], &values[b]);
+                let columns = self.columns.iter();
+                let weights = columns.map(|column| weight(b, column) - weight(a, column)).collect();
+                Contrast { name: format!("{entry} = {b} / {a}"), weights }
+            });
+            found.push((entry, all.collect()));
+        }
+        found
     }
 
     /// Names of the groups of a session.

@@ -2,10 +2,18 @@
 
 mod curves;
 mod design;
+mod figures;
+mod questions;
 mod report;
+mod results;
+mod specimens;
 
 pub use design::{Design, DesignError};
+pub use figures::PopulationFigure;
+pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
 pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
+pub use results::{paragraph, write_results};
+pub use specimens::{CurveKind, PopulationCurves};
 
 use crate::fit::FitRecipe;
 use crate::progress::Progress;
@@ -13,8 +21,8 @@ use crate::report::text::counted;
 use crate::study_table::{StudyReadError, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
-    CurveEvidence, CurveRounds, PopulationOptions, Study, StudyError, StudySession, expand_curves,
-    fit_population,
+    CurveEvidence, CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession,
+    expand_curves, fit_population,
 };
 use palpate_rheology::fit::{CurveLikelihood, FitError, FitSolution, SignalRecord};
 use palpate_tables::lake::LakeError;
@@ -47,6 +55,12 @@ pub struct PopulationRequest<'a> {
     /// Entries of sessions that may move the mean.
     pub effects: &'a [String],
     pub method: PopulationMethod,
+    /// Whether each group is left out in turn.
+    pub is_influence_wanted: bool,
+    /// Whether curves for figures are kept.
+    pub is_drawn: bool,
+    /// Percent by which no end of an interval may be off, for which sizes of a study are looked at.
+    pub wanted_percent: Option<f64>,
     /// Number of sessions fitted at a time.
     pub jobs: usize,
 }
@@ -77,11 +91,29 @@ pub enum PopulationError {
     Died,
 }
 
+/// A population, and what it was found from.
+#[derive(Clone, Debug)]
+pub struct Population {
+    pub report: PopulationReport,
+    /// What each session says at the end.
+    pub study: Study,
+    pub fit: PopulationFit,
+    /// Where they are wanted.
+    pub curves: Option<PopulationCurves>,
+}
+
+impl Population {
+    #[must_use]
+    pub fn figures(&self) -> Vec<PopulationFigure> {
+        figures::figures(&self.report, &self.fit, self.curves.as_ref())
+    }
+}
+
 /// Finds the population. `progress` hears of sessions that were read, fitted and expanded.
 pub fn population(
     request: &PopulationRequest<'_>,
     progress: &dyn Progress,
-) -> Result<PopulationReport, PopulationError> {
+) -> Result<Population, PopulationError> {
     let names = parameter_names(request)?;
     let mut table = read_study(request.paths)?;
     // What is wrong with it is said before the sessions are fitted.
@@ -95,6 +127,8 @@ pub fn population(
     let fits = workers.all("fits", &records, |record| {
         FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
     })?;
+    let fitted = curves.iter().zip(&fits).filter(|(_, fit)| fit.is_ok());
+    let fitted: Vec<&Curve> = fitted.map(|(curve, _)| curve).collect();
     let fits = keep(&mut table, fits, &mut not_fitted)?;
     let likelihoods = likelihoods(&names, &table, &fits)?;
     let design = Design::of(&table, request.levels, request.effects)?;
@@ -108,24 +142,36 @@ pub fn population(
             })
         })?),
     };
-    let fit = fit_population(
-        &study,
-        &PopulationOptions { has_deviation_intervals: true, ..Default::default() },
-    )?;
+    let contrasts = questions::contrasts(&design);
+    let fit =
+        fit_population(&study, &PopulationOptions { has_deviation_intervals: true, contrasts })?;
+    let influence = request.is_influence_wanted;
+    let influence = influence.then(|| questions::influences(&study, &fit, &workers)).transpose()?;
+    let plan = request.wanted_percent;
+    let plan = plan.map(|wanted| questions::plan(&study, &fit, wanted, &workers)).transpose()?;
+    let drawn = request.is_drawn.then(|| {
+        let reports: Vec<_> = fits.iter().map(FitSolution::report).collect();
+        specimens::curves(&design, &table.rows, &fitted, &reports, (&study, &fit))
+    });
     let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
     let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
-    Ok(PopulationReport {
+    let effect = |one| EffectRow::of(one, unit(&one.parameter), &fit);
+    let report = PopulationReport {
         model: options.family().key(),
         method: request.method,
         rounds: rounds.map(|one| one.rounds),
         sessions: study.sessions.len(),
         levels: LevelRow::all(&study),
-        effects: fit.effects.iter().map(|one| EffectRow::of(one, unit(&one.parameter))).collect(),
-        standard_deviations: fit.standard_deviations.iter().map(DeviationRow::of).collect(),
-        groups: fit.groups,
+        effects: fit.effects.iter().map(effect).collect(),
+        comparisons: questions::comparisons(&design, &study, &fit),
+        standard_deviations: DeviationRow::all(&fit),
+        groups: fit.groups.clone(),
+        influence,
+        plan,
         not_fitted,
         notes: notes(&design, &table, rounds, fit.is_bounded),
-    })
+    };
+    Ok(Population { report, study, fit, curves: drawn.flatten() })
 }
 
 /// The results of sessions that have one; the others leave the table with their reasons.
