@@ -226,7 +226,7 @@ impl Fitter<'_> {
         let slopes = DVector::from_iterator(judged.slopes.len(), judged.slopes.iter().map(form));
         let uncertainty = (&judged.coordinate_covariance * &slopes).dot(&slopes);
         let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, FREEDOM_MAX);
-        let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
+        let student = student(freedom)?;
         let half = quantile(&student) * variance.sqrt();
         Some(EffectEstimate {
             effect: contrast.name.clone(),
@@ -323,9 +323,13 @@ impl Fitter<'_> {
     }
 }
 
+pub(crate) fn student(freedom: f64) -> Option<StudentsT> {
+    StudentsT::new(0.0, 1.0, freedom).ok()
+}
+
 /// Student's t at 97.5 %. The approximation is good to a millionth from 30 degrees of freedom on; below, Newton's steps follow:
 /// the library's own search does not end for some degrees of freedom, and its distribution is rough for many.
-fn quantile(student: &StudentsT) -> f64 {
+pub(crate) fn quantile(student: &StudentsT) -> f64 {
     let freedom = student.freedom();
     // Each step squares an error of a hundredth at most.
     let steps = if freedom < 30.0 { 4 } else { 0 };

@@ -7,6 +7,7 @@
 //! Start at [`Study`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+mod agreement;
 mod comparisons;
 mod curves;
 mod fit;
@@ -19,6 +20,7 @@ mod study;
 #[cfg(test)]
 mod tests;
 
+pub use agreement::{Agreement, AgreementError, PairedPlace, agreement};
 pub use comparisons::holm;
 pub use curves::{CurveEvidence, CurveRounds, expand_curves};
 pub use fit::{
