@@ -55,12 +55,7 @@ pub struct PopulationArgs {
 
 pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("folder", args.out.as_deref())?;
-    let choice = FitChoice { family: args.family.clone(), fixed: Vec::new(), free: Vec::new() };
-    let wanted =
-        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
-    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
-    recipe.is_systematic = false;
-    recipe.corrections = compliance::corrections(args.compliance.as_deref())?;
+    let recipe = recipe(args.family.clone(), args.compliance.as_deref())?;
     let request = PopulationRequest {
         paths: &args.sources,
         recipe: &recipe,
@@ -90,7 +85,21 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-fn failure(err: PopulationError) -> Failure {
+/// How sessions of a study are fitted.
+pub(super) fn recipe(
+    family: Option<String>,
+    compliance: Option<&str>,
+) -> Result<FitRecipe, Failure> {
+    let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
+    let wanted =
+        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
+    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
+    recipe.is_systematic = false;
+    recipe.corrections = compliance::corrections(compliance)?;
+    Ok(recipe)
+}
+
+pub(super) fn failure(err: PopulationError) -> Failure {
     match err {
         PopulationError::Read(err) => study::failure(err),
         PopulationError::Design(_)

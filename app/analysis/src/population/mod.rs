@@ -1,5 +1,6 @@
 //! From the sessions of a study to the population that their specimens come from.
 
+mod agreement;
 mod curves;
 mod design;
 mod figures;
@@ -8,6 +9,10 @@ mod report;
 mod results;
 mod specimens;
 
+pub use agreement::{
+    AgreementFailure, AgreementReport, AgreementRequest, ParameterAgreement, PlaceDifference,
+    agreements,
+};
 pub use design::{Design, DesignError};
 pub use figures::PopulationFigure;
 pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
@@ -24,7 +29,7 @@ use palpate_population::{
     CurveEvidence, CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession,
     expand_curves, fit_population,
 };
-use palpate_rheology::fit::{CurveLikelihood, FitError, FitSolution, SignalRecord};
+use palpate_rheology::fit::{CurveLikelihood, FitError, FitOptions, FitSolution, SignalRecord};
 use palpate_tables::lake::LakeError;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -114,13 +119,13 @@ pub fn population(
     request: &PopulationRequest<'_>,
     progress: &dyn Progress,
 ) -> Result<Population, PopulationError> {
-    let names = parameter_names(request)?;
+    let names = parameter_names(&request.recipe.options, request.parameters)?;
     let mut table = read_study(request.paths)?;
     // What is wrong with it is said before the sessions are fitted.
     Design::of(&table, request.levels, request.effects)?;
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
-    let curves = read_curves(request, &table, &workers)?;
+    let curves = read_curves(request.paths, request.recipe, &table, &workers)?;
     let curves = keep(&mut table, curves, &mut not_fitted)?;
     let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
     let options = &request.recipe.options;
@@ -224,13 +229,16 @@ fn notes(
     notes
 }
 
-fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, PopulationError> {
-    let known = request.recipe.options.body_names();
-    if request.parameters.is_empty() {
+fn parameter_names(
+    options: &FitOptions,
+    parameters: &[String],
+) -> Result<Vec<String>, PopulationError> {
+    let known = options.body_names();
+    if parameters.is_empty() {
         return Ok(known.into_iter().map(str::to_owned).collect());
     }
     let mut names = BTreeSet::new();
-    for name in request.parameters {
+    for name in parameters {
         if !known.contains(&name.as_str()) {
             let (name, known) = (name.clone(), known.join(", "));
             return Err(PopulationError::Parameter(FitError::UnknownParameter { name, known }));
@@ -239,7 +247,7 @@ fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, Popul
             return Err(PopulationError::ParameterTwice { name: name.clone() });
         }
     }
-    Ok(request.parameters.to_vec())
+    Ok(parameters.to_vec())
 }
 
 /// The likelihoods of all sessions. A parameter that has none in one of them is refused: without that session the
