@@ -37,7 +37,7 @@ pub enum AgreementFailure {
     #[error("two of '{name}' cannot be compared; choose from {}", WITHIN.join(", "))]
     UnknownEntry { name: String },
     #[error(
-        "{entry} has {found} values in these sessions ({values}), and two are compared; give sessions of two"
+        "two values of {entry} are compared, and these sessions have {found} ({values}); give sessions of two"
     )]
     Values { entry: &'static str, found: usize, values: String },
     #[error("{parameter}: {reason} (animal, specimen and site together)")]

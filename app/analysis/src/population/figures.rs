@@ -3,9 +3,12 @@
 use super::report::{EffectRow, PopulationReport, is_mean};
 use super::specimens::{CurveKind, PopulationCurves};
 use crate::report::panels::FigurePanels;
-use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries, PointLabels};
+use palpate_figures::figure::{
+    AxisScale, Ink, Plot, PlotAxis, PlotBand, PlotLevel, PlotSeries, PointLabels,
+};
 use palpate_population::{GroupShift, PopulationFit, normal_scores};
 
+pub(super) const CURVES: &str = "curves";
 /// Most rows of a plot that are named; more leave no room for their names.
 const NAMED_MAX: usize = 30;
 /// Standard errors in half of the interval of a shift.
@@ -19,7 +22,7 @@ pub struct PopulationFigure {
     pub panels: FigurePanels,
 }
 
-/// All figures of a population. Curves are left out where there are none.
+/// All figures of a population, that of curves where it was wanted.
 #[must_use]
 pub fn figures(
     report: &PopulationReport,
@@ -48,7 +51,7 @@ pub fn figures(
         ),
     };
     let curves = curves.map(|curves| PopulationFigure {
-        stem: "curves",
+        stem: CURVES,
         caption: format!(
             "Measured forces from contact (thin), that of the median specimen (thick), and between which 95 % of specimens lie (band), along the motion of {}",
             curves.motion_of
@@ -89,23 +92,32 @@ struct Row {
     ends: [f64; 2],
 }
 
-/// Rows from below, each a value on its interval.
-fn rows_plot(title: &str, x: &str, y: &str, rows: &[Row]) -> Plot {
+/// Rows from below, each a value on its interval, with its name behind.
+fn rows_plot(title: &str, x: &str, rows: &[Row]) -> Plot {
     let at = |k: usize| (k + 1) as f64;
     let intervals = rows.iter().enumerate().map(|(k, row)| {
         PlotSeries::line("", Ink::Quiet, 1.4, row.ends.map(|end| [end, at(k)]).to_vec())
     });
-    let dots = rows.iter().enumerate().map(|(k, row)| [row.value, at(k)]).collect();
-    let dots = PlotSeries::dots("", Ink::Series, 4.0, dots);
-    let name = |row: &Row| [row.name.clone(), format!("{}: {:.4}", row.name, row.value)];
-    let dots = match rows.len() <= NAMED_MAX {
-        true => dots.labelled(PointLabels::Each(rows.iter().map(name).collect())),
-        false => dots,
+    let points =
+        |of: fn(&Row) -> f64| rows.iter().enumerate().map(|(k, row)| [of(row), at(k)]).collect();
+    let dots = PlotSeries::dots("", Ink::Series, 4.0, points(|row| row.value));
+    let names =
+        rows.iter().map(|row| [row.name.clone(), format!("{}: {:.4}", row.name, row.value)]);
+    let names = match rows.len() <= NAMED_MAX {
+        true => PointLabels::Each(names.collect()),
+        false => PointLabels::None,
     };
-    let y = PlotAxis::linear(y).with_range([0.0, at(rows.len())]);
+    let ends = PlotSeries::dots("", Ink::Series, 0.0, points(|row| row.ends[1])).labelled(names);
+    let low = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
+    let high = rows.iter().map(|row| row.ends[1]).fold(1.0, f64::max);
+    // A margin on the left, and room for names on the right; rows that are all at one are seen too.
+    let width = (high / low).max(1.1);
+    let x = PlotAxis::logarithmic(x).with_range([low / width.powf(0.08), high * width.powf(0.6)]);
+    let y = PlotAxis { scale: AxisScale::Rows, ..PlotAxis::linear("") };
     Plot {
         x_levels: vec![PlotLevel { is_dashed: true, ..PlotLevel::plain(1.0, Ink::Quiet) }],
-        ..Plot::new(title, PlotAxis::logarithmic(x), y).with(intervals.chain([dots]))
+        ..Plot::new(title, x, y.with_range([0.0, at(rows.len())]))
+            .with(intervals.chain([dots, ends]))
     }
 }
 
@@ -126,7 +138,7 @@ fn effects_plot(report: &PopulationReport) -> Option<Plot> {
     };
     let mut rows: Vec<Row> = own.chain(comparisons).map(row).collect();
     rows.reverse();
-    (!rows.is_empty()).then(|| rows_plot("", "factor", "effect", &rows))
+    (!rows.is_empty()).then(|| rows_plot("", "factor", &rows))
 }
 
 fn groups_plot(
@@ -143,7 +155,7 @@ fn groups_plot(
     let mut rows: Vec<Row> = fit.groups.iter().filter(|one| one.level == level).map(row).collect();
     rows.sort_by(|a, b| a.value.total_cmp(&b.value));
     let title = report.parameters().nth(parameter).unwrap_or_default();
-    rows_plot(title, "factor from the median", "rank", &rows)
+    rows_plot(title, "factor from the median", &rows)
 }
 
 fn curves_plot(kind: &CurveKind) -> Plot {

@@ -62,7 +62,7 @@ pub struct PopulationRequest<'a> {
     pub method: PopulationMethod,
     /// Whether each group is left out in turn.
     pub is_influence_wanted: bool,
-    /// Whether curves for figures are kept.
+    /// Whether curves for figures are kept, where the population has all parameters of the model.
     pub is_drawn: bool,
     /// Percent by which no end of an interval may be off, for which sizes of a study are looked at.
     pub wanted_percent: Option<f64>,
@@ -103,7 +103,7 @@ pub struct Population {
     /// What each session says at the end.
     pub study: Study,
     pub fit: PopulationFit,
-    /// Where they are wanted.
+    /// Where they are wanted and all parameters of the model are in the population.
     pub curves: Option<PopulationCurves>,
 }
 
@@ -154,7 +154,9 @@ pub fn population(
     let influence = influence.then(|| questions::influences(&study, &fit, &workers)).transpose()?;
     let plan = request.wanted_percent;
     let plan = plan.map(|wanted| questions::plan(&study, &fit, wanted, &workers)).transpose()?;
-    let drawn = request.is_drawn.then(|| {
+    // A specimen is drawn whole or not at all.
+    let is_drawn = request.is_drawn && names.len() == options.body_names().len();
+    let drawn = is_drawn.then(|| {
         let reports: Vec<_> = fits.iter().map(FitSolution::report).collect();
         specimens::curves(&design, &table.rows, &fitted, &reports, (&study, &fit))
     });

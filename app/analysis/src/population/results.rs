@@ -1,6 +1,6 @@
 //! A population for a paper: tables, a paragraph, figures and a page, each a file of a new folder.
 
-use super::figures::PopulationFigure;
+use super::figures::{CURVES, PopulationFigure};
 use super::report::{
     COMPARISON_HEAD, ComparisonRow, DEVIATION_HEAD, DeviationRow, EFFECT_HEAD, EffectRow,
     PopulationReport, is_mean, probability,
@@ -10,6 +10,7 @@ use crate::report::text::counted;
 use palpate_figures::page::{HtmlBody, document};
 use palpate_figures::uncertain::significant;
 use palpate_population::Evidence;
+use palpate_rheology::families::find_family;
 use palpate_sessions::atomic;
 use std::io;
 use std::path::Path;
@@ -195,7 +196,7 @@ pub fn paragraph(report: &PopulationReport) -> String {
     let mut text = format!(
         "We recorded {}. The force was described by {}, and the logarithms of its parameters by a linear mixed model with random intercepts nested in this order, {entered}, by restricted maximum likelihood (palpate {version}). Intervals are of 95 %: of medians and factors by Student's t with Satterthwaite's degrees of freedom, of standard deviations by the profile of the likelihood.",
         groups.join(" of "),
-        report.model,
+        find_family(&report.model).map_or_else(|_| report.model.clone(), |one| one.name()),
     );
     for one in report.effects.iter().filter(|one| is_mean(&one.effect)) {
         text += &parameter_sentences(report, one);
@@ -278,6 +279,9 @@ fn page(report: &PopulationReport, figures: &[PopulationFigure]) -> String {
     }
     for figure in figures {
         body.figure(&figure.panels.drawing().svg(), &figure.caption);
+    }
+    if figures.iter().all(|one| one.stem != CURVES) {
+        body.paragraph("Curves are drawn where all parameters of the model are in the population.");
     }
     document("Population", body)
 }
