@@ -6,11 +6,10 @@ use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
-use palpate_analysis::fit::{FitChoice, FitRecipe};
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::population::{
-    PopulationError, PopulationMethod, PopulationRequest, population, write_results,
+    PopulationError, PopulationMethod, PopulationRequest, population, study_recipe, write_results,
 };
-use palpate_analysis::source::{RecordStretch, SourceSelection};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -90,13 +89,8 @@ pub(super) fn recipe(
     family: Option<String>,
     compliance: Option<&str>,
 ) -> Result<FitRecipe, Failure> {
-    let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
-    let wanted =
-        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
-    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
-    recipe.is_systematic = false;
-    recipe.corrections = compliance::corrections(compliance)?;
-    Ok(recipe)
+    let corrections = compliance::corrections(compliance)?;
+    study_recipe(family, corrections).map_err(Failure::usage)
 }
 
 pub(super) fn failure(err: PopulationError) -> Failure {

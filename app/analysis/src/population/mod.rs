@@ -16,13 +16,15 @@ pub use agreement::{
 pub use design::{Design, DesignError};
 pub use figures::PopulationFigure;
 pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
-pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
+pub use report::{DeviationRow, EffectRow, LevelRow, ParameterLines, PopulationReport};
 pub use results::{paragraph, write_results};
 pub use specimens::{CurveKind, PopulationCurves};
 
-use crate::fit::FitRecipe;
+use crate::compliance::ComplianceCorrections;
+use crate::fit::{FitChoice, FitRecipe};
 use crate::progress::Progress;
 use crate::report::text::counted;
+use crate::source::{RecordStretch, SourceSelection};
 use crate::study_table::{StudyReadError, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
@@ -46,6 +48,18 @@ pub enum PopulationMethod {
     Curves,
     /// Each with the values that fit it best and their covariance.
     TwoStage,
+}
+
+/// How the sessions of a study are fitted: their loading and hold, by a family, or without one by the modified Kelvin model.
+pub fn study_recipe(
+    family: Option<String>,
+    corrections: ComplianceCorrections,
+) -> Result<FitRecipe, FitError> {
+    let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
+    let stretch = RecordStretch::with_unload(false);
+    let selection = SourceSelection { stretch, is_rejected_included: false };
+    let recipe = FitRecipe::new(choice.options()?, selection);
+    Ok(FitRecipe { is_systematic: false, corrections, ..recipe })
 }
 
 #[derive(Debug)]

@@ -251,12 +251,24 @@ impl PopulationReport {
 
     pub(super) fn influence_text(&self) -> Option<String> {
         let report = self.influence.as_ref()?;
+        let head = "left out | changes most | with it | without it | in standard errors";
+        let mut text = table(head, self.influence_rows().into_iter().map(Vec::from));
+        for (group, reason) in &report.impossible {
+            let _ = write!(text, "\nwithout {group}: {reason}");
+        }
+        Some(text)
+    }
+
+    /// The most influential groups: name, the mean or effect that changes most, its factor with and without the group, and the
+    /// change in standard errors. None where it was not wanted.
+    #[must_use]
+    pub fn influence_rows(&self) -> Vec<[String; 5]> {
         let row = |one: &Influence| {
             let changes = one.changes.iter().enumerate();
             let most = changes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
             let (place, change) = most.map_or((0, 0.0), |(place, change)| (place, *change));
             let whole = &self.effects[place];
-            vec![
+            [
                 format!("{} {}", one.level, one.group),
                 format!("{} of {}", whole.effect, whole.parameter),
                 significant(whole.factor, 4),
@@ -264,12 +276,8 @@ impl PopulationReport {
                 format!("{change:+.2}"),
             ]
         };
-        let head = "left out | changes most | with it | without it | in standard errors";
-        let mut text = table(head, report.groups.iter().take(INFLUENTIAL).map(row));
-        for (group, reason) in &report.impossible {
-            let _ = write!(text, "\nwithout {group}: {reason}");
-        }
-        Some(text)
+        let groups = self.influence.iter().flat_map(|report| &report.groups);
+        groups.take(INFLUENTIAL).map(row).collect()
     }
 }
 
@@ -311,5 +319,60 @@ impl PlanReport {
             None => write!(text, "\nno study of these sizes has intervals of {wanted} % or less"),
         };
         text
+    }
+}
+
+/// What is known of one parameter: names and words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParameterLines {
+    pub parameter: String,
+    pub facts: Vec<(String, String)>,
+}
+
+impl PopulationReport {
+    /// Median, effects and standard deviations of each parameter, for a narrow place.
+    #[must_use]
+    pub fn parameter_lines(&self) -> Vec<ParameterLines> {
+        let ends =
+            |[low, high]: [f64; 2]| format!("{} to {}", significant(low, 3), significant(high, 3));
+        let effect = |one: &EffectRow| match one.p_value {
+            None => {
+                let unit = one.unit.as_deref().unwrap_or_default();
+                let value = format!("{} {unit}", significant(one.factor, 3));
+                (
+                    "median".to_owned(),
+                    format!("{} ({})", value.trim_end(), ends(one.factor_interval)),
+                )
+            }
+            Some(p) => {
+                let words = format!(
+                    "{} ({}), p {}",
+                    significant(one.factor, 3),
+                    ends(one.factor_interval),
+                    probability(p)
+                );
+                (one.effect.clone(), words)
+            }
+        };
+        let percent = |value: f64| format!("{:.1}", 100.0 * value);
+        let deviation = |one: &DeviationRow| {
+            let [low, high] = one.estimate.interval;
+            let end = |end: Option<f64>| end.map_or("open".to_owned(), percent);
+            let value = percent(one.estimate.value);
+            (
+                format!("between {}s", one.estimate.level),
+                format!("{value} % ({} to {} %)", end(low), end(high)),
+            )
+        };
+        let lines = self.parameters().map(|parameter| {
+            let effects = self.effects.iter().filter(|one| one.parameter == parameter).map(effect);
+            let own = |one: &&DeviationRow| one.estimate.parameter == parameter;
+            let deviations = self.standard_deviations.iter().filter(own).map(deviation);
+            ParameterLines {
+                parameter: parameter.to_owned(),
+                facts: effects.chain(deviations).collect(),
+            }
+        });
+        lines.collect()
     }
 }
