@@ -17,23 +17,28 @@ from ._library import Library, library
 from ._material import Material, material
 from ._native import PalpateError, __version__
 from ._plot import plot
+from ._population import Agreement, Population, agreement, population
 from ._run import Run, run
 from ._session import Session, open
 
 __all__ = [
+    "Agreement",
     "Fit",
     "Library",
     "Material",
     "PalpateError",
     "PalpateWarning",
     "Parameter",
+    "Population",
     "Run",
     "Session",
     "__version__",
+    "agreement",
     "fit",
     "library",
     "material",
     "open",
     "plot",
+    "population",
     "run",
 ]

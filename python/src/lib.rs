@@ -8,6 +8,7 @@ mod error;
 mod fit;
 mod library;
 mod material;
+mod population;
 mod run;
 mod session;
 
@@ -24,6 +25,8 @@ mod _native {
     use super::library::{default_library, entry_fields, find};
     #[pymodule_export]
     use super::material::fit_material;
+    #[pymodule_export]
+    use super::population::{find_agreement, find_population};
     #[pymodule_export]
     use super::run::NativeRun;
     #[pymodule_export]

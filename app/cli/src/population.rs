@@ -1,19 +1,20 @@
 //! `palpate population`: means, effects and standard deviations of the parameters of a study.
 
+use super::arguments::positive;
 use super::fit::jobs;
+use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
-use palpate_analysis::fit::{FitChoice, FitRecipe};
+use palpate_analysis::fit::FitRecipe;
 use palpate_analysis::population::{
     PopulationError, PopulationMethod, PopulationReport, PopulationRequest, SavePopulationError,
-    check_new_name, population, save_population,
+    check_new_name, population, save_population, study_recipe, write_results,
 };
-use palpate_analysis::source::{RecordStretch, SourceSelection};
 use palpate_sessions::{LibraryError, library_folder};
 use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Estimate the population that the specimens of a study come from: medians, effects and standard deviations by level
 #[derive(Debug, Args)]
@@ -36,6 +37,15 @@ pub struct PopulationArgs {
     /// Take each session's best values and their covariance instead of its curve
     #[arg(long)]
     two_stage: bool,
+    /// Leave each group and session out in turn, and print on which of them the population rests
+    #[arg(long)]
+    influence: bool,
+    /// Draw studies of other sizes from the population, and print in which no end of an interval is off by more than PERCENT
+    #[arg(long, value_name = "PERCENT", value_parser = positive)]
+    wanted: Option<f64>,
+    /// Write tables (CSV, LaTeX), figures, a paragraph and a page for a paper into this new folder
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// Correct depths for machine compliance: last for the compliance in force for each
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
@@ -49,12 +59,8 @@ pub struct PopulationArgs {
 }
 
 pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
-    let choice = FitChoice { family: args.family.clone(), fixed: Vec::new(), free: Vec::new() };
-    let wanted =
-        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
-    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
-    recipe.is_systematic = false;
-    recipe.corrections = compliance::corrections(args.compliance.as_deref())?;
+    new_file::check("folder", args.out.as_deref())?;
+    let recipe = recipe(args.family.clone(), args.compliance.as_deref())?;
     let request = PopulationRequest {
         paths: &args.sources,
         recipe: &recipe,
@@ -62,6 +68,9 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
         levels: &args.by,
         effects: &args.effect,
         method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
+        is_drawn: args.out.is_some(),
+        is_influence_wanted: args.influence,
+        wanted_percent: args.wanted,
         jobs: jobs(args.jobs),
     };
     let library = args.save.is_some().then(library_folder).transpose().map_err(Failure::usage)?;
@@ -77,14 +86,23 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
     // What took long to find is printed even if it cannot be saved.
     let place = saved.as_ref().ok().and_then(Option::as_ref);
     let answer = PopulationAnswer {
-        found: &found,
+        found: &found.report,
         id: place.map(|one| one.id.as_str()),
         file: place.map(|one| one.path.as_path()),
     };
     output.answer("population", &answer, || {
         let saved = place.map(|one| format!("saved as {}, {}", one.id, one.path.display()));
-        [found.text()].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
+        [found.report.text()].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
     });
+    if let Some(folder) = &args.out {
+        write_results(&found, folder).map_err(|err| {
+            Failure::failed(format!(
+                "the results cannot be written into {} ({err}); choose a folder that you may write to",
+                folder.display()
+            ))
+        })?;
+        output.note(&format!("wrote {}", folder.display()));
+    }
     saved.map(|_| ()).map_err(save_failure)
 }
 
@@ -106,7 +124,16 @@ fn save_failure(err: SavePopulationError) -> Failure {
     }
 }
 
-fn failure(err: PopulationError) -> Failure {
+/// How sessions of a study are fitted.
+pub(super) fn recipe(
+    family: Option<String>,
+    compliance: Option<&str>,
+) -> Result<FitRecipe, Failure> {
+    let corrections = compliance::corrections(compliance)?;
+    study_recipe(family, corrections).map_err(Failure::usage)
+}
+
+pub(super) fn failure(err: PopulationError) -> Failure {
     match err {
         PopulationError::Read(err) => study::failure(err),
         PopulationError::Design(_)

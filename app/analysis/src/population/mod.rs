@@ -1,26 +1,41 @@
 //! From the sessions of a study to the population that their specimens come from.
 
+mod agreement;
 mod curves;
 mod design;
+mod figures;
 mod member;
+mod questions;
 mod report;
+mod results;
 mod saved;
+mod specimens;
 
+pub use agreement::{
+    AgreementFailure, AgreementReport, AgreementRequest, ParameterAgreement, PlaceDifference,
+    agreements,
+};
 pub use design::{Design, DesignError};
+pub use figures::PopulationFigure;
 pub use member::{MemberError, PopulationMember, draw_member, is_member, library_member};
-pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
+pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
+pub use report::{DeviationRow, EffectRow, LevelRow, ParameterLines, PopulationReport};
+pub use results::{paragraph, write_results};
 pub use saved::{PopulationOrigin, SavePopulationError, check_new_name, save_population};
+pub use specimens::{CurveKind, PopulationCurves};
 
-use crate::fit::FitRecipe;
+use crate::compliance::ComplianceCorrections;
+use crate::fit::{FitChoice, FitRecipe};
 use crate::progress::Progress;
 use crate::report::text::counted;
+use crate::source::{RecordStretch, SourceSelection};
 use crate::study_table::{StudyReadError, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
-    CurveEvidence, CurveRounds, PopulationOptions, Study, StudyError, StudySession, expand_curves,
-    fit_population,
+    CurveEvidence, CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession,
+    expand_curves, fit_population,
 };
-use palpate_rheology::fit::{CurveLikelihood, FitError, FitSolution, SignalRecord};
+use palpate_rheology::fit::{CurveLikelihood, FitError, FitOptions, FitSolution, SignalRecord};
 use palpate_tables::lake::LakeError;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -39,6 +54,18 @@ pub enum PopulationMethod {
     TwoStage,
 }
 
+/// How the sessions of a study are fitted: their loading and hold, by a family, or without one by the modified Kelvin model.
+pub fn study_recipe(
+    family: Option<String>,
+    corrections: ComplianceCorrections,
+) -> Result<FitRecipe, FitError> {
+    let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
+    let stretch = RecordStretch::with_unload(false);
+    let selection = SourceSelection { stretch, is_rejected_included: false };
+    let recipe = FitRecipe::new(choice.options()?, selection);
+    Ok(FitRecipe { is_systematic: false, corrections, ..recipe })
+}
+
 #[derive(Debug)]
 pub struct PopulationRequest<'a> {
     /// Sessions and folders of sessions, or one lake.
@@ -51,6 +78,12 @@ pub struct PopulationRequest<'a> {
     /// Entries of sessions that may move the mean.
     pub effects: &'a [String],
     pub method: PopulationMethod,
+    /// Whether each group is left out in turn.
+    pub is_influence_wanted: bool,
+    /// Whether curves for figures are kept, where the population has all parameters of the model.
+    pub is_drawn: bool,
+    /// Percent by which no end of an interval may be off, for which sizes of a study are looked at.
+    pub wanted_percent: Option<f64>,
     /// Number of sessions fitted at a time.
     pub jobs: usize,
 }
@@ -81,24 +114,45 @@ pub enum PopulationError {
     Died,
 }
 
+/// A population, and what it was found from.
+#[derive(Clone, Debug)]
+pub struct Population {
+    pub report: PopulationReport,
+    /// What each session says at the end.
+    pub study: Study,
+    pub fit: PopulationFit,
+    /// Where they are wanted and all parameters of the model are in the population.
+    pub curves: Option<PopulationCurves>,
+    pub origin: PopulationOrigin,
+}
+
+impl Population {
+    #[must_use]
+    pub fn figures(&self) -> Vec<PopulationFigure> {
+        figures::figures(&self.report, &self.fit, self.curves.as_ref())
+    }
+}
+
 /// Finds the population. `progress` hears of sessions that were read, fitted and expanded.
 pub fn population(
     request: &PopulationRequest<'_>,
     progress: &dyn Progress,
-) -> Result<PopulationReport, PopulationError> {
-    let names = parameter_names(request)?;
+) -> Result<Population, PopulationError> {
+    let names = parameter_names(&request.recipe.options, request.parameters)?;
     let mut table = read_study(request.paths)?;
     // What is wrong with it is said before the sessions are fitted.
     Design::of(&table, request.levels, request.effects)?;
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
-    let curves = read_curves(request, &table, &workers)?;
+    let curves = read_curves(request.paths, request.recipe, &table, &workers)?;
     let curves = keep(&mut table, curves, &mut not_fitted)?;
     let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
     let options = &request.recipe.options;
     let fits = workers.all("fits", &records, |record| {
         FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
     })?;
+    let fitted = curves.iter().zip(&fits).filter(|(_, fit)| fit.is_ok());
+    let fitted: Vec<&Curve> = fitted.map(|(curve, _)| curve).collect();
     let fits = keep(&mut table, fits, &mut not_fitted)?;
     let likelihoods = likelihoods(&names, &table, &fits)?;
     let design = Design::of(&table, request.levels, request.effects)?;
@@ -112,24 +166,40 @@ pub fn population(
             })
         })?),
     };
-    let fit = fit_population(&study, PopulationOptions { has_deviation_intervals: true })?;
+    let contrasts = questions::contrasts(&design);
+    let fit =
+        fit_population(&study, &PopulationOptions { has_deviation_intervals: true, contrasts })?;
+    let influence = request.is_influence_wanted;
+    let influence = influence.then(|| questions::influences(&study, &fit, &workers)).transpose()?;
+    let plan = request.wanted_percent;
+    let plan = plan.map(|wanted| questions::plan(&study, &fit, wanted, &workers)).transpose()?;
+    // A specimen is drawn whole or not at all.
+    let is_drawn = request.is_drawn && names.len() == options.body_names().len();
+    let drawn = is_drawn.then(|| {
+        let reports: Vec<_> = fits.iter().map(FitSolution::report).collect();
+        specimens::curves(&design, &table.rows, &fitted, &reports, (&study, &fit))
+    });
     let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
     let specimen = &known[..known.len().min(options.body_names().len())];
-    let origin = PopulationOrigin::of(&design, &table, (specimen, &names), &curves, &fits);
+    let origin = PopulationOrigin::of(&design, &table, (specimen, &names), &fitted, &fits);
     let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
-    Ok(PopulationReport {
+    let effect = |one| EffectRow::of(one, unit(&one.parameter), &fit);
+    let report = PopulationReport {
         model: options.family().key(),
         method: request.method,
         rounds: rounds.map(|one| one.rounds),
         sessions: study.sessions.len(),
         levels: LevelRow::all(&study),
-        effects: fit.effects.iter().map(|one| EffectRow::of(one, unit(&one.parameter))).collect(),
-        standard_deviations: fit.standard_deviations.iter().map(DeviationRow::of).collect(),
-        groups: fit.groups,
+        effects: fit.effects.iter().map(effect).collect(),
+        comparisons: questions::comparisons(&design, &study, &fit),
+        standard_deviations: DeviationRow::all(&fit),
+        groups: fit.groups.clone(),
+        influence,
+        plan,
         not_fitted,
-        origin,
         notes: notes(&design, &table, rounds, fit.is_bounded),
-    })
+    };
+    Ok(Population { report, study, fit, curves: drawn.flatten(), origin })
 }
 
 /// The results of sessions that have one; the others leave the table with their reasons.
@@ -182,13 +252,16 @@ fn notes(
     notes
 }
 
-fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, PopulationError> {
-    let known = request.recipe.options.body_names();
-    if request.parameters.is_empty() {
+fn parameter_names(
+    options: &FitOptions,
+    parameters: &[String],
+) -> Result<Vec<String>, PopulationError> {
+    let known = options.body_names();
+    if parameters.is_empty() {
         return Ok(known.into_iter().map(str::to_owned).collect());
     }
     let mut names = BTreeSet::new();
-    for name in request.parameters {
+    for name in parameters {
         if !known.contains(&name.as_str()) {
             let (name, known) = (name.clone(), known.join(", "));
             return Err(PopulationError::Parameter(FitError::UnknownParameter { name, known }));
@@ -197,7 +270,7 @@ fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, Popul
             return Err(PopulationError::ParameterTwice { name: name.clone() });
         }
     }
-    Ok(request.parameters.to_vec())
+    Ok(parameters.to_vec())
 }
 
 /// The likelihoods of all sessions. A parameter that has none in one of them is refused: without that session the

@@ -2,7 +2,7 @@
 
 use super::curves::Curve;
 use super::design::{Design, MEAN};
-use super::{PopulationMethod, PopulationReport};
+use super::{Population, PopulationMethod};
 use crate::study_table::StudyTable;
 use palpate_model::estimate::FittedParameter;
 use palpate_rheology::fit::FitSolution;
@@ -34,7 +34,7 @@ impl PopulationOrigin {
         design: &Design,
         table: &StudyTable,
         (known, names): (&[FittedParameter], &[String]),
-        curves: &[Curve],
+        curves: &[&Curve],
         fits: &[FitSolution<'_>],
     ) -> Self {
         let values: Vec<Vec<f64>> = fits.iter().map(|fit| fit.values()).collect();
@@ -48,7 +48,7 @@ impl PopulationOrigin {
             sessions: table.rows.iter().map(|row| row.session_id.clone()).collect(),
             effects: design.described(),
             constants: constants.collect(),
-            depth_max_mm: curves.iter().map(Curve::depth_max_mm).fold(0.0, f64::max),
+            depth_max_mm: curves.iter().map(|one| one.depth_max_mm()).fold(0.0, f64::max),
         }
     }
 }
@@ -82,13 +82,14 @@ pub fn check_new_name(library: &Path, name: &str) -> Result<(), SavePopulationEr
 pub fn save_population(
     library: &Path,
     name: &str,
-    report: &PopulationReport,
+    found: &Population,
 ) -> Result<StoredPopulation, SavePopulationError> {
     check_new_name(library, name)?;
-    Ok(save_document(library, &document(name, report))?)
+    Ok(save_document(library, &document(name, found))?)
 }
 
-fn document(name: &str, report: &PopulationReport) -> PopulationDocument {
+fn document(name: &str, found: &Population) -> PopulationDocument {
+    let Population { report, origin, .. } = found;
     let means = report.effects.iter().filter(|row| row.effect == MEAN);
     let parameters = means.map(|mean| {
         let effects = report.effects.iter();
@@ -115,11 +116,11 @@ fn document(name: &str, report: &PopulationReport) -> PopulationDocument {
         }
         .to_owned(),
         levels: report.levels.iter().map(|one| one.level.clone()).collect(),
-        effects: report.origin.effects.clone(),
+        effects: origin.effects.clone(),
         parameters: parameters.collect(),
-        constants: report.origin.constants.clone(),
-        depth_max_mm: report.origin.depth_max_mm,
-        sessions: report.origin.sessions.clone(),
+        constants: origin.constants.clone(),
+        depth_max_mm: origin.depth_max_mm,
+        sessions: origin.sessions.clone(),
         supersedes: None,
     }
 }

@@ -7,6 +7,7 @@ pub mod checks;
 pub mod exact_fit;
 pub mod extremes;
 pub mod form;
+pub mod groups;
 pub mod haptics;
 pub mod library;
 pub mod live_panel;

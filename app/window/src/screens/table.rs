@@ -25,6 +25,7 @@ pub const GROUPS: [ScreenGroup; 3] = [
             super::review::SCREEN,
             super::models::SCREEN,
             super::material::SCREEN,
+            super::groups::SCREEN,
             super::trade::SCREEN,
             super::extremes::SCREEN,
             super::haptics::SCREEN,

@@ -22,6 +22,8 @@ pub enum PathPurpose {
     Body,
     /// A recorded session whose modulus is wanted.
     Press,
+    /// A folder of the sessions of a study.
+    Study,
     /// A scene file.
     Scene,
     /// A recorded session to look at.
@@ -123,6 +125,7 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
         PathPurpose::Session | PathPurpose::Body | PathPurpose::Press | PathPurpose::Opened => {
             dialog.set_title("Folder of a session").pick_folder()
         }
+        PathPurpose::Study => dialog.set_title("Folder of sessions").pick_folder(),
         PathPurpose::Specimens => of_kind("Table of specimens", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
