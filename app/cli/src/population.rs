@@ -14,7 +14,7 @@ use palpate_analysis::population::{
 use palpate_sessions::{LibraryError, library_folder};
 use serde::Serialize;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Estimate the population that the specimens of a study come from: medians, effects and standard deviations by level
 #[derive(Debug, Args)]
