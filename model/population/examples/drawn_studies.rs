@@ -7,7 +7,7 @@
 use palpate_model::random::SplitMix;
 use palpate_population::{
     Evidence, PopulationFit, PopulationOptions, Study, StudySession, SymmetricMatrix,
-    fit_population,
+    fit_population, outlying_group,
 };
 
 const ANIMALS: [usize; 3] = [4, 6, 12];
@@ -72,6 +72,10 @@ struct Tally {
     spreads: [usize; 3],
     widths: [f64; 2],
     zeros: [usize; 3],
+    /// Studies in which a group of any level is said to be outlying, and those in which none is, with how many of the latter have
+    /// intervals around the standard deviations.
+    outlying: usize,
+    silent: [usize; 3],
 }
 
 impl Tally {
@@ -82,10 +86,15 @@ impl Tally {
         self.effect += covers(treated.interval, effect);
         self.widths[0] += mean.interval[1] - mean.interval[0];
         self.widths[1] += treated.interval[1] - treated.interval[0];
+        let is_outlying =
+            ["animal", "site", "repeat"].iter().any(|one| outlying_group(fit, one, 0).is_some());
+        self.outlying += usize::from(is_outlying);
         for (k, one) in fit.standard_deviations.iter().enumerate() {
             let [low, high] = one.interval;
             let ends = [low.unwrap_or(0.0), high.unwrap_or(f64::INFINITY)];
-            self.spreads[k] += covers(ends, SPREADS[k]);
+            let is_covered = covers(ends, SPREADS[k]);
+            self.spreads[k] += is_covered;
+            self.silent[k] += if is_outlying { 0 } else { is_covered };
             self.zeros[k] += usize::from(one.is_zero);
         }
     }
@@ -114,10 +123,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let share = |count: usize| 100.0 * count as f64 / studies as f64;
         let [animal, site, repeat] = tally.spreads.map(share);
         println!(
-            "{animals:2} animals: mean {:.1} %, effect {:.1} %, standard deviations of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; zero {:?}; widths {:.3} {:.3}",
+            "{animals:2} animals: mean {:.1} %, effect {:.1} %, standard deviations of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; said to be outlying {:.1} %, else standard deviations {:.1?} %; zero {:?}; widths {:.3} {:.3}",
             share(tally.mean),
             share(tally.effect),
             share(false_positives),
+            share(tally.outlying),
+            tally.silent.map(|one| 100.0 * one as f64 / (studies - tally.outlying) as f64),
             tally.zeros,
             tally.widths[0] / studies as f64,
             tally.widths[1] / studies as f64,

@@ -33,5 +33,5 @@ pub use influence::{Influence, influence};
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;
 pub use plan::{ASSURANCE, PlannedEffect, PlannedStudy, plan_study};
-pub use scores::{NormalScore, normal_scores};
+pub use scores::{NormalScore, normal_scores, outlying_group};
 pub use study::{Evidence, Study, StudyError, StudySession};

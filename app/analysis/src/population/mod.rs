@@ -19,13 +19,13 @@ pub use design::{Design, DesignError};
 pub use figures::PopulationFigure;
 pub use member::{MemberError, PopulationMember, draw_member, is_member, library_member};
 pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
-pub use report::{DeviationRow, EffectRow, LevelRow, ParameterLines, PopulationReport};
+pub use report::{DeviationRow, EffectRow, LevelRow, Outlying, ParameterLines, PopulationReport};
 pub use results::{paragraph, write_results};
 pub use saved::{PopulationOrigin, SavePopulationError, check_new_name, save_population};
 pub use specimens::{CurveKind, PopulationCurves};
 
 use crate::compliance::ComplianceCorrections;
-use crate::fit::{FitChoice, FitRecipe};
+use crate::fit::{FitChoice, FitChoiceError, FitRecipe};
 use crate::progress::Progress;
 use crate::report::text::counted;
 use crate::source::{RecordStretch, SourceSelection};
@@ -58,7 +58,7 @@ pub enum PopulationMethod {
 pub fn study_recipe(
     family: Option<String>,
     corrections: ComplianceCorrections,
-) -> Result<FitRecipe, FitError> {
+) -> Result<FitRecipe, FitChoiceError> {
     let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
     let stretch = RecordStretch::with_unload(false);
     let selection = SourceSelection { stretch, is_rejected_included: false };
@@ -194,6 +194,7 @@ pub fn population(
         comparisons: questions::comparisons(&design, &study, &fit),
         standard_deviations: DeviationRow::all(&fit),
         groups: fit.groups.clone(),
+        outlying: Outlying::all(&study, &fit),
         influence,
         plan,
         not_fitted,

@@ -7,7 +7,8 @@ use super::questions::{InfluenceReport, PlanReport};
 use crate::report::text::{counted, table};
 use palpate_figures::uncertain::significant;
 use palpate_population::{
-    EffectEstimate, GroupShift, Influence, LevelDeviation, PlannedStudy, PopulationFit, Study,
+    EffectEstimate, GroupShift, Influence, LevelDeviation, NormalScore, PlannedStudy,
+    PopulationFit, Study, outlying_group,
 };
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,6 +32,8 @@ pub struct PopulationReport {
     pub comparisons: Vec<ComparisonRow>,
     /// How far each group is from the one that it belongs to, in logarithms.
     pub groups: Vec<GroupShift>,
+    /// Groups that are farther from the others than one of twenty normal studies has any, at most one of each level and parameter.
+    pub outlying: Vec<Outlying>,
     /// What the population is without each group, where that was wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub influence: Option<InfluenceReport>,
@@ -40,6 +43,29 @@ pub struct PopulationReport {
     /// Sessions that could not be fitted, with the reason.
     pub not_fitted: BTreeMap<String, String>,
     pub notes: Vec<String>,
+}
+
+/// A group that is far from the others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outlying {
+    pub level: String,
+    pub parameter: String,
+    pub group: String,
+    /// From the mean of all groups, in their standard deviation.
+    pub distance: f64,
+}
+
+impl Outlying {
+    pub(super) fn all(study: &Study, fit: &PopulationFit) -> Vec<Self> {
+        let pairs = study.levels.iter().flat_map(|level| {
+            study.parameters.iter().enumerate().map(move |(k, parameter)| (level, k, parameter))
+        });
+        let found = pairs.filter_map(|(level, k, parameter)| {
+            let NormalScore { group, found: distance, .. } = outlying_group(fit, level, k)?;
+            Some(Self { level: level.clone(), parameter: parameter.clone(), group, distance })
+        });
+        found.collect()
+    }
 }
 
 /// A level and its number of groups.
@@ -223,11 +249,21 @@ impl PopulationReport {
                 "{parameter}: no differences between {level}s are seen; that is not proof of none"
             )
         });
+        let outlying = self.outlying.iter().map(|one| {
+            let Outlying { parameter, level, group, .. } = one;
+            format!(
+                "{parameter}: {level} {group} is farther from the others than normal ones are; look at it, since one such {level} makes the interval of the standard deviation between {level}s wrong"
+            )
+        });
         let not_fitted = self.not_fitted.iter();
         let not_fitted =
             not_fitted.map(|(session, reason)| format!("{session} was not fitted: {reason}"));
         let largest = self.parameters().filter_map(|parameter| self.dominant_level(parameter));
-        zero.chain(largest).chain(not_fitted).chain(self.notes.iter().cloned()).collect()
+        zero.chain(largest)
+            .chain(outlying)
+            .chain(not_fitted)
+            .chain(self.notes.iter().cloned())
+            .collect()
     }
 
     pub(super) fn parameters(&self) -> impl Iterator<Item = &str> {
