@@ -6,6 +6,7 @@ pub mod interval_coverage;
 pub mod lab;
 pub mod planned_runs;
 pub mod recorded_runs;
+pub mod recorded_study;
 pub mod sample_library;
 pub mod simulated;
 

@@ -59,6 +59,20 @@ pub fn record_specimen(
     out: &Path,
 ) {
     let labels = SessionLabels { specimen: specimen.to_owned(), ..SessionLabels::default() };
+    record_labelled(rig, calibration, params, labels, out);
+}
+
+/// Records a run with all that is known of it into a folder.
+///
+/// # Panics
+/// If the run is not started or says nothing for minutes.
+pub fn record_labelled(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    params: RampHold,
+    labels: SessionLabels,
+    out: &Path,
+) {
     let request =
         RecordingRequest { is_acknowledged: true, labels, ..RecordingRequest::of(params.plan()) };
     wait_for_end(ask(rig, calibration, request, out).expect("a start"));

@@ -17,8 +17,10 @@ use palpate_runner::TimeScale;
 use palpate_sessions::specimen_queue::{QueueChange, QueueVerdict, QueuedSpecimen, SpecimenQueue};
 use palpate_test_support::skip::{HAS_RENDERER, lacks_command};
 use palpate_tests::flow::screen_of;
+use palpate_tests::recorded_study::record_study;
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
+use palpate_window::screens::groups::GroupsScreen;
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::material::MaterialScreen;
 use palpate_window::screens::scene::SceneScreen;
@@ -211,6 +213,29 @@ fn fit_modulus(window: &mut Window) {
     fit_and_wait(window);
 }
 
+/// Finds the population of a recorded study on the groups screen, unless that is done.
+fn find_population(window: &mut Window, study: &Path) {
+    if screen_of::<GroupsScreen>(window).found().is_some() {
+        return;
+    }
+    record_study(study);
+    let folder = study.display().to_string();
+    type_fields(window, &[("sessions", &folder), ("effects", "animal.treatment")]);
+    window.get_by_label("Find population  F6").click_accesskit();
+    window.run_steps(2);
+    for _ in 0..FRAMES_MAX {
+        window.step();
+        if screen_of::<GroupsScreen>(window).found().is_some() {
+            // A caret in a field would come and go.
+            window.get_by_label("Find population  F6").focus();
+            window.run_steps(2);
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("the population was never found");
+}
+
 /// Fits the relaxation modulus of a table on the material screen, which knows indenter and specimen.
 fn fit_relaxation(window: &mut Window, library: &Path) {
     let table = library.join("hold.csv");
@@ -302,6 +327,8 @@ fn every_screen_looks_as_it_did() {
         return;
     }
     let library = library();
+    let study = library.with_file_name("palpate-pictures-study");
+    let _ = std::fs::remove_dir_all(&study);
     let mut window = open(&library);
     let mut results = SnapshotResults::new();
     // Other versions of the renderer place some pixels otherwise: fewer than a letter has.
@@ -324,6 +351,10 @@ fn every_screen_looks_as_it_did() {
             }
             if screen.name == "Material" {
                 fit_modulus(&mut window);
+            }
+            if screen.name == "Groups" {
+                // Beside the library, in which it would be found.
+                find_population(&mut window, &study);
             }
             if screen.name == "Scene" {
                 compute_poke(&mut window);

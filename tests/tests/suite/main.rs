@@ -10,6 +10,7 @@ mod faults;
 mod follow;
 mod gui_checks;
 mod gui_flows;
+mod gui_groups;
 mod gui_layout;
 mod gui_library;
 mod gui_link;

@@ -112,7 +112,9 @@ fn rows_plot(title: &str, x: &str, rows: &[Row]) -> Plot {
     let high = rows.iter().map(|row| row.ends[1]).fold(1.0, f64::max);
     // A margin on the left, and room for names on the right; rows that are all at one are seen too.
     let width = (high / low).max(1.1);
-    let x = PlotAxis::logarithmic(x).with_range([low / width.powf(0.08), high * width.powf(0.6)]);
+    // A logarithmic axis has too few numbers for a narrow range.
+    let axis = if width < 4.0 { PlotAxis::linear } else { PlotAxis::logarithmic };
+    let x = axis(x).with_range([low / width.powf(0.08), high * width.powf(0.6)]);
     let y = PlotAxis { scale: AxisScale::Rows, ..PlotAxis::linear("") };
     Plot {
         x_levels: vec![PlotLevel { is_dashed: true, ..PlotLevel::plain(1.0, Ink::Quiet) }],

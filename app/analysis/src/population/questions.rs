@@ -11,11 +11,11 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Number of studies drawn for each size of a study.
-const DRAWN_STUDIES: usize = 100;
+const DRAWN_STUDIES: usize = 50;
 /// Numbers of outermost groups of the studies that are drawn, as many as are measured in practice.
 const GROUPS: [usize; 7] = [4, 6, 8, 12, 16, 24, 32];
-/// Numbers of sessions in each innermost group.
-const SESSIONS: [usize; 3] = [1, 2, 4];
+/// Numbers of sessions in each innermost group: more help little where groups differ.
+const SESSIONS: [usize; 2] = [1, 2];
 
 /// The difference between two values of an entry.
 #[derive(Clone, Debug, PartialEq, Serialize)]

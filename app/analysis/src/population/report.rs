@@ -4,7 +4,7 @@ use super::PopulationMethod;
 use super::design::MEAN;
 pub(super) use super::questions::ComparisonRow;
 use super::questions::{InfluenceReport, PlanReport};
-use crate::report::text::{counted, table};
+use crate::report::text::{counted, table, typeset};
 use palpate_figures::uncertain::significant;
 use palpate_population::{
     EffectEstimate, GroupShift, Influence, LevelDeviation, NormalScore, PlannedStudy,
@@ -130,9 +130,14 @@ impl EffectRow {
         }
     }
 
+    /// The unit as it is printed; empty of a factor.
+    pub(super) fn unit_in_print(&self) -> String {
+        typeset(self.unit.as_deref().unwrap_or_default())
+    }
+
     pub(super) fn cells(&self) -> Vec<String> {
         let [low, high] = self.factor_interval.map(|end| significant(end, 4));
-        let unit = self.unit.as_deref().unwrap_or_default();
+        let unit = self.unit_in_print();
         vec![
             self.parameter.clone(),
             self.effect.clone(),
@@ -278,7 +283,7 @@ impl PopulationReport {
         let most = own.find(|one| one.share > 0.5)?;
         let LevelDeviation { level, share, .. } = most;
         let percent = 100.0 * share;
-        Some(format!("{parameter}: {percent:.0} % of the variance lie between {level}s"))
+        Some(format!("{parameter}: {percent:.0} % of the variance lies between {level}s"))
     }
 
     pub(super) fn plan_text(&self) -> Option<String> {
@@ -336,13 +341,16 @@ impl PlanReport {
                 format!("{percent:.0} % ({} of {})", one.effect, one.parameter)
             });
             let effects = one.effects.iter().filter(|one| !is_mean(&one.effect));
-            let power = effects.map(|one| one.power).reduce(f64::min);
+            let seen: Vec<String> = effects
+                .map(|one| format!("{} {:.0} %", one.parameter, 100.0 * one.power))
+                .collect();
             let counts = one.counts.iter().map(usize::to_string).collect::<Vec<_>>();
-            let power = power.map_or("-".to_owned(), |power| format!("{:.0} %", 100.0 * power));
-            vec![counts.join(" x "), one.sessions.to_string(), widest, power]
+            let seen = if seen.is_empty() { "-".to_owned() } else { seen.join(", ") };
+            vec![counts.join(" x "), one.sessions.to_string(), widest, seen]
         };
         let levels = self.levels.join(" x ");
-        let head = format!("{levels} | sessions | widest interval, up or down by | smallest power");
+        let head =
+            format!("{levels} | sessions | widest interval, up or down by | effects seen in");
         let mut text = table(&head, self.studies.iter().map(row));
         let wanted = significant(self.wanted_percent, 3);
         let _ = match self.smallest() {
@@ -373,7 +381,7 @@ impl PopulationReport {
             |[low, high]: [f64; 2]| format!("{} to {}", significant(low, 3), significant(high, 3));
         let effect = |one: &EffectRow| match one.p_value {
             None => {
-                let unit = one.unit.as_deref().unwrap_or_default();
+                let unit = one.unit_in_print();
                 let value = format!("{} {unit}", significant(one.factor, 3));
                 (
                     "median".to_owned(),

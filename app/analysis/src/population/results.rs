@@ -176,6 +176,8 @@ fn latex_text(text: &str) -> String {
             '^' => out += "\\textasciicircum{}",
             '<' => out += "$<$",
             '·' => out += "$\\cdot$",
+            '²' => out += "$^2$",
+            '³' => out += "$^3$",
             '&' | '%' | '$' | '#' | '_' | '{' | '}' => out.extend(['\\', letter]),
             _ => out.push(letter),
         }
@@ -207,7 +209,7 @@ pub fn paragraph(report: &PopulationReport) -> String {
 fn parameter_sentences(report: &PopulationReport, mean: &EffectRow) -> String {
     let ends =
         |[low, high]: [f64; 2]| format!("{} to {}", significant(low, 3), significant(high, 3));
-    let unit = mean.unit.as_deref().unwrap_or_default();
+    let unit = mean.unit_in_print();
     let median = format!("{} {unit}", significant(mean.factor, 3));
     let parameter = &mean.parameter;
     let mut text = format!(
