@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 27] = [
+const PROPER_NAMES: [&str; 29] = [
     // Programs, libraries, repositories and formats.
     "AppImage",
     "CarbonFiberData",
@@ -15,6 +15,7 @@ const PROPER_NAMES: [&str; 27] = [
     "GalilConnector",
     "GitHub",
     "JavaScript",
+    "LaTeX",
     "ModemManager",
     "JuliaRheology",
     "MiB",
@@ -29,6 +30,8 @@ const PROPER_NAMES: [&str; 27] = [
     "SarahIaquinta",
     "SplitMix64",
     "StephenQiu628",
+    // Authors.
+    "McCulloch",
     // Makers of rheometers and haptic devices.
     "RheoCompass",
     "SensAble",
