@@ -70,7 +70,61 @@ known <- function(name, data, fixed) {
          metafor = list(effects = unname(c(coef(fit))), errors = unname(fit$se), spreads = sqrt(fit$sigma2)))
 }
 
+# The force of a standard linear solid (prony-1) whose indenter goes in at 1.5 mm/s for 4 s and stays: the logarithms of
+# k_0, k_1 and tau_1.
+speed_mm_s <- 1.5; ramp_s <- 4
+relaxation <- function(t, k0, k1, tau) {
+    ramp <- pmin(t, ramp_s)
+    exp(k0) * speed_mm_s * ramp + exp(k1 + tau) * speed_mm_s * (exp(-(t - ramp) / exp(tau)) - exp(-t / exp(tau)))
+}
+medians <- log(c(0.05, 0.08, 3))
+
+# Curves of one specimen or more of each animal and one press or more of each; `spreads` has a row for each level.
+curves <- function(name, animals, specimens, presses, spreads, noise, fixed = "1", effect = 0) {
+    levels <- c("animal", "specimen", "press")[seq_len(nrow(spreads))]
+    rows <- list()
+    for (a in seq_len(animals)) {
+        of_animal <- medians + effect * (a %% 2) + rnorm(3, 0, spreads[1, ])
+        for (s in seq_len(specimens)) {
+            of_specimen <- of_animal + rnorm(3, 0, spreads[2, ])
+            for (p in seq_len(presses)) {
+                own <- of_specimen + if (nrow(spreads) > 2) rnorm(3, 0, spreads[3, ]) else 0
+                t <- seq(0, by = 0.2, length.out = 80 + 20 * ((a + s + p) %% 3))
+                rows[[length(rows) + 1]] <- data.frame(
+                    animal = paste0("a", a), specimen = paste0("s", s), press = paste0("p", p), treated = a %% 2, t = t,
+                    force = relaxation(t, own[1], own[2], own[3]) + rnorm(length(t), 0, noise))
+            }
+        }
+    }
+    data <- do.call(rbind, rows)
+    by_level <- sapply(levels, function(level) pdDiag(k0 + k1 + tau ~ 1), simplify = FALSE)
+    count <- length(all.vars(as.formula(paste("~", fixed)))) + 1
+    # It needs starting values; with a smaller tolerance of the inner step it stops at rounding.
+    control <- nlmeControl(tolerance = 1e-7, pnlsTol = 1e-5, msTol = 1e-9, maxIter = 200, msMaxIter = 500, pnlsMaxIter = 50)
+    fit <- tryCatch(nlme(force ~ relaxation(t, k0, k1, tau), data, fixed = as.formula(paste("k0 + k1 + tau ~", fixed)),
+                         random = by_level, start = c(t(cbind(medians, matrix(0, 3, count - 1)))), method = "REML",
+                         control = control),
+                    error = function(why) NULL)
+    design_of <- function(one) model.matrix(as.formula(paste("~", fixed)), one)[1, , drop = FALSE]
+    list(name = name, family = "prony-1", levels = levels, parameters = c("k_0", "k_1", "tau_1"), effects = colnames(design_of(rows[[1]])),
+         curves = lapply(rows, function(one) list(
+             groups = as.character(one[1, levels[-length(levels)]]),
+             design = c(design_of(one)),
+             t_s = one$t, depth_mm = speed_mm_s * pmin(one$t, ramp_s), force_n = one$force)),
+         nlme = if (is.null(fit)) NULL else
+             # All parameters of an effect together, as here; it has the effects of a parameter together.
+             list(effects = c(matrix(fixef(fit), 3, byrow = TRUE)), errors = c(matrix(sqrt(diag(fit$varFix)), 3, byrow = TRUE)),
+                  spreads = unlist(lapply(rev(fit$modelStruct$reStruct), function(one) sqrt(diag(as.matrix(one))) * fit$sigma),
+                                   use.names = FALSE)))
+}
+
+spreads <- rbind(c(0.25, 0.3, 0.2), c(0.15, 0.12, 0.15), c(0.08, 0.1, 0.12))
 designs <- list(
+    curves("curves", 8, 4, 1, spreads[1:2, ], 0.005),
+    curves("curves with noise", 8, 4, 1, spreads[1:2, ], 0.03),
+    curves("curves, an effect", 12, 3, 1, spreads[1:2, ], 0.01, "treated", c(0.3, 0.2, 0)),
+    curves("curves of repeated presses", 8, 3, 3, spreads, 0.01),
+    curves("curves, three animals", 3, 2, 1, spreads[1:2, ], 0.01),
     design("Oats", Oats, "yield", "nitro", c("Block", "Variety")),
     design("Machines, every seventh row left out", as.data.frame(Machines)[-seq(1, 54, 7), ], "score", "Machine", c("Worker")),
     design("Machines", Machines, "score", "1", c("Machine", "Worker")),

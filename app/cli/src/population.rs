@@ -1,6 +1,6 @@
 //! `palpate population`: means, effects and standard deviations of the parameters of a study.
 
-use super::fit::jobs;
+use super::fit::{jobs, lake::hash_file};
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
@@ -33,6 +33,9 @@ pub struct PopulationArgs {
     /// Take each session's best values and their covariance instead of its curve
     #[arg(long)]
     two_stage: bool,
+    /// Take these values and covariances from the fits that the lake stores, and read no curve
+    #[arg(long, requires = "two_stage")]
+    stored: bool,
     /// Correct depths for machine compliance: last for the compliance in force for each
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
@@ -49,13 +52,20 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
     let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
     recipe.is_systematic = false;
     recipe.corrections = compliance::corrections(args.compliance.as_deref())?;
+    // A stored fit knows its compliance by the file alone.
+    let compliance = args.compliance.as_deref().filter(|_| args.stored);
     let request = PopulationRequest {
         paths: &args.sources,
         recipe: &recipe,
         parameters: &args.parameters,
         levels: &args.by,
         effects: &args.effect,
-        method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
+        method: match (args.two_stage, args.stored) {
+            (false, _) => PopulationMethod::Curves,
+            (true, false) => PopulationMethod::TwoStage,
+            (true, true) => PopulationMethod::Stored,
+        },
+        compliance_sha256: compliance.map(hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };
     let bar = output.count_bar(0);
@@ -72,7 +82,8 @@ fn failure(err: PopulationError) -> Failure {
         PopulationError::Design(_)
         | PopulationError::Parameter(_)
         | PopulationError::ParameterTwice { .. }
-        | PopulationError::InSession { .. } => Failure::usage(err),
+        | PopulationError::InSession { .. }
+        | PopulationError::Stored(_) => Failure::usage(err),
         err => Failure::failed(err),
     }
 }

@@ -3,25 +3,28 @@
 mod curves;
 mod design;
 mod report;
+mod stored;
 
 pub use design::{Design, DesignError};
 pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
 
-use crate::fit::FitRecipe;
+use crate::fit::{FitRecipe, StoredFitError};
 use crate::progress::Progress;
 use crate::report::text::counted;
-use crate::study_table::{StudyReadError, StudyTable, read_study};
+use crate::study_table::{StudyReadError, StudyRow, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
-    CurveEvidence, CurveRounds, PopulationOptions, Study, StudyError, StudySession, expand_curves,
-    fit_population,
+    CurveRounds, PopulationOptions, Study, StudyError, StudySession, expand_curves, fit_population,
 };
-use palpate_rheology::fit::{CurveLikelihood, FitError, FitSolution, SignalRecord};
+use palpate_rheology::fit::{
+    CurveLikelihood, FitError, FitSolution, LikelihoodExpansion, SignalRecord,
+};
 use palpate_tables::lake::LakeError;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::PathBuf;
+use stored::read_stored;
 use thiserror::Error;
 
 /// How sessions enter.
@@ -33,6 +36,8 @@ pub enum PopulationMethod {
     Curves,
     /// Each with the values that fit it best and their covariance.
     TwoStage,
+    /// The same, as the fits of a lake stored them: no curve is read.
+    Stored,
 }
 
 #[derive(Debug)]
@@ -47,6 +52,8 @@ pub struct PopulationRequest<'a> {
     /// Entries of sessions that may move the mean.
     pub effects: &'a [String],
     pub method: PopulationMethod,
+    /// SHA-256 of the file of the compliance that stored fits must have, as the corrections of the recipe have it.
+    pub compliance_sha256: Option<String>,
     /// Number of sessions fitted at a time.
     pub jobs: usize,
 }
@@ -68,7 +75,9 @@ pub enum PopulationError {
     #[error("{name} is given twice as a parameter; give it once")]
     ParameterTwice { name: String },
     #[error("{session}: {reason}")]
-    InSession { session: String, reason: FitError },
+    InSession { session: String, reason: String },
+    #[error(transparent)]
+    Stored(#[from] StoredFitError),
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
     #[error("the population was not found, because the command was interrupted")]
@@ -88,29 +97,38 @@ pub fn population(
     Design::of(&table, request.levels, request.effects)?;
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
-    let curves = read_curves(request, &table, &workers)?;
-    let curves = keep(&mut table, curves, &mut not_fitted)?;
-    let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
     let options = &request.recipe.options;
-    let fits = workers.all("fits", &records, |record| {
-        FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
-    })?;
-    let fits = keep(&mut table, fits, &mut not_fitted)?;
-    let likelihoods = likelihoods(&names, &table, &fits)?;
-    let design = Design::of(&table, request.levels, request.effects)?;
-    let mut study = study(&names, &design, &table, &likelihoods)?;
-    let rounds = match request.method {
-        PopulationMethod::TwoStage => None,
-        PopulationMethod::Curves => Some(expand_curves(&mut study, |modes| {
+    let (study, design, rounds) = if request.method == PopulationMethod::Stored {
+        let stored = read_stored(request, &table, &workers)?;
+        let stored = keep(&mut table, stored, &mut not_fitted)?;
+        let design = Design::of(&table, request.levels, request.effects)?;
+        let best = stored.iter().map(|one| one.of_parameters(&names));
+        (study(&names, &design, &table, best)?, design, None)
+    } else {
+        let curves = read_curves(request, &table, &workers)?;
+        let curves = keep(&mut table, curves, &mut not_fitted)?;
+        let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
+        let fits = workers.all("fits", &records, |record| {
+            FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
+        })?;
+        let fits = keep(&mut table, fits, &mut not_fitted)?;
+        let likelihoods = likelihoods(&names, &table, &fits)?;
+        let design = Design::of(&table, request.levels, request.effects)?;
+        let best =
+            likelihoods.iter().map(|one| one.expand_at_best().ok_or_else(|| inseparable(&names)));
+        let mut study = study(&names, &design, &table, best)?;
+        let expand = |modes: &[Vec<f64>]| {
             let pieces: Vec<_> = likelihoods.iter().zip(modes).collect();
             workers.all("curves", &pieces, |(likelihood, mode)| {
                 likelihood.expand(mode).map(curve_evidence)
             })
-        })?),
+        };
+        let is_of_curves = request.method == PopulationMethod::Curves;
+        let rounds = is_of_curves.then(|| expand_curves(&mut study, expand)).transpose()?;
+        (study, design, rounds)
     };
     let fit = fit_population(&study, PopulationOptions { has_deviation_intervals: true })?;
-    let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
-    let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
+    let unit = |name: &str| options.unit(name).map(str::to_owned);
     Ok(PopulationReport {
         model: options.family().key(),
         method: request.method,
@@ -202,26 +220,21 @@ fn likelihoods<'f, 'a>(
 ) -> Result<Vec<CurveLikelihood<'f, 'a>>, PopulationError> {
     let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
     let each = fits.iter().zip(&table.rows).map(|(fit, row)| {
-        CurveLikelihood::of(fit, 0, &wanted)
-            .map_err(|reason| PopulationError::InSession { session: row.session.clone(), reason })
+        CurveLikelihood::of(fit, 0, &wanted).map_err(|reason| in_session(row, reason))
     });
     each.collect()
 }
 
+/// The study of sessions with what each says of the parameters.
 fn study(
     names: &[String],
     design: &Design,
     table: &StudyTable,
-    likelihoods: &[CurveLikelihood<'_, '_>],
+    best: impl Iterator<Item = Result<LikelihoodExpansion, String>>,
 ) -> Result<Study, PopulationError> {
-    let sessions = table.rows.iter().zip(likelihoods).map(|(row, likelihood)| {
-        let best = likelihood.expand(likelihood.best()).map(curve_evidence);
-        let evidence = best.as_ref().and_then(CurveEvidence::evidence);
-        let (Some(best), Some(evidence)) = (best, evidence) else {
-            let advice = "leave one of the parameters out".to_owned();
-            let reason = FitError::Inseparable { names: names.to_vec(), advice };
-            return Err(PopulationError::InSession { session: row.session.clone(), reason });
-        };
+    let sessions = table.rows.iter().zip(best).map(|(row, best)| {
+        let best = curve_evidence(best.map_err(|reason| in_session(row, reason))?);
+        let evidence = best.evidence().ok_or_else(|| in_session(row, inseparable(names)))?;
         Ok(StudySession {
             name: row.session.clone(),
             groups: design.groups(row),
@@ -234,6 +247,15 @@ fn study(
         parameters: names.to_vec(),
         effects: design.effects(),
         levels: design.levels(),
-        sessions: sessions.collect::<Result<_, _>>()?,
+        sessions: sessions.collect::<Result<_, PopulationError>>()?,
     })
+}
+
+fn in_session(row: &StudyRow, reason: impl ToString) -> PopulationError {
+    PopulationError::InSession { session: row.session.clone(), reason: reason.to_string() }
+}
+
+fn inseparable(names: &[String]) -> String {
+    let advice = "leave one of the parameters out".to_owned();
+    FitError::Inseparable { names: names.to_vec(), advice }.to_string()
 }

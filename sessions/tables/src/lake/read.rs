@@ -25,6 +25,8 @@ pub enum LakeError {
     Bad { path: PathBuf, reason: String },
     #[error("{} is a session of record version {version}, which this palpate is too old to read; update palpate", path.display())]
     Newer { path: PathBuf, version: u32 },
+    #[error("{} is not a whole fit ({reason}); move it away and fit the lake again", path.display())]
+    BadFit { path: PathBuf, reason: String },
     #[error("cannot read {} ({source}); check its permissions", path.display())]
     Io { path: PathBuf, source: io::Error },
 }
