@@ -10,6 +10,7 @@
 mod curves;
 mod fit;
 mod likelihood;
+mod profile;
 mod search;
 mod study;
 #[cfg(test)]
