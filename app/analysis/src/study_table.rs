@@ -32,6 +32,11 @@ pub const COVARIATES: [&str; 8] = [
     "series.order",
 ];
 
+/// Who measured, or with what, and what parts of one animal may differ in: a population takes them as effects too, and two of
+/// them are compared in one place.
+pub const WITHIN: [&str; 4] = ["operator", RIG, SITE, "specimen.storage"];
+const RIG: &str = "rig";
+
 /// Most names in a sentence. More would hide what it says.
 const NAMES_MAX: usize = 5;
 
@@ -51,7 +56,7 @@ pub struct StudyRow {
     pub series: Option<String>,
     /// From 1.
     pub repeat: Option<u64>,
-    /// Of all [`COVARIATES`]; null where the session lacks one.
+    /// Of all [`COVARIATES`] and [`WITHIN`]; null where the session lacks one.
     pub covariates: BTreeMap<&'static str, Value>,
 }
 
@@ -215,7 +220,11 @@ impl StudyRow {
     fn of(session: &str, manifest: &Manifest) -> Self {
         let labels = manifest.labels();
         let words = |name: &str| labels.value(name).as_ref().map(plain_value);
-        let covariate = |name| (name, labels.value(name).unwrap_or_default());
+        let rig = || manifest.rig.as_ref().map(|rig| Value::from(rig.name.as_str()));
+        let covariate = |name| match name {
+            RIG => (name, rig().unwrap_or_default()),
+            name => (name, labels.value(name).unwrap_or_default()),
+        };
         Self {
             session: session.to_owned(),
             session_id: manifest.session_id.clone(),
@@ -226,7 +235,7 @@ impl StudyRow {
             site: words(SITE),
             series: words("series.id"),
             repeat: labels.value(REPEAT).as_ref().and_then(Value::as_u64),
-            covariates: COVARIATES.map(covariate).into(),
+            covariates: COVARIATES.into_iter().chain(WITHIN).map(covariate).collect(),
         }
     }
 

@@ -5,6 +5,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod about;
+mod agreement;
 mod analyse;
 mod arguments;
 mod calibration;
@@ -139,6 +140,7 @@ commands! { windows;
     History(history::HistoryArgs) => history::run;
     Study(study::StudyArgs) => study::run;
     Population(population::PopulationArgs) => population::run;
+    Agreement(agreement::AgreementArgs) => agreement::run;
     #[command(subcommand)] Catalog(catalog::CatalogCommand) => catalog::run;
     Info(info::InfoArgs) => info::run;
     Report(report::ReportArgs) => report::run;

@@ -1,12 +1,14 @@
 //! `palpate population`: means, effects and standard deviations of the parameters of a study.
 
+use super::arguments::positive;
 use super::fit::{jobs, lake::hash_file};
+use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
 use palpate_analysis::fit::{FitChoice, FitRecipe};
 use palpate_analysis::population::{
-    PopulationError, PopulationMethod, PopulationRequest, population,
+    PopulationError, PopulationMethod, PopulationRequest, population, write_results,
 };
 use palpate_analysis::source::{RecordStretch, SourceSelection};
 use std::num::NonZeroUsize;
@@ -36,6 +38,15 @@ pub struct PopulationArgs {
     /// Take these values and covariances from the fits that the lake stores, and read no curve
     #[arg(long, requires = "two_stage")]
     stored: bool,
+    /// Leave each group and session out in turn, and print on which of them the population rests
+    #[arg(long)]
+    influence: bool,
+    /// Draw studies of other sizes from the population, and print in which no end of an interval is off by more than PERCENT
+    #[arg(long, value_name = "PERCENT", value_parser = positive)]
+    wanted: Option<f64>,
+    /// Write tables (CSV, LaTeX), figures, a paragraph and a page for a paper into this new folder
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// Correct depths for machine compliance: last for the compliance in force for each
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
@@ -46,12 +57,8 @@ pub struct PopulationArgs {
 }
 
 pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
-    let choice = FitChoice { family: args.family.clone(), fixed: Vec::new(), free: Vec::new() };
-    let wanted =
-        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
-    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
-    recipe.is_systematic = false;
-    recipe.corrections = compliance::corrections(args.compliance.as_deref())?;
+    new_file::check("folder", args.out.as_deref())?;
+    let recipe = recipe(args.family.clone(), args.compliance.as_deref())?;
     // A stored fit knows its compliance by the file alone.
     let compliance = args.compliance.as_deref().filter(|_| args.stored);
     let request = PopulationRequest {
@@ -66,17 +73,43 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
             (true, true) => PopulationMethod::Stored,
         },
         compliance_sha256: compliance.map(hash_file).transpose()?,
+        is_drawn: args.out.is_some(),
+        is_influence_wanted: args.influence,
+        wanted_percent: args.wanted,
         jobs: jobs(args.jobs),
     };
     let bar = output.count_bar(0);
     let found = population(&request, &bar).map_err(failure);
     drop(bar);
     let found = found?;
-    output.answer("population", &found, || found.text());
+    output.answer("population", &found.report, || found.report.text());
+    if let Some(folder) = &args.out {
+        write_results(&found, folder).map_err(|err| {
+            Failure::failed(format!(
+                "the results cannot be written into {} ({err}); choose a folder that you may write to",
+                folder.display()
+            ))
+        })?;
+        output.note(&format!("wrote {}", folder.display()));
+    }
     Ok(())
 }
 
-fn failure(err: PopulationError) -> Failure {
+/// How sessions of a study are fitted.
+pub(super) fn recipe(
+    family: Option<String>,
+    compliance: Option<&str>,
+) -> Result<FitRecipe, Failure> {
+    let choice = FitChoice { family, fixed: Vec::new(), free: Vec::new() };
+    let wanted =
+        SourceSelection { stretch: RecordStretch::with_unload(false), is_rejected_included: false };
+    let mut recipe = FitRecipe::new(choice.options().map_err(Failure::usage)?, wanted);
+    recipe.is_systematic = false;
+    recipe.corrections = compliance::corrections(compliance)?;
+    Ok(recipe)
+}
+
+pub(super) fn failure(err: PopulationError) -> Failure {
     match err {
         PopulationError::Read(err) => study::failure(err),
         PopulationError::Design(_)

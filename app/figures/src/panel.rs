@@ -1,6 +1,7 @@
 //! A rectangle of a picture with a range of numbers each way, and the marks of its axes.
 
 use crate::drawing::{Anchor, FONT, Svg, TextStyle};
+use crate::figure::AxisScale;
 use crate::uncertain::shortest;
 use ecolor::Color32;
 
@@ -68,24 +69,23 @@ impl PlotPanel {
         self.frame(svg, [name, ""], look, &[marks(self.x, MARKS_MAX), Vec::new()]);
     }
 
-    /// Grid, numbers and names of the axes, the numbers along some of them decimal logarithms.
+    /// Grid, numbers and names of axes of these scales; of a logarithmic one the places are decimal logarithms.
     pub fn scaled_axes(
         &self,
         svg: &mut Svg,
         names: [&str; 2],
-        are_logarithms: [bool; 2],
+        scales: [AxisScale; 2],
         look: AxisColours,
     ) {
         let [left, top, right, bottom] = self.place;
         let room = [(right - left) / WIDTH_OF_DECADE, (bottom - top) / HEIGHT_OF_MARK];
-        let x_marks = match are_logarithms[0] {
-            true => decades(self.x, room[0]),
-            false => marks(self.x, MARKS_MAX.min(room[0])),
+        let marked = |range: [f64; 2], scale: AxisScale, room: f64, most: f64| match scale {
+            AxisScale::Logarithmic => decades(range, room),
+            AxisScale::Linear => marks(range, most),
+            AxisScale::Rows => Vec::new(),
         };
-        let y_marks = match are_logarithms[1] {
-            true => decades(self.y, room[1]),
-            false => marks(self.y, room[1]),
-        };
+        let x_marks = marked(self.x, scales[0], room[0], MARKS_MAX.min(room[0]));
+        let y_marks = marked(self.y, scales[1], room[1], room[1]);
         self.frame(svg, names, look, &[x_marks, y_marks]);
     }
 

@@ -32,9 +32,9 @@ pub(crate) fn record_study(at: &Path) {
     }
 }
 
-/// The curves are those of the tissue: medians, effect and spreads are known to a few percent, the noise of short presses.
+/// The curves are those of the tissue: medians, effect and standard deviations are known to a few percent, the noise of short presses.
 #[test]
-fn a_study_has_the_spreads_and_the_effect_of_its_tissues() {
+fn a_study_has_the_deviations_and_the_effect_of_its_tissues() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     record_study(at);
@@ -62,7 +62,7 @@ fn a_study_has_the_spreads_and_the_effect_of_its_tissues() {
         let treated = row("effects", "effect", "animal.treatment = enzyme", "mu1");
         let error = treated["value"].as_f64().unwrap() - effect;
         assert!(error.abs() < 0.05, "{treated:#}");
-        let animals = row("spreads", "level", "animal", "mu1");
+        let animals = row("standard_deviations", "level", "animal", "mu1");
         let ends = [0, 1].map(|end: usize| animals["interval"][end].as_f64().unwrap());
         assert!(ends[0] < spread && spread < ends[1], "{animals:#}");
         let time = row("effects", "effect", "mean", "tau_eps");
@@ -83,11 +83,128 @@ fn what_says_nothing_of_a_population_is_refused_in_one_sentence() {
         assert_refused(&typed(at, &format!("population study{more}")), code, says);
     };
     refused(" --parameters mu9", 2, "the model has no parameter 'mu9'");
-    refused(" --by site", 2, "2 of 2 sessions lack specimen.site");
+    refused(
+        " --by site",
+        2,
+        "study/one has no specimen.site, as 2 of 2 sessions; add it, or leave specimen.site out",
+    );
     refused(" --by specimen,animal", 2, "from the outermost: animal, specimen, site");
-    refused(" --effect animal.sex", 2, "2 of 2 sessions lack animal.sex");
-    refused(" --effect operator", 2, "no entry 'operator'");
-    refused(" --parameters mu1", 1, "the study has 2 sessions for");
+    refused(" --effect animal.sex", 2, "study/one has no animal.sex, as 2 of 2 sessions");
+    refused(" --effect weather", 2, "no entry 'weather'");
+    refused(" --effect operator", 2, "operator is 'sim' in all sessions");
+    refused(" --out study", 2, "study exists already; give the folder another name");
+    refused(" --wanted -3", 2, "this is not a positive number");
+    refused(" --parameters mu1", 1, "sessions or more, not 2");
     succeeded(&short_run(at, "study/three", &["--specimen", "three"]));
-    refused(" --parameters mu1", 2, "1 of 3 sessions lack animal.name");
+    refused(" --parameters mu1", 2, "study/three has no animal.name, as 1 of 3 sessions");
+}
+
+/// Rows of a table with a head, by the names of its columns.
+fn rows(path: &Path) -> Vec<Vec<(String, String)>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned));
+    let head: Vec<String> = lines.next().unwrap().collect();
+    lines.map(|line| head.iter().cloned().zip(line).collect()).collect()
+}
+
+fn cell(row: &[(String, String)], name: &str) -> String {
+    let found = row.iter().find(|(one, _)| one == name);
+    found.unwrap_or_else(|| panic!("no {name} in {row:?}")).1.clone()
+}
+
+/// Everything of a paper by one command: the numbers of its tables are those of the answer, and influence and sizes of studies
+/// are what their definitions say.
+#[test]
+fn one_command_makes_the_tables_figures_and_words_of_a_paper() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    record_study(at);
+    let line = "population study --family series-1 --parameters mu1 --effect animal.treatment";
+    let more = " --influence --wanted 40 --out results --json";
+    let found = answer(&typed(at, &format!("{line}{more}")));
+    let results = at.join("results");
+    let effects = rows(&results.join("effects.csv"));
+    assert_eq!(effects.len(), 2);
+    for (row, one) in effects.iter().zip(found["effects"].as_array().unwrap()) {
+        let log: f64 = cell(row, "log").parse().unwrap();
+        assert_eq!(log, one["value"].as_f64().unwrap());
+    }
+    let size = found["effects"][1]["effect_size"].as_f64().unwrap();
+    let deviations = found["standard_deviations"].as_array().unwrap();
+    let squares = deviations.iter().map(|one| one["value"].as_f64().unwrap().powi(2));
+    let whole = squares.sum::<f64>().sqrt();
+    let effect = found["effects"][1]["value"].as_f64().unwrap();
+    assert!((size * whole - effect).abs() < 1e-12);
+    // The last level differs in everything that two presses on one specimen differ in.
+    let inner = deviations[2]["value"].as_f64().unwrap();
+    let pair = deviations[2]["pair_factor"].as_f64().unwrap();
+    assert!((pair.ln() - 1.96 * 2f64.sqrt() * inner).abs() < 1e-12);
+    let sessions = rows(&results.join("sessions.csv"));
+    assert_eq!(sessions.len(), 16);
+    assert!(cell(&sessions[0], "cov mu1 mu1").parse::<f64>().unwrap() > 0.0);
+    let paragraph = std::fs::read_to_string(results.join("paragraph.txt")).unwrap();
+    assert!(paragraph.starts_with("We recorded 16 sessions of 8 specimens of 4 animals."));
+    assert!(paragraph.contains("animal.treatment = enzyme"), "{paragraph}");
+    let latex = std::fs::read_to_string(results.join("table.tex")).unwrap();
+    assert!(latex.contains("95 \\% interval") && latex.contains("tau\\_eps") == false);
+    for name in ["effects.svg", "groups.svg", "residuals.svg", "table.tex", "population.html"] {
+        assert!(results.join(name).is_file(), "{name}");
+    }
+    // One of two animals of a treatment is left out: all are possible, and the first moves most.
+    let groups = found["influence"]["groups"].as_array().unwrap();
+    assert_eq!(groups.len(), 4 + 8 + 16);
+    let largest = |one: &serde_json::Value| {
+        let changes = one["changes"].as_array().unwrap().iter();
+        changes.map(|one| one.as_f64().unwrap().abs()).fold(0.0, f64::max)
+    };
+    assert!(groups.windows(2).all(|pair| largest(&pair[0]) >= largest(&pair[1])));
+    assert_eq!(groups[0]["level"], "animal");
+    let studies = found["plan"]["studies"].as_array().unwrap();
+    let widths = |one: &serde_json::Value| one["effects"][1]["half_width"].as_f64().unwrap();
+    let of =
+        |counts: [u64; 3]| studies.iter().find(|one| one["counts"] == serde_json::json!(counts));
+    // More animals help; more presses on one place hardly do.
+    let [few, many, pressed] =
+        [[8, 2, 1], [32, 2, 1], [8, 2, 4]].map(|counts| widths(of(counts).unwrap()));
+    assert!(many < 0.6 * few && pressed > 0.75 * few, "{few} {many} {pressed}");
+}
+
+/// One operator's tissue is made stiffer by a fifth in every place: that is the bias, and presses on one place hardly scatter.
+#[test]
+fn two_operators_agree_but_for_their_bias() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (specimen, percent) in [("one", 70), ("two", 90), ("three", 100), ("four", 130)] {
+        for (operator, factor) in [("ada", 1.0), ("bea", 1.2)] {
+            let percent = (f64::from(percent) * factor).round().to_string();
+            let seed = format!("{}", specimen.len() * 10 + operator.len());
+            let more = [
+                "--stiffness",
+                &percent,
+                "--seed",
+                &seed,
+                "--specimen",
+                specimen,
+                "--operator",
+                operator,
+                "--about",
+                "animal.name=pig",
+            ];
+            succeeded(&short_run(at, &format!("study/{specimen} {operator}"), &more));
+        }
+    }
+    let line = "agreement study --family series-1 --parameters mu1";
+    let found = answer(&typed(at, &format!("{line} --between operator --plot plot.svg --json")));
+    assert_eq!(found["values"], serde_json::json!(["ada", "bea"]));
+    let one = &found["parameters"][0];
+    assert_eq!(one["places"].as_array().unwrap().len(), 4);
+    let bias = one["bias"].as_f64().unwrap();
+    let [low, high] = [0, 1].map(|end: usize| one["limits"][end].as_f64().unwrap());
+    assert!((bias - 1.2f64.ln()).abs() < 0.03 && low < bias && bias < high, "{one:#}");
+    assert!(at.join("plot.svg").is_file());
+    let refused = |more: &str, code: i32, says: &str| {
+        assert_refused(&typed(at, &format!("{line}{more}")), code, says);
+    };
+    refused(" --between weather", 2, "two of 'weather' cannot be compared");
+    refused(" --between rig", 2, "two values of rig are compared, and these sessions have 1 (sim)");
 }

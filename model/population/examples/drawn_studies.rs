@@ -100,15 +100,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Some("one-bad") => Trouble::OneBad,
         _ => Trouble::None,
     };
-    let options = PopulationOptions { has_deviation_intervals: true };
+    let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
     for animals in ANIMALS {
         let mut random = SplitMix::seeded(animals as u64);
         let (mut tally, mut false_positives) = (Tally::default(), 0);
         for _ in 0..studies {
-            let fit = fit_population(&study(animals, EFFECT, trouble, &mut random), options)?;
+            let fit = fit_population(&study(animals, EFFECT, trouble, &mut random), &options)?;
             tally.count(&fit, EFFECT);
             let plain = PopulationOptions::default();
-            let none = fit_population(&study(animals, 0.0, trouble, &mut random), plain)?;
+            let none = fit_population(&study(animals, 0.0, trouble, &mut random), &plain)?;
             false_positives += usize::from(none.effects[1].p_value < 0.05);
         }
         let share = |count: usize| 100.0 * count as f64 / studies as f64;

@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let pairs = likelihoods.iter().zip(modes);
         Ok(pairs.map(|(likelihood, mode)| likelihood.expand(mode).map(evidence)).collect())
     })?;
-    let fit = fit_population(&study, PopulationOptions::default())?;
+    let fit = fit_population(&study, &PopulationOptions::default())?;
     println!("{}", serde_json::to_string(&fit)?);
     Ok(())
 }

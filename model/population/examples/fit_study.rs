@@ -46,8 +46,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         levels: text.levels,
         sessions: text.sessions.into_iter().enumerate().map(session).collect(),
     };
-    let options = PopulationOptions { has_deviation_intervals: text.has_deviation_intervals };
-    let fit = fit_population(&study, options)?;
+    let options = PopulationOptions {
+        has_deviation_intervals: text.has_deviation_intervals,
+        ..Default::default()
+    };
+    let fit = fit_population(&study, &options)?;
     println!("{}", serde_json::to_string(&fit)?);
     Ok(())
 }

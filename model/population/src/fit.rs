@@ -5,8 +5,9 @@ use crate::profile::Profile;
 use crate::search::{Coordinates, Criterion, Optimum};
 use crate::study::{NestedStudy, Study, StudyError};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use palpate_model::estimate::student_t975;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, StudentsT};
 
 /// A standard deviation below this share of the scatter of the values is zero.
 const ZERO: f64 = 1e-4;
@@ -62,27 +63,48 @@ pub struct GroupShift {
 /// A population.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PopulationFit {
+    /// Of each effect all parameters.
     pub effects: Vec<EffectEstimate>,
+    /// Of each contrast all parameters.
+    pub contrasts: Vec<EffectEstimate>,
+    /// Of each level all parameters.
     pub standard_deviations: Vec<LevelDeviation>,
+    /// Of each level all groups, of the last all sessions.
     pub groups: Vec<GroupShift>,
     /// Whether the intervals of the effects keep the bound on variances although one of them is zero, since without it no
     /// optimum was found.
     pub is_bounded: bool,
 }
 
+/// A sum of effects, such as the difference between two treatments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contrast {
+    pub name: String,
+    /// By which each of [`Study::effects`] is multiplied.
+    pub weights: Vec<f64>,
+}
+
 /// Options of a fit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PopulationOptions {
     /// Whether intervals of standard deviations are found, which takes most of the time.
     pub has_deviation_intervals: bool,
+    pub contrasts: Vec<Contrast>,
 }
 
 /// The population of a study by restricted maximum likelihood (Patterson & Thompson, Biometrika 58 (1971) 545-554).
 pub fn fit_population(
     study: &Study,
-    options: PopulationOptions,
+    options: &PopulationOptions,
 ) -> Result<PopulationFit, StudyError> {
     let nested = study.nested()?;
+    for one in &options.contrasts {
+        let (found, expected) = (one.weights.len(), study.effects.len());
+        if found != expected {
+            let session = one.name.clone();
+            return Err(StudyError::Count { session, what: "weights", found, expected });
+        }
+    }
     let coordinates = Coordinates::of(&nested);
     let optimum = optimum(&nested, &coordinates)?;
     let criterion = Criterion { study: &nested, coordinates: &coordinates };
@@ -148,15 +170,15 @@ impl Fitter<'_> {
         self.coordinates().factors(&self.optimum.at)
     }
 
-    fn fit(&self, options: PopulationOptions) -> Result<PopulationFit, StudyError> {
+    fn fit(&self, options: &PopulationOptions) -> Result<PopulationFit, StudyError> {
         let shifts = self.nested.shifts(&self.factors(), &self.optimum.evaluation.effects);
         let unbounded = self.has_zero().then(|| self.without_bounds()).flatten();
         let is_bounded = self.has_zero() && unbounded.is_none();
         let judged = unbounded.or_else(|| Judgement::of(&self.criterion, &self.optimum));
+        let judged = judged.ok_or(StudyError::NoOptimum)?;
         Ok(PopulationFit {
-            effects: judged
-                .and_then(|judged| self.effects(&judged))
-                .ok_or(StudyError::NoOptimum)?,
+            effects: self.effects(&judged).ok_or(StudyError::NoOptimum)?,
+            contrasts: self.contrasts(&judged, &options.contrasts).ok_or(StudyError::NoOptimum)?,
             standard_deviations: self.deviations(options.has_deviation_intervals),
             groups: self.groups(&shifts.ok_or(StudyError::NoOptimum)?),
             is_bounded,
@@ -164,31 +186,51 @@ impl Fitter<'_> {
     }
 
     fn effects(&self, judged: &Judgement) -> Option<Vec<EffectEstimate>> {
+        let effects = self.study.effects.iter().enumerate();
+        let own = effects.map(|(place, effect)| Contrast {
+            name: effect.clone(),
+            weights: (0..self.study.effects.len())
+                .map(|k| f64::from(u8::from(k == place)))
+                .collect(),
+        });
+        self.contrasts(judged, &own.collect::<Vec<_>>())
+    }
+
+    fn contrasts(&self, judged: &Judgement, all: &[Contrast]) -> Option<Vec<EffectEstimate>> {
+        let parameters = self.study.parameters.len();
+        let each = all.iter().flat_map(|one| (0..parameters).map(move |k| (one, k)));
+        each.map(|(contrast, parameter)| self.contrast(judged, contrast, parameter)).collect()
+    }
+
+    fn contrast(
+        &self,
+        judged: &Judgement,
+        contrast: &Contrast,
+        parameter: usize,
+    ) -> Option<EffectEstimate> {
         let evaluation = &self.optimum.evaluation;
-        let mut found = Vec::new();
-        for (j, effect) in self.study.effects.iter().enumerate() {
-            for (k, parameter) in self.study.parameters.iter().enumerate() {
-                let index = j * self.study.parameters.len() + k;
-                let value = evaluation.effects[index];
-                let variance = judged.covariance[(index, index)];
-                let slopes = judged.slopes.iter().map(|slope| slope[(index, index)]);
-                let slopes = DVector::from_iterator(judged.slopes.len(), slopes);
-                let uncertainty = (&judged.coordinate_covariance * &slopes).dot(&slopes);
-                let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, FREEDOM_MAX);
-                let student = StudentsT::new(0.0, 1.0, freedom).ok()?;
-                let half = student.inverse_cdf(0.5 + 0.5 * COVERAGE) * variance.sqrt();
-                found.push(EffectEstimate {
-                    effect: effect.clone(),
-                    parameter: parameter.clone(),
-                    value,
-                    std_error: evaluation.covariance[(index, index)].sqrt(),
-                    freedom,
-                    interval: [value - half, value + half],
-                    p_value: 2.0 * student.cdf(-(value / variance.sqrt()).abs()),
-                });
-            }
+        let count = self.study.parameters.len();
+        let mut weights = DVector::zeros(evaluation.effects.len());
+        for (place, weight) in contrast.weights.iter().enumerate() {
+            weights[place * count + parameter] = *weight;
         }
-        Some(found)
+        let form = |matrix: &DMatrix<f64>| (matrix * &weights).dot(&weights);
+        let value = evaluation.effects.dot(&weights);
+        let variance = form(&judged.covariance);
+        let slopes = DVector::from_iterator(judged.slopes.len(), judged.slopes.iter().map(form));
+        let uncertainty = (&judged.coordinate_covariance * &slopes).dot(&slopes);
+        let freedom = (2.0 * variance * variance / uncertainty).clamp(1.0, FREEDOM_MAX);
+        let student = student(freedom)?;
+        let half = quantile(&student) * variance.sqrt();
+        Some(EffectEstimate {
+            effect: contrast.name.clone(),
+            parameter: self.study.parameters[parameter].clone(),
+            value,
+            std_error: form(&evaluation.covariance).sqrt(),
+            freedom,
+            interval: [value - half, value + half],
+            p_value: 2.0 * student.cdf(-(value / variance.sqrt()).abs()),
+        })
     }
 
     fn has_zero(&self) -> bool {
@@ -237,7 +279,10 @@ impl Fitter<'_> {
     }
 
     fn groups(&self, shifts: &[Vec<ShiftEstimate>]) -> Vec<GroupShift> {
-        let levels = self.study.levels.iter().zip(&self.nested.names).zip(shifts);
+        let sessions: Vec<String> =
+            self.study.sessions.iter().map(|one| one.name.clone()).collect();
+        let names = self.nested.names.iter().chain(std::iter::once(&sessions));
+        let levels = self.study.levels.iter().zip(names).zip(shifts);
         let groups = levels.flat_map(|((level, names), shifts)| {
             names.iter().zip(shifts).map(|(group, one)| {
                 let variances = one.own_covariance.diagonal();
@@ -250,5 +295,42 @@ impl Fitter<'_> {
             })
         });
         groups.collect()
+    }
+}
+
+pub(crate) fn student(freedom: f64) -> Option<StudentsT> {
+    StudentsT::new(0.0, 1.0, freedom).ok()
+}
+
+/// Student's t at 97.5 %. The approximation is good to a millionth from 30 degrees of freedom on; below, Newton's steps follow:
+/// the library's own search does not end for some degrees of freedom, and its distribution is rough for many.
+pub(crate) fn quantile(student: &StudentsT) -> f64 {
+    let freedom = student.freedom();
+    // Each step squares an error of a hundredth at most.
+    let steps = if freedom < 30.0 { 4 } else { 0 };
+    (0..steps).fold(student_t975(freedom), |at, _| {
+        at - (student.cdf(at) - (0.5 + 0.5 * COVERAGE)) / student.pdf(at)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By R's `qt`.
+    #[test]
+    fn quantiles_are_those_of_a_table_and_fall_with_the_degrees_of_freedom() {
+        let at = |freedom: f64| quantile(&StudentsT::new(0.0, 1.0, freedom).unwrap());
+        for (freedom, expected) in [
+            (1.0, 12.706_204_736),
+            (2.5, 3.574_654_842),
+            (3.0, 3.182_446_305),
+            (12.0, 2.178_812_830),
+        ] {
+            assert!((at(freedom) - expected).abs() < 1e-8, "{freedom} {}", at(freedom));
+        }
+        assert!((at(FREEDOM_MAX) - 1.959_963_985).abs() < 1e-6);
+        let all: Vec<f64> = (0..3000).map(|k| at(1.007f64.powi(k).min(FREEDOM_MAX))).collect();
+        assert!(all.windows(2).all(|pair| pair[1] <= pair[0]));
     }
 }

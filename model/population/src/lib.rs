@@ -7,20 +7,30 @@
 //! Start at [`Study`].
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
+mod agreement;
+mod comparisons;
 mod curves;
 mod fit;
+mod influence;
 mod likelihood;
+mod plan;
 mod profile;
+mod scores;
 mod search;
 mod study;
 #[cfg(test)]
 mod tests;
 
+pub use agreement::{Agreement, AgreementError, PairedPlace, agreement};
+pub use comparisons::holm;
 pub use curves::{CurveEvidence, CurveRounds, expand_curves};
 pub use fit::{
-    COVERAGE, EffectEstimate, GroupShift, LevelDeviation, PopulationFit, PopulationOptions,
-    fit_population,
+    COVERAGE, Contrast, EffectEstimate, GroupShift, LevelDeviation, PopulationFit,
+    PopulationOptions, fit_population,
 };
+pub use influence::{Influence, influence};
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;
+pub use plan::{ASSURANCE, PlannedEffect, PlannedStudy, plan_study};
+pub use scores::{NormalScore, normal_scores};
 pub use study::{Evidence, Study, StudyError, StudySession};

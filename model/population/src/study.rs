@@ -213,4 +213,13 @@ impl StudySession {
     pub(crate) fn vector(&self) -> DVector<f64> {
         DVector::from_column_slice(&self.values)
     }
+
+    /// Its group of a level behind those that this belongs to; of the last level its own name.
+    #[must_use]
+    pub fn group(&self, level: usize) -> String {
+        match self.groups.get(..=level) {
+            Some(path) => path.join(" / "),
+            None => self.name.clone(),
+        }
+    }
 }

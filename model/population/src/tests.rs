@@ -2,14 +2,14 @@ use crate::likelihood::{Evaluation, SpreadFactor};
 use crate::search::Coordinates;
 use crate::study::NestedStudy;
 use crate::{
-    CurveEvidence, Evidence, PopulationOptions, Study, StudyError, StudySession, expand_curves,
-    fit_population,
+    Contrast, CurveEvidence, Evidence, PopulationOptions, Study, StudyError, StudySession,
+    expand_curves, fit_population,
 };
 use nalgebra::{Cholesky, DMatrix, DVector};
 use palpate_model::random::SplitMix;
 
 /// An unbalanced study of two parameters with an effect.
-fn study(random: &mut SplitMix) -> Study {
+pub(crate) fn study(random: &mut SplitMix) -> Study {
     let mut sessions = Vec::new();
     for animal in 0..4 {
         let outer = random.normal();
@@ -223,16 +223,16 @@ fn a_parameter_that_a_session_does_not_identify_is_left_to_the_others() {
     let open = DMatrix::from_row_slice(2, 2, &[40.0, 0.0, 0.0, 0.0]);
     study.sessions[0].evidence = Evidence::Information(open);
     study.sessions[0].values[1] = 1e6;
-    let options = PopulationOptions { has_deviation_intervals: true };
-    let far = fit_population(&study, options).unwrap();
+    let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
+    let far = fit_population(&study, &options).unwrap();
     study.sessions[0].values[1] = 0.0;
-    let near = fit_population(&study, options).unwrap();
+    let near = fit_population(&study, &options).unwrap();
     assert_eq!(far, near);
     assert!(far.standard_deviations.iter().any(|one| one.value > 0.0));
 }
 
 /// A balanced study of six animals, three sites of each and two repeats, from its mean squares.
-fn balanced(of_animals: f64, of_sites: f64, of_repeats: f64) -> Study {
+pub(crate) fn balanced(of_animals: f64, of_sites: f64, of_repeats: f64) -> Study {
     let sign = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut sessions = Vec::new();
     for animal in 0..6 {
@@ -289,8 +289,8 @@ fn profile_of_animals(squares: [f64; 3], variance: f64) -> f64 {
 fn intervals_of_a_balanced_study_are_those_of_its_mean_squares() {
     for of_sites in [0.8, 2.0] {
         let squares = [3.0, of_sites, 1.0];
-        let options = PopulationOptions { has_deviation_intervals: true };
-        let fit = fit_population(&balanced(squares[0], squares[1], squares[2]), options).unwrap();
+        let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
+        let fit = fit_population(&balanced(squares[0], squares[1], squares[2]), &options).unwrap();
         assert_eq!(fit.standard_deviations[1].is_zero, of_sites < 1.0);
         let lowest = (0..4000).map(|k| profile_of_animals(squares, f64::from(k) * 2.5e-4));
         let lowest = lowest.fold(f64::INFINITY, f64::min);
@@ -310,6 +310,51 @@ fn intervals_of_a_balanced_study_are_those_of_its_mean_squares() {
 }
 
 #[test]
+fn both_ends_of_an_interval_are_where_the_profile_of_the_mean_squares_has_risen() {
+    let squares = [6.0, 1.0, 0.8];
+    let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
+    let fit = fit_population(&balanced(squares[0], squares[1], squares[2]), &options).unwrap();
+    let lowest = (0..4000).map(|k| profile_of_animals(squares, f64::from(k) * 2.5e-4));
+    let lowest = lowest.fold(f64::INFINITY, f64::min);
+    let animals = &fit.standard_deviations[0];
+    let ends = animals.interval.map(Option::unwrap);
+    assert!(0.0 < ends[0] && ends[0] < animals.value && animals.value < ends[1], "{animals:?}");
+    for end in ends {
+        // An end is right to a thousandth of itself, over which the profile rises by less than this.
+        let rise = profile_of_animals(squares, end * end) - lowest;
+        assert!((rise - 3.841_459).abs() < 0.02, "{end} {rise}");
+    }
+}
+
+/// A difference of two treatments is the effect of one of them in a design whose first treatment is the other one.
+#[test]
+fn a_contrast_is_the_effect_of_another_first_value() {
+    let mut random = SplitMix::seeded(12);
+    let mut study = study(&mut random);
+    study.effects = ["mean", "b", "c"].map(String::from).to_vec();
+    let kinds: Vec<usize> = (0..study.sessions.len()).map(|k| k % 3).collect();
+    let coded = |second: usize, third: usize| {
+        let mut study = study.clone();
+        let is = |kind: usize, one: usize| f64::from(u8::from(kind == one));
+        for (session, kind) in study.sessions.iter_mut().zip(&kinds) {
+            session.design = vec![1.0, is(*kind, second), is(*kind, third)];
+        }
+        let difference = Contrast { name: "c - b".into(), weights: vec![0.0, -1.0, 1.0] };
+        let options = PopulationOptions { contrasts: vec![difference], ..Default::default() };
+        fit_population(&study, &options).unwrap()
+    };
+    let (from_a, from_b) = (coded(1, 2), coded(0, 2));
+    for k in 0..2 {
+        let (contrast, effect) = (&from_a.contrasts[k], &from_b.effects[4 + k]);
+        close(contrast.value, effect.value);
+        close(contrast.std_error, effect.std_error);
+        // Degrees of freedom are of differences of a covariance.
+        assert!((contrast.freedom / effect.freedom - 1.0).abs() < 1e-3, "{contrast:?} {effect:?}");
+        assert_eq!(contrast.effect, "c - b");
+    }
+}
+
+#[test]
 fn a_standard_deviation_that_is_not_there_is_zero_and_its_interval_starts_there() {
     let mut random = SplitMix::seeded(8);
     let mut study = study(&mut random);
@@ -317,8 +362,8 @@ fn a_standard_deviation_that_is_not_there_is_zero_and_its_interval_starts_there(
         // Each site has the same mean of its animal: the sites scatter less than their repeats let expect.
         session.values = vec![if index % 2 == 0 { 1.0 } else { -1.0 }, random.normal()];
     }
-    let options = PopulationOptions { has_deviation_intervals: true };
-    let fit = fit_population(&study, options).unwrap();
+    let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
+    let fit = fit_population(&study, &options).unwrap();
     let animals = &fit.standard_deviations[0];
     assert!(animals.is_zero && animals.value == 0.0, "{animals:?}");
     assert_eq!(animals.interval[0], Some(0.0));
@@ -331,7 +376,7 @@ fn studies_that_say_nothing_are_refused() {
     let refusal = |change: &dyn Fn(&mut Study)| {
         let mut other = whole.clone();
         change(&mut other);
-        fit_population(&other, PopulationOptions::default()).unwrap_err()
+        fit_population(&other, &PopulationOptions::default()).unwrap_err()
     };
     let one_animal = refusal(&|study| study.sessions.retain(|one| one.groups[0] == "a2"));
     assert_eq!(one_animal, StudyError::OneGroup { level: "animal".into() });

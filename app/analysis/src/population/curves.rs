@@ -1,21 +1,24 @@
 //! The records of a study, read and worked on by several threads.
 
-use super::{PopulationError, PopulationRequest};
+use super::PopulationError;
 use crate::fit::{FitRecipe, settled};
 use crate::pool::{WorkEvent, WorkFailure, in_order};
 use crate::progress::Progress;
 use crate::source::{self, SourceError};
 use crate::study_table::{StudyRow, StudyTable};
 use palpate_population::CurveEvidence;
-use palpate_rheology::fit::{FitSample, LikelihoodExpansion, Signal, SignalRecord};
+use palpate_rheology::fit::{
+    CurveLikelihood, FitError, FitOptions, FitSample, FitSolution, LikelihoodExpansion, Signal,
+    SignalRecord,
+};
 use palpate_tables::lake::{LakeSession, is_lake, list_sessions, read_session};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The record of one session.
 pub(super) struct Curve {
-    samples: Vec<FitSample>,
+    pub samples: Vec<FitSample>,
     signal: Option<Signal>,
 }
 
@@ -66,18 +69,19 @@ pub(super) fn curve_evidence(found: LikelihoodExpansion) -> CurveEvidence {
 
 /// The record of every row of the table, or why it has none.
 pub(super) fn read_curves(
-    request: &PopulationRequest<'_>,
+    paths: &[PathBuf],
+    recipe: &FitRecipe,
     table: &StudyTable,
     workers: &Workers<'_>,
 ) -> Result<Vec<Result<Curve, String>>, PopulationError> {
-    let lake = match request.paths {
+    let lake = match paths {
         [lake] if is_lake(lake) => {
             let sessions = list_sessions(lake)?.into_iter().map(|one| (one.id.clone(), one));
             Some((lake.as_path(), sessions.collect::<BTreeMap<_, _>>()))
         }
         _ => None,
     };
-    workers.all("sessions", &table.rows, |row| read_curve(request.recipe, lake.as_ref(), row))
+    workers.all("sessions", &table.rows, |row| read_curve(recipe, lake.as_ref(), row))
 }
 
 fn read_curve(
@@ -98,4 +102,20 @@ fn read_curve(
     recipe.corrections.apply(&mut read).map_err(|err| err.to_string())?;
     let read = settled(read, &recipe.options);
     Ok(Curve { samples: read.samples, signal: read.signal })
+}
+
+/// Logarithms of some parameters where each record fits best, or why there are none.
+pub(super) fn best_values(
+    names: &[String],
+    options: &FitOptions,
+    curves: &[Curve],
+    workers: &Workers<'_>,
+) -> Result<Vec<Result<Vec<f64>, String>>, PopulationError> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    workers.all("fits", curves, |curve| {
+        let words = |err: FitError| err.to_string();
+        let fit = FitSolution::fit_signals(&[curve.record()], options, &[]).map_err(words)?;
+        let likelihood = CurveLikelihood::of(&fit, 0, &names).map_err(words)?;
+        Ok(likelihood.best().to_vec())
+    })
 }

@@ -1,13 +1,15 @@
 //! Which groups and which effects the sessions of a study have.
 
-use crate::study_table::{COVARIATES, StudyProblem, StudyRow, StudyTable};
+use crate::study_table::{COVARIATES, StudyProblem, StudyRow, StudyTable, WITHIN};
 use palpate_model::metadata::plain_value;
+use palpate_population::Contrast;
 use serde_json::Value;
 use std::collections::BTreeSet;
 use thiserror::Error;
 
 /// Levels of the nesting, the outermost first, above the session itself.
-pub const LEVELS: [&str; 3] = ["animal", "specimen", "site"];
+pub const LEVELS: [&str; 3] = ["animal", "specimen", SITE];
+const SITE: &str = "site";
 /// The innermost level: what is left between two presses on one place.
 const SESSION: &str = "session";
 /// The effect that all sessions have.
@@ -15,11 +17,11 @@ pub(super) const MEAN: &str = "mean";
 
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DesignError {
-    #[error("there is no level '{name}'; choose from {}", LEVELS.join(", "))]
+    #[error("there is no level '{name}'; choose from {}, or an entry such as specimen.storage", LEVELS.join(", "))]
     UnknownLevel { name: String },
     #[error("the levels are {given}; give them from the outermost: {}", LEVELS.join(", "))]
     LevelOrder { given: String },
-    #[error("there is no entry '{name}' that may be an effect; choose from {}", COVARIATES.join(", "))]
+    #[error("there is no entry '{name}' that may be an effect; choose from {}", entries().collect::<Vec<_>>().join(", "))]
     UnknownEffect { name: String },
     #[error("{0}")]
     Problem(Box<StudyProblem>),
@@ -52,6 +54,8 @@ enum Column {
 pub struct Design {
     levels: Vec<&'static str>,
     columns: Vec<Column>,
+    /// Values of each entry that is a text, the one that the mean is at first.
+    values: Vec<(&'static str, Vec<String>)>,
     /// What was left out and why, and where the mean is.
     pub notes: Vec<String>,
 }
@@ -66,8 +70,12 @@ impl Design {
         if let Some(problem) = table.problems.iter().find(|one| one.is_contradiction()) {
             return Err(DesignError::Problem(Box::new(problem.clone())));
         }
-        let mut design =
-            Self { levels: Vec::new(), columns: vec![Column::Mean], notes: Vec::new() };
+        let mut design = Self {
+            levels: Vec::new(),
+            columns: vec![Column::Mean],
+            values: Vec::new(),
+            notes: Vec::new(),
+        };
         design.choose_levels(table, levels)?;
         for name in effects {
             design.add_effect(table, name)?;
@@ -76,26 +84,27 @@ impl Design {
     }
 
     fn choose_levels(&mut self, table: &StudyTable, wanted: &[String]) -> Result<(), DesignError> {
-        let mut places = Vec::new();
+        let mut levels = Vec::new();
         for name in wanted {
-            let place = LEVELS.iter().position(|level| level == name);
-            places.push(place.ok_or_else(|| DesignError::UnknownLevel { name: name.clone() })?);
+            let level = LEVELS.into_iter().chain(entries()).find(|level| level == name);
+            levels.push(level.ok_or_else(|| DesignError::UnknownLevel { name: name.clone() })?);
         }
-        if !places.is_sorted_by(|a, b| a < b) {
+        // An entry is a level wherever it is named.
+        let place = |level: &&str| LEVELS.iter().position(|one| one == level);
+        if !levels.iter().filter_map(place).is_sorted_by(|a, b| a < b) {
             return Err(DesignError::LevelOrder { given: wanted.join(", ") });
         }
         if wanted.is_empty() {
             // A site is a level where a session names one.
-            places = (0..LEVELS.len())
-                .filter(|&k| k < 2 || table.rows.iter().any(|row| name_of(row, k).is_some()))
-                .collect();
+            let is_named = |level: &str| table.rows.iter().any(|row| name_of(row, level).is_some());
+            levels = LEVELS.into_iter().filter(|level| *level != SITE || is_named(level)).collect();
         }
-        for &place in &places {
+        for level in &levels {
             let lacking: Vec<&StudyRow> =
-                table.rows.iter().filter(|row| name_of(row, place).is_none()).collect();
+                table.rows.iter().filter(|row| name_of(row, level).is_none()).collect();
             if let Some(first) = lacking.first() {
                 return Err(DesignError::Missing {
-                    entry: entry_of(place).to_owned(),
+                    entry: entry_of(level).to_owned(),
                     lacking: lacking.len(),
                     of: table.rows.len(),
                     first: first.session.clone(),
@@ -103,27 +112,27 @@ impl Design {
             }
         }
         if wanted.is_empty() {
-            self.drop_empty(table, &mut places);
+            self.drop_empty(table, &mut levels);
         }
-        self.levels = places.into_iter().map(|place| LEVELS[place]).collect();
+        self.levels = levels;
         Ok(())
     }
 
     /// Leaves out levels whose groups have one member each.
-    fn drop_empty(&mut self, table: &StudyTable, places: &mut Vec<usize>) {
+    fn drop_empty(&mut self, table: &StudyTable, levels: &mut Vec<&'static str>) {
         let mut members = table.rows.len();
         let mut inner = SESSION;
-        for index in (0..places.len()).rev() {
+        for index in (0..levels.len()).rev() {
             let path = |row: &StudyRow| -> Vec<Option<String>> {
-                places[..=index].iter().map(|&place| name_of(row, place).cloned()).collect()
+                levels[..=index].iter().map(|level| name_of(row, level)).collect()
             };
             let groups = table.rows.iter().map(path).collect::<BTreeSet<_>>().len();
-            let level = LEVELS[places[index]];
+            let level = levels[index];
             if groups == members {
                 self.notes.push(format!(
                     "each {level} has one {inner}, so differences between {level}s are part of those between {inner}s"
                 ));
-                places.remove(index);
+                levels.remove(index);
             } else {
                 (members, inner) = (groups, level);
             }
@@ -131,7 +140,7 @@ impl Design {
     }
 
     fn add_effect(&mut self, table: &StudyTable, name: &str) -> Result<(), DesignError> {
-        let entry = COVARIATES.into_iter().find(|entry| *entry == name);
+        let entry = entries().find(|entry| *entry == name);
         let entry = entry.ok_or_else(|| DesignError::UnknownEffect { name: name.to_owned() })?;
         let values: Vec<(&StudyRow, &Value)> =
             table.rows.iter().map(|row| (row, &row.covariates[entry])).collect();
@@ -158,6 +167,7 @@ impl Design {
         if !numbers.is_empty() {
             return Err(DesignError::Mixed { entry: entry.to_owned() });
         }
+        self.values.push((entry, words.iter().cloned().collect()));
         let mut words = words.into_iter();
         if let Some(first) = words.next() {
             self.notes.push(format!("the mean is at {entry} = {first}"));
@@ -183,12 +193,63 @@ impl Design {
         self.columns.iter().map(name).collect()
     }
 
+    /// Names of the values of the first entry that is a text, each with its columns where all others are as the mean is; without
+    /// such an entry one, named so.
+    #[must_use]
+    pub fn kinds(&self, name: &str) -> Vec<(String, Vec<f64>)> {
+        let columns = |of: &dyn Fn(&Column) -> bool| {
+            let value =
+                |column: &Column| f64::from(u8::from(*column == Column::Mean || of(column)));
+            self.columns.iter().map(value).collect()
+        };
+        let Some((entry, values)) = self.values.first() else {
+            return vec![(name.to_owned(), columns(&|_| false))];
+        };
+        let kind = |value: &String| {
+            let is_own = |column: &Column| matches!(column, Column::Is { entry: own, value: one } if own == entry && one == value);
+            (value.clone(), columns(&is_own))
+        };
+        values.iter().map(kind).collect()
+    }
+
+    /// Place of a session among the kinds.
+    #[must_use]
+    pub fn kind_of(&self, row: &StudyRow) -> usize {
+        let place = self.values.first().and_then(|(entry, values)| {
+            let own = plain_value(&row.covariates[entry]);
+            values.iter().position(|value| *value == own)
+        });
+        place.unwrap_or(0)
+    }
+
+    /// The differences between any two values of a text that has three or more, by their entries.
+    #[must_use]
+    pub fn comparisons(&self) -> Vec<(&'static str, Vec<Contrast>)> {
+        let mut found: Vec<(&'static str, Vec<Contrast>)> = Vec::new();
+        for (entry, values) in &self.values {
+            if values.len() < 3 {
+                continue;
+            }
+            let weight = |value: &String, column: &Column| match column {
+                Column::Is { entry: own, value: one } if own == entry && one == value => 1.0,
+                _ => 0.0,
+            };
+            let pairs = (0..values.len()).flat_map(|a| (a + 1..values.len()).map(move |b| (a, b)));
+            let all = pairs.map(|(a, b)| {
+                let (a, b) = (&values[a], &values[b]);
+                let columns = self.columns.iter();
+                let weights = columns.map(|column| weight(b, column) - weight(a, column)).collect();
+                Contrast { name: format!("{entry} = {b} / {a}"), weights }
+            });
+            found.push((entry, all.collect()));
+        }
+        found
+    }
+
     /// Names of the groups of a session.
     #[must_use]
     pub fn groups(&self, row: &StudyRow) -> Vec<String> {
-        let place = |level: &&str| LEVELS.iter().position(|one| one == level).unwrap_or(0);
-        let names = self.levels.iter().map(|level| name_of(row, place(level)));
-        names.map(|name| name.cloned().unwrap_or_default()).collect()
+        self.levels.iter().map(|level| name_of(row, level).unwrap_or_default()).collect()
     }
 
     /// The value of each column for a session.
@@ -205,10 +266,25 @@ impl Design {
     }
 }
 
-fn entry_of(level: usize) -> &'static str {
-    ["animal.name", "specimen", "specimen.site"][level]
+/// Entries that may be effects and levels.
+fn entries() -> impl Iterator<Item = &'static str> {
+    COVARIATES.into_iter().chain(WITHIN)
 }
 
-fn name_of(row: &StudyRow, level: usize) -> Option<&String> {
-    [&row.animal, &row.specimen, &row.site][level].as_ref()
+/// What a session that lacks a level is without.
+fn entry_of(level: &str) -> &str {
+    match level {
+        "animal" => "animal.name",
+        SITE => "specimen.site",
+        level => level,
+    }
+}
+
+fn name_of(row: &StudyRow, level: &str) -> Option<String> {
+    match level {
+        "animal" => row.animal.clone(),
+        "specimen" => row.specimen.clone(),
+        SITE => row.site.clone(),
+        entry => row.covariates.get(entry).filter(|value| !value.is_null()).map(plain_value),
+    }
 }

@@ -1,12 +1,25 @@
 //! From the sessions of a study to the population that their specimens come from.
 
+mod agreement;
 mod curves;
 mod design;
+mod figures;
+mod questions;
 mod report;
+mod results;
+mod specimens;
 mod stored;
 
+pub use agreement::{
+    AgreementFailure, AgreementReport, AgreementRequest, ParameterAgreement, PlaceDifference,
+    agreements,
+};
 pub use design::{Design, DesignError};
+pub use figures::PopulationFigure;
+pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
 pub use report::{DeviationRow, EffectRow, LevelRow, PopulationReport};
+pub use results::{paragraph, write_results};
+pub use specimens::{CurveKind, PopulationCurves};
 
 use crate::fit::{FitRecipe, StoredFitError};
 use crate::progress::Progress;
@@ -14,10 +27,11 @@ use crate::report::text::counted;
 use crate::study_table::{StudyReadError, StudyRow, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
-    CurveRounds, PopulationOptions, Study, StudyError, StudySession, expand_curves, fit_population,
+    CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession, expand_curves,
+    fit_population,
 };
 use palpate_rheology::fit::{
-    CurveLikelihood, FitError, FitSolution, LikelihoodExpansion, SignalRecord,
+    CurveLikelihood, FitError, FitOptions, FitSolution, LikelihoodExpansion, SignalRecord,
 };
 use palpate_tables::lake::LakeError;
 use serde::Serialize;
@@ -54,6 +68,12 @@ pub struct PopulationRequest<'a> {
     pub method: PopulationMethod,
     /// SHA-256 of the file of the compliance that stored fits must have, as the corrections of the recipe have it.
     pub compliance_sha256: Option<String>,
+    /// Whether each group is left out in turn.
+    pub is_influence_wanted: bool,
+    /// Whether curves for figures are kept, where the population has all parameters of the model.
+    pub is_drawn: bool,
+    /// Percent by which no end of an interval may be off, for which sizes of a study are looked at.
+    pub wanted_percent: Option<f64>,
     /// Number of sessions fitted at a time.
     pub jobs: usize,
 }
@@ -86,61 +106,122 @@ pub enum PopulationError {
     Died,
 }
 
+/// A population, and what it was found from.
+#[derive(Clone, Debug)]
+pub struct Population {
+    pub report: PopulationReport,
+    /// What each session says at the end.
+    pub study: Study,
+    pub fit: PopulationFit,
+    /// Where they are wanted and all parameters of the model are in the population.
+    pub curves: Option<PopulationCurves>,
+}
+
+impl Population {
+    #[must_use]
+    pub fn figures(&self) -> Vec<PopulationFigure> {
+        figures::figures(&self.report, &self.fit, self.curves.as_ref())
+    }
+}
+
 /// Finds the population. `progress` hears of sessions that were read, fitted and expanded.
 pub fn population(
     request: &PopulationRequest<'_>,
     progress: &dyn Progress,
-) -> Result<PopulationReport, PopulationError> {
-    let names = parameter_names(request)?;
+) -> Result<Population, PopulationError> {
+    let names = parameter_names(&request.recipe.options, request.parameters)?;
     let mut table = read_study(request.paths)?;
     // What is wrong with it is said before the sessions are fitted.
     Design::of(&table, request.levels, request.effects)?;
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
     let options = &request.recipe.options;
-    let (study, design, rounds) = if request.method == PopulationMethod::Stored {
+    if request.method == PopulationMethod::Stored {
         let stored = read_stored(request, &table, &workers)?;
         let stored = keep(&mut table, stored, &mut not_fitted)?;
         let design = Design::of(&table, request.levels, request.effects)?;
         let best = stored.iter().map(|one| one.of_parameters(&names));
-        (study(&names, &design, &table, best)?, design, None)
-    } else {
-        let curves = read_curves(request, &table, &workers)?;
-        let curves = keep(&mut table, curves, &mut not_fitted)?;
-        let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
-        let fits = workers.all("fits", &records, |record| {
-            FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
-        })?;
-        let fits = keep(&mut table, fits, &mut not_fitted)?;
-        let likelihoods = likelihoods(&names, &table, &fits)?;
-        let design = Design::of(&table, request.levels, request.effects)?;
-        let best =
-            likelihoods.iter().map(|one| one.expand_at_best().ok_or_else(|| inseparable(&names)));
-        let mut study = study(&names, &design, &table, best)?;
-        let expand = |modes: &[Vec<f64>]| {
-            let pieces: Vec<_> = likelihoods.iter().zip(modes).collect();
-            workers.all("curves", &pieces, |(likelihood, mode)| {
-                likelihood.expand(mode).map(curve_evidence)
-            })
-        };
-        let is_of_curves = request.method == PopulationMethod::Curves;
-        let rounds = is_of_curves.then(|| expand_curves(&mut study, expand)).transpose()?;
-        (study, design, rounds)
+        let study = study(&names, &design, &table, best)?;
+        let found = StudyFound { design, study, rounds: None, table, not_fitted };
+        return found.population(request, &workers, |_, _| None);
+    }
+    let curves = read_curves(request.paths, request.recipe, &table, &workers)?;
+    let curves = keep(&mut table, curves, &mut not_fitted)?;
+    let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
+    let fits = workers.all("fits", &records, |record| {
+        FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
+    })?;
+    let fitted = curves.iter().zip(&fits).filter(|(_, fit)| fit.is_ok());
+    let fitted: Vec<&Curve> = fitted.map(|(curve, _)| curve).collect();
+    let fits = keep(&mut table, fits, &mut not_fitted)?;
+    let likelihoods = likelihoods(&names, &table, &fits)?;
+    let design = Design::of(&table, request.levels, request.effects)?;
+    let best =
+        likelihoods.iter().map(|one| one.expand_at_best().ok_or_else(|| inseparable(&names)));
+    let mut study = study(&names, &design, &table, best)?;
+    let expand = |modes: &[Vec<f64>]| {
+        let pieces: Vec<_> = likelihoods.iter().zip(modes).collect();
+        workers.all("curves", &pieces, |(likelihood, mode)| {
+            likelihood.expand(mode).map(curve_evidence)
+        })
     };
-    let fit = fit_population(&study, PopulationOptions { has_deviation_intervals: true })?;
-    let unit = |name: &str| options.unit(name).map(str::to_owned);
-    Ok(PopulationReport {
-        model: options.family().key(),
-        method: request.method,
-        rounds: rounds.map(|one| one.rounds),
-        sessions: study.sessions.len(),
-        levels: LevelRow::all(&study),
-        effects: fit.effects.iter().map(|one| EffectRow::of(one, unit(&one.parameter))).collect(),
-        standard_deviations: fit.standard_deviations.iter().map(DeviationRow::of).collect(),
-        groups: fit.groups,
-        not_fitted,
-        notes: notes(&design, &table, rounds, fit.is_bounded),
+    let is_of_curves = request.method == PopulationMethod::Curves;
+    let rounds = is_of_curves.then(|| expand_curves(&mut study, expand)).transpose()?;
+    let found = StudyFound { design, study, rounds, table, not_fitted };
+    // A specimen is drawn whole or not at all.
+    let is_drawn = request.is_drawn && names.len() == options.body_names().len();
+    found.population(request, &workers, |found, fit| {
+        let reports = || fits.iter().map(FitSolution::report).collect::<Vec<_>>();
+        let StudyFound { design, study, table, .. } = found;
+        is_drawn
+            .then(|| specimens::curves(design, &table.rows, &fitted, &reports(), (study, fit)))?
     })
+}
+
+/// The sessions of a study, and what they say.
+struct StudyFound {
+    design: Design,
+    study: Study,
+    rounds: Option<CurveRounds>,
+    table: StudyTable,
+    not_fitted: BTreeMap<String, String>,
+}
+
+impl StudyFound {
+    fn population(
+        self,
+        request: &PopulationRequest<'_>,
+        workers: &Workers<'_>,
+        draw: impl FnOnce(&Self, &PopulationFit) -> Option<PopulationCurves>,
+    ) -> Result<Population, PopulationError> {
+        let (study, options) = (&self.study, &request.recipe.options);
+        let contrasts = questions::contrasts(&self.design);
+        let wanted = PopulationOptions { has_deviation_intervals: true, contrasts };
+        let fit = fit_population(study, &wanted)?;
+        let influence = request.is_influence_wanted;
+        let influence = influence.then(|| questions::influences(study, &fit, workers));
+        let plan = request.wanted_percent;
+        let plan = plan.map(|wanted| questions::plan(study, &fit, wanted, workers)).transpose()?;
+        let unit = |name: &str| options.unit(name).map(str::to_owned);
+        let effect = |one| EffectRow::of(one, unit(&one.parameter), &fit);
+        let curves = draw(&self, &fit);
+        let report = PopulationReport {
+            model: options.family().key(),
+            method: request.method,
+            rounds: self.rounds.map(|one| one.rounds),
+            sessions: study.sessions.len(),
+            levels: LevelRow::all(study),
+            effects: fit.effects.iter().map(effect).collect(),
+            comparisons: questions::comparisons(&self.design, study, &fit),
+            standard_deviations: DeviationRow::all(&fit),
+            groups: fit.groups.clone(),
+            influence: influence.transpose()?,
+            plan,
+            not_fitted: self.not_fitted,
+            notes: notes(&self.design, &self.table, self.rounds, fit.is_bounded),
+        };
+        Ok(Population { report, study: self.study, fit, curves })
+    }
 }
 
 /// The results of sessions that have one; the others leave the table with their reasons.
@@ -193,13 +274,16 @@ fn notes(
     notes
 }
 
-fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, PopulationError> {
-    let known = request.recipe.options.body_names();
-    if request.parameters.is_empty() {
+fn parameter_names(
+    options: &FitOptions,
+    parameters: &[String],
+) -> Result<Vec<String>, PopulationError> {
+    let known = options.body_names();
+    if parameters.is_empty() {
         return Ok(known.into_iter().map(str::to_owned).collect());
     }
     let mut names = BTreeSet::new();
-    for name in request.parameters {
+    for name in parameters {
         if !known.contains(&name.as_str()) {
             let (name, known) = (name.clone(), known.join(", "));
             return Err(PopulationError::Parameter(FitError::UnknownParameter { name, known }));
@@ -208,7 +292,7 @@ fn parameter_names(request: &PopulationRequest<'_>) -> Result<Vec<String>, Popul
             return Err(PopulationError::ParameterTwice { name: name.clone() });
         }
     }
-    Ok(request.parameters.to_vec())
+    Ok(parameters.to_vec())
 }
 
 /// The likelihoods of all sessions. A parameter that has none in one of them is refused: without that session the

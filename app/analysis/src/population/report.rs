@@ -2,9 +2,13 @@
 
 use super::PopulationMethod;
 use super::design::MEAN;
+pub(super) use super::questions::ComparisonRow;
+use super::questions::{InfluenceReport, PlanReport};
 use crate::report::text::{counted, table};
 use palpate_figures::uncertain::significant;
-use palpate_population::{EffectEstimate, GroupShift, LevelDeviation, Study};
+use palpate_population::{
+    EffectEstimate, GroupShift, Influence, LevelDeviation, PlannedStudy, PopulationFit, Study,
+};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -23,8 +27,16 @@ pub struct PopulationReport {
     pub levels: Vec<LevelRow>,
     pub effects: Vec<EffectRow>,
     pub standard_deviations: Vec<DeviationRow>,
+    /// Differences between any two values of an entry that has three or more.
+    pub comparisons: Vec<ComparisonRow>,
     /// How far each group is from the one that it belongs to, in logarithms.
     pub groups: Vec<GroupShift>,
+    /// What the population is without each group, where that was wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub influence: Option<InfluenceReport>,
+    /// What studies of other sizes would find, where that was wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanReport>,
     /// Sessions that could not be fitted, with the reason.
     pub not_fitted: BTreeMap<String, String>,
     pub notes: Vec<String>,
@@ -66,11 +78,17 @@ pub struct EffectRow {
     pub factor_interval: [f64; 2],
     /// Probability of an effect as far from a factor of one, or farther, if there were none; none of a mean.
     pub p_value: Option<f64>,
+    /// An effect over the standard deviation of one session in its group, all levels together (Westfall, Kenny & Judd, Journal
+    /// of Experimental Psychology: General 143 (2014) 2020-2045); none of a mean, or where nothing varies.
+    pub effect_size: Option<f64>,
 }
 
 impl EffectRow {
-    pub(super) fn of(estimate: &EffectEstimate, unit: Option<String>) -> Self {
-        let is_mean = estimate.effect == MEAN;
+    pub(super) fn of(estimate: &EffectEstimate, unit: Option<String>, fit: &PopulationFit) -> Self {
+        let is_mean = is_mean(&estimate.effect);
+        let own = fit.standard_deviations.iter();
+        let own = own.filter(|one| one.parameter == estimate.parameter);
+        let whole = own.map(|one| one.value.powi(2)).sum::<f64>().sqrt();
         Self {
             effect: estimate.effect.clone(),
             parameter: estimate.parameter.clone(),
@@ -82,16 +100,12 @@ impl EffectRow {
             factor: estimate.value.exp(),
             factor_interval: estimate.interval.map(f64::exp),
             p_value: (!is_mean).then_some(estimate.p_value),
+            effect_size: (!is_mean && whole > 0.0).then_some(estimate.value / whole),
         }
     }
 
-    fn cells(&self) -> Vec<String> {
+    pub(super) fn cells(&self) -> Vec<String> {
         let [low, high] = self.factor_interval.map(|end| significant(end, 4));
-        let p_value = match self.p_value {
-            None => "-".to_owned(),
-            Some(p) if p < 0.001 => "< 0.001".to_owned(),
-            Some(p) => format!("{p:.3}"),
-        };
         let unit = self.unit.as_deref().unwrap_or_default();
         vec![
             self.parameter.clone(),
@@ -99,7 +113,8 @@ impl EffectRow {
             format!("{} {unit}", significant(self.factor, 4)).trim_end().to_owned(),
             format!("{low} to {high}"),
             format!("{:.1}", self.freedom),
-            p_value,
+            self.p_value.map_or("-".to_owned(), probability),
+            self.effect_size.map_or("-".to_owned(), |size| format!("{size:.2}")),
         ]
     }
 }
@@ -111,15 +126,37 @@ pub struct DeviationRow {
     pub estimate: LevelDeviation,
     /// Coefficient of variation of the parameter: standard deviation over mean of a log-normal distribution.
     pub coefficient_of_variation: f64,
+    /// Intraclass correlation: of two sessions of one group of this level. None of sessions.
+    pub intraclass_correlation: Option<f64>,
+    /// The factor that 95 % of pairs of sessions stay below whose groups differ from this level inwards, without the noise of
+    /// their curves: of sessions the repeatability limit (ISO 5725-6:1994, 4.1.4).
+    pub pair_factor: f64,
 }
 
+/// Differences of two sessions that 95 % stay below, in standard deviations of one.
+const PAIR: f64 = 1.96 * std::f64::consts::SQRT_2;
+
 impl DeviationRow {
-    pub(super) fn of(estimate: &LevelDeviation) -> Self {
-        let coefficient_of_variation = estimate.value.powi(2).exp_m1().sqrt();
-        Self { estimate: estimate.clone(), coefficient_of_variation }
+    /// All levels and parameters of a population.
+    pub(super) fn all(fit: &PopulationFit) -> Vec<Self> {
+        let last = fit.standard_deviations.last().map(|one| one.level.clone());
+        let row = |(place, estimate): (usize, &LevelDeviation)| {
+            let own = |one: &&LevelDeviation| one.parameter == estimate.parameter;
+            let (outer, inner) = fit.standard_deviations.split_at(place);
+            let inner = inner.iter().filter(own).map(|one| one.value.powi(2)).sum::<f64>();
+            let shared = outer.iter().filter(own).map(|one| one.share).sum::<f64>();
+            let is_last = last.as_ref() == Some(&estimate.level);
+            Self {
+                estimate: estimate.clone(),
+                coefficient_of_variation: estimate.value.powi(2).exp_m1().sqrt(),
+                intraclass_correlation: (!is_last).then_some(shared + estimate.share),
+                pair_factor: (PAIR * inner.sqrt()).exp(),
+            }
+        };
+        fit.standard_deviations.iter().enumerate().map(row).collect()
     }
 
-    fn cells(&self) -> Vec<String> {
+    pub(super) fn cells(&self) -> Vec<String> {
         let percent = |value: f64| format!("{:.1} %", 100.0 * value);
         let end = |end: Option<f64>| end.map_or("open".to_owned(), percent);
         let [low, high] = self.estimate.interval;
@@ -129,34 +166,150 @@ impl DeviationRow {
             percent(self.estimate.value),
             format!("{} to {}", end(low), end(high)),
             percent(self.estimate.share),
+            self.intraclass_correlation.map_or("-".to_owned(), |one| format!("{one:.2}")),
+            significant(self.pair_factor, 3),
         ]
     }
 }
 
+/// Whether an effect is what all sessions have.
+pub(super) fn is_mean(effect: &str) -> bool {
+    effect == MEAN
+}
+
+/// A probability in three digits.
+pub(super) fn probability(p: f64) -> String {
+    if p < 0.001 { "< 0.001".to_owned() } else { format!("{p:.3}") }
+}
+
+pub(super) const EFFECT_HEAD: &str = "parameter | mean or effect | median or factor | 95 % interval | degrees of freedom | p | effect size";
+pub(super) const DEVIATION_HEAD: &str = "parameter | between | standard deviation | 95 % interval | share of variance | ICC | 95 % of pairs within";
+
+pub(super) const COMPARISON_HEAD: &str =
+    "parameter | comparison | factor | 95 % interval | p of Holm";
+
+/// Groups that are printed of those left out in turn.
+const INFLUENTIAL: usize = 5;
+
 impl PopulationReport {
-    /// Tables of means and effects and of standard deviations, then notes.
+    /// Tables of means and effects and of standard deviations, of what else was wanted, then notes.
     #[must_use]
     pub fn text(&self) -> String {
         let groups = self.levels.iter().map(|one| counted(one.groups, &one.level));
-        let mut text = format!("{}: {}\n\n", self.model, groups.collect::<Vec<_>>().join(", "));
-        let head = "parameter | mean or effect | median or factor | 95 % interval | degrees of freedom | p";
-        text += &table(head, self.effects.iter().map(EffectRow::cells));
-        text.push_str("\n\n");
-        let head = "parameter | between | standard deviation | 95 % interval | share of variance";
-        text += &table(head, self.standard_deviations.iter().map(DeviationRow::cells));
-        for row in self.standard_deviations.iter().filter(|row| row.estimate.is_zero) {
+        let mut parts = vec![format!("{}: {}", self.model, groups.collect::<Vec<_>>().join(", "))];
+        parts.push(table(EFFECT_HEAD, self.effects.iter().map(EffectRow::cells)));
+        if !self.comparisons.is_empty() {
+            let rows = self.comparisons.iter().map(ComparisonRow::cells);
+            parts.push(table(COMPARISON_HEAD, rows));
+        }
+        let rows = self.standard_deviations.iter().map(DeviationRow::cells);
+        parts.push(table(DEVIATION_HEAD, rows));
+        parts.extend(self.influence_text());
+        parts.extend(self.plan_text());
+        let remarks = self.remarks();
+        if !remarks.is_empty() {
+            parts.push(remarks.join("\n"));
+        }
+        parts.join("\n\n")
+    }
+
+    /// What is said of the numbers, a sentence each.
+    #[must_use]
+    pub fn remarks(&self) -> Vec<String> {
+        let zero = self.standard_deviations.iter().filter(|row| row.estimate.is_zero);
+        let zero = zero.map(|row| {
             let LevelDeviation { parameter, level, .. } = &row.estimate;
-            let _ = write!(
+            format!(
+                "{parameter}: no differences between {level}s are seen; that is not proof of none"
+            )
+        });
+        let not_fitted = self.not_fitted.iter();
+        let not_fitted =
+            not_fitted.map(|(session, reason)| format!("{session} was not fitted: {reason}"));
+        let largest = self.parameters().filter_map(|parameter| self.dominant_level(parameter));
+        zero.chain(largest).chain(not_fitted).chain(self.notes.iter().cloned()).collect()
+    }
+
+    pub(super) fn parameters(&self) -> impl Iterator<Item = &str> {
+        let means = self.effects.iter().filter(|one| is_mean(&one.effect));
+        means.map(|one| one.parameter.as_str())
+    }
+
+    /// The level that has most of the variance, where it is more than half.
+    fn dominant_level(&self, parameter: &str) -> Option<String> {
+        let own = self.standard_deviations.iter().map(|row| &row.estimate);
+        let mut own = own.filter(|one| one.parameter == parameter);
+        let most = own.find(|one| one.share > 0.5)?;
+        let LevelDeviation { level, share, .. } = most;
+        let percent = 100.0 * share;
+        Some(format!("{parameter}: {percent:.0} % of the variance lie between {level}s"))
+    }
+
+    pub(super) fn plan_text(&self) -> Option<String> {
+        self.plan.as_ref().map(PlanReport::text)
+    }
+
+    pub(super) fn influence_text(&self) -> Option<String> {
+        let report = self.influence.as_ref()?;
+        let row = |one: &Influence| {
+            let changes = one.changes.iter().enumerate();
+            let most = changes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+            let (place, change) = most.map_or((0, 0.0), |(place, change)| (place, *change));
+            let whole = &self.effects[place];
+            vec![
+                format!("{} {}", one.level, one.group),
+                format!("{} of {}", whole.effect, whole.parameter),
+                significant(whole.factor, 4),
+                significant(one.effects[place].exp(), 4),
+                format!("{change:+.2}"),
+            ]
+        };
+        let head = "left out | changes most | with it | without it | in standard errors";
+        let mut text = table(head, report.groups.iter().take(INFLUENTIAL).map(row));
+        for (group, reason) in &report.impossible {
+            let _ = write!(text, "\nwithout {group}: {reason}");
+        }
+        Some(text)
+    }
+}
+
+impl ComparisonRow {
+    pub(super) fn cells(&self) -> Vec<String> {
+        let mut cells = self.difference.cells();
+        cells.truncate(4);
+        cells.push(probability(self.adjusted_p));
+        cells
+    }
+}
+
+impl PlanReport {
+    fn text(&self) -> String {
+        // The means and effects of all parameters would be too wide: the widest decides.
+        let row = |one: &PlannedStudy| {
+            let widest = one.effects.iter().max_by(|a, b| a.half_width.total_cmp(&b.half_width));
+            let widest = widest.map_or("-".to_owned(), |one| {
+                let percent = 100.0 * one.half_width.exp_m1();
+                format!("{percent:.0} % ({} of {})", one.effect, one.parameter)
+            });
+            let effects = one.effects.iter().filter(|one| !is_mean(&one.effect));
+            let power = effects.map(|one| one.power).reduce(f64::min);
+            let counts = one.counts.iter().map(usize::to_string).collect::<Vec<_>>();
+            let power = power.map_or("-".to_owned(), |power| format!("{:.0} %", 100.0 * power));
+            vec![counts.join(" x "), one.sessions.to_string(), widest, power]
+        };
+        let levels = self.levels.join(" x ");
+        let head = format!("{levels} | sessions | widest interval, up or down by | smallest power");
+        let mut text = table(&head, self.studies.iter().map(row));
+        let wanted = significant(self.wanted_percent, 3);
+        let _ = match self.smallest() {
+            Some(one) => write!(
                 text,
-                "\n{parameter}: no differences between {level}s are seen; that is not proof of none"
-            );
-        }
-        for (session, reason) in &self.not_fitted {
-            let _ = write!(text, "\n{session} was not fitted: {reason}");
-        }
-        for note in &self.notes {
-            let _ = write!(text, "\n{note}");
-        }
+                "\nthe smallest study in which no interval is wider than {wanted} % has {} ({} sessions)",
+                counted(one.counts[0], &self.levels[0]),
+                one.sessions
+            ),
+            None => write!(text, "\nno study of these sizes has intervals of {wanted} % or less"),
+        };
         text
     }
 }

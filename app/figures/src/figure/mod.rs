@@ -60,6 +60,8 @@ pub enum AxisScale {
     Linear,
     /// By their logarithm; a number that has none is drawn as the least there is.
     Logarithmic,
+    /// Evenly, without numbers: rows whose points have names.
+    Rows,
 }
 
 /// A number at or below zero is drawn here on a logarithmic axis; nothing measured or computed is so small.
@@ -70,7 +72,7 @@ impl AxisScale {
     #[must_use]
     pub fn place(self, value: f64) -> f64 {
         match self {
-            Self::Linear => value,
+            Self::Linear | Self::Rows => value,
             Self::Logarithmic => value.max(LEAST).log10(),
         }
     }

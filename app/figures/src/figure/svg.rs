@@ -30,8 +30,7 @@ impl Plot {
             AxisNames::Upright => "",
         };
         let look = AxisColours { text: LIGHT.text_quiet, grid: LIGHT.line };
-        let scales = [self.x.scale, self.y.scale].map(|scale| scale == AxisScale::Logarithmic);
-        panel.scaled_axes(svg, [x_name, &self.y.name], scales, look);
+        panel.scaled_axes(svg, [x_name, &self.y.name], [self.x.scale, self.y.scale], look);
         for band in &self.bands {
             let [lower, upper] = band.edges.each_ref().map(|edge| self.placed(&panel, edge));
             if !upper.is_empty() {
@@ -58,7 +57,7 @@ impl Plot {
         let [left, right] = match (self.x.range, self.x.scale) {
             (Some(range), scale) => range.map(|x| scale.place(x)),
             (None, AxisScale::Logarithmic) => PlotPanel::around_logarithms(place, &placed).x,
-            (None, AxisScale::Linear) => {
+            (None, AxisScale::Linear | AxisScale::Rows) => {
                 let ends = range(placed.iter().map(|point| point[0]));
                 ends.filter(|[low, high]| low < high).unwrap_or([0.0, 1.0])
             }
@@ -69,7 +68,9 @@ impl Plot {
         let all: Vec<[f64; 2]> = placed.iter().copied().chain(seen).collect();
         let y = match (self.y.range, self.y.scale) {
             (Some(range), scale) => range.map(|y| scale.place(y)),
-            (None, AxisScale::Linear) => PlotPanel::around(place, [left, right], &[&all]).y,
+            (None, AxisScale::Linear | AxisScale::Rows) => {
+                PlotPanel::around(place, [left, right], &[&all]).y
+            }
             (None, AxisScale::Logarithmic) => PlotPanel::around_logarithms(place, &all).y,
         };
         PlotPanel { place, x: [left, right], y }

@@ -96,6 +96,9 @@ fn show(
     if let Some(text) = look.x_text {
         drawn = drawn.x_axis_formatter(move |mark, _| text(mark.value));
     }
+    if plot.y.scale == AxisScale::Rows {
+        drawn = drawn.y_axis_formatter(|_, _| String::new());
+    }
     if plot.y.scale == AxisScale::Logarithmic {
         drawn = drawn
             .y_grid_spacer(decades)

@@ -124,6 +124,21 @@ impl FitReport {
         })
     }
 
+    /// The same with other values of some parameters, in their units, such as contact in mm; names that it lacks change nothing.
+    #[must_use]
+    pub fn with_values<'n>(mut self, values: impl IntoIterator<Item = (&'n str, f64)>) -> Self {
+        for (name, value) in values {
+            if let Some(place) = self.parameters.iter().position(|one| one.name == name) {
+                self.parameters[place].value = value;
+                // The nonlinear ones come first.
+                if let Some(outer) = self.body.outer.get_mut(place) {
+                    *outer = value;
+                }
+            }
+        }
+        self
+    }
+
     /// The modelled force in N at each sample, along the depth of the samples; their forces are
     /// not used. NaN from where depths or times are not finite or times do not increase.
     pub fn predict(&self, samples: &[FitSample]) -> Vec<Newtons> {
