@@ -6,7 +6,7 @@ use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
-use palpate_analysis::fit::{FitChoice, FitRecipe};
+use palpate_analysis::fit::{FitChoice, FitRecipe, StoredFitError};
 use palpate_analysis::population::{
     PopulationError, PopulationMethod, PopulationRequest, population, write_results,
 };
@@ -112,6 +112,7 @@ pub(super) fn recipe(
 pub(super) fn failure(err: PopulationError) -> Failure {
     match err {
         PopulationError::Read(err) => study::failure(err),
+        PopulationError::Stored(StoredFitError::Lake(_)) => Failure::failed(err),
         PopulationError::Design(_)
         | PopulationError::Parameter(_)
         | PopulationError::ParameterTwice { .. }

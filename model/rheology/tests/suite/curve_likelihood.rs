@@ -119,7 +119,7 @@ fn statistics_of_a_fit_are_its_likelihood_at_the_best_values() {
     for memory in [0.0, 0.8] {
         let samples = record(memory);
         let mut options = FitOptions::default();
-        options.fix("mu2", 0.0).unwrap();
+        options.fix("mu2", ModifiedKelvin::THESIS.mu[1]).unwrap();
         let solution = FitSolution::of(&samples, &options).unwrap();
         let text = serde_json::to_string(&LogarithmStatistics::of(&solution, 0)).unwrap();
         let stored: LogarithmStatistics = serde_json::from_str(&text).unwrap();
