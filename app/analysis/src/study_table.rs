@@ -10,8 +10,7 @@ use palpate_model::metadata::{
 };
 use palpate_protocols::plans::Plan;
 use palpate_sessions::{DataQuality, Edits, Manifest, SessionSummary};
-use palpate_tables::lake::{LakeError, LakeSession, is_lake, list_sessions, read_manifest};
-use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use palpate_tables::lake::{LakeError, is_lake, list_sessions, read_manifest};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -143,16 +142,9 @@ pub fn read_study(paths: &[PathBuf]) -> Result<StudyTable, StudyReadError> {
     };
     match paths {
         [lake] if is_lake(lake) => {
-            let read = |one: LakeSession| {
+            for one in list_sessions(lake)? {
                 let (manifest, rejection) = read_manifest(lake, &one)?;
-                Ok((one.id, manifest, rejection.is_some()))
-            };
-            // By all threads: of many sessions this takes longer than their population does.
-            let read: Vec<Result<_, LakeError>> =
-                list_sessions(lake)?.into_par_iter().map(read).collect();
-            for one in read {
-                let (id, manifest, is_rejected) = one?;
-                take(id, manifest, is_rejected);
+                take(one.id, manifest, rejection.is_some());
             }
         }
         paths => {
