@@ -1,7 +1,7 @@
 //! `palpate population`: means, effects and standard deviations of the parameters of a study.
 
 use super::arguments::positive;
-use super::fit::{jobs, lake::hash_file};
+use super::fit::jobs;
 use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
@@ -59,8 +59,6 @@ pub struct PopulationArgs {
 pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("folder", args.out.as_deref())?;
     let recipe = recipe(args.family.clone(), args.compliance.as_deref())?;
-    // A stored fit knows its compliance by the file alone.
-    let compliance = args.compliance.as_deref().filter(|_| args.stored);
     let request = PopulationRequest {
         paths: &args.sources,
         recipe: &recipe,
@@ -72,7 +70,6 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
             (true, false) => PopulationMethod::TwoStage,
             (true, true) => PopulationMethod::Stored,
         },
-        compliance_sha256: compliance.map(hash_file).transpose()?,
         is_drawn: args.out.is_some(),
         is_influence_wanted: args.influence,
         wanted_percent: args.wanted,

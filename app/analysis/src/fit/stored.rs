@@ -1,7 +1,10 @@
 //! What the fits of a lake say of their sessions' parameters, read back without the curves.
 
+use super::FitRecipe;
 use super::lake::{FIT_VERSION, lake_model};
-use palpate_rheology::fit::{FitOptions, LogarithmStatistics};
+use crate::compliance::ComplianceCorrectionError;
+use palpate_rheology::fit::LogarithmStatistics;
+use palpate_sessions::text::sha256_of_file;
 use palpate_tables::lake::{
     LakeError, LakeResult, StoredFitFile, list_models, model_folder, read_fit,
 };
@@ -13,6 +16,8 @@ use thiserror::Error;
 pub enum StoredFitError {
     #[error(transparent)]
     Lake(#[from] LakeError),
+    #[error(transparent)]
+    Compliance(#[from] ComplianceCorrectionError),
     #[error(
         "only a lake stores the statistics of its fits; give one lake, or read the curves of these sessions"
     )]
@@ -79,13 +84,13 @@ pub struct StoredFits<'a> {
 }
 
 impl<'a> StoredFits<'a> {
-    /// With raw depths, or with those corrected by the compliance whose file has this SHA-256.
-    pub fn of(
-        lake: &'a Path,
-        options: &FitOptions,
-        compliance_sha256: Option<String>,
-    ) -> Result<Self, StoredFitError> {
-        let model = lake_model(options);
+    /// Those that a recipe would make.
+    pub fn of(lake: &'a Path, recipe: &FitRecipe) -> Result<Self, StoredFitError> {
+        let model = lake_model(&recipe.options);
+        let compliance = recipe.corrections.file()?.map(|path| {
+            sha256_of_file(path).map_err(|source| LakeError::Io { path: path.into(), source })
+        });
+        let compliance_sha256 = compliance.transpose()?;
         let known = list_models(lake, LakeResult::Fit)?;
         if known.is_empty() {
             return Err(StoredFitError::NoFits);

@@ -66,8 +66,6 @@ pub struct PopulationRequest<'a> {
     /// Entries of sessions that may move the mean.
     pub effects: &'a [String],
     pub method: PopulationMethod,
-    /// SHA-256 of the file of the compliance that stored fits must have, as the corrections of the recipe have it.
-    pub compliance_sha256: Option<String>,
     /// Whether each group is left out in turn.
     pub is_influence_wanted: bool,
     /// Whether curves for figures are kept, where the population has all parameters of the model.

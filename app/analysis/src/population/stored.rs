@@ -17,7 +17,7 @@ pub(super) fn read_stored(
         [lake] if is_lake(lake) => lake,
         _ => return Err(StoredFitError::NoLake.into()),
     };
-    let fits = StoredFits::of(lake, &request.recipe.options, request.compliance_sha256.clone())?;
+    let fits = StoredFits::of(lake, request.recipe)?;
     let found = workers.all("fits", &table.rows, |row| fits.statistics(&row.session))?;
     let found = found.into_iter().map(|one| {
         let one = one?;
