@@ -148,6 +148,10 @@ pub enum ComplianceCorrectionError {
     )]
     NoRig,
     #[error(
+        "the compliance in force differs between rigs and computers, and a stored fit has that of one file; give a compliance file"
+    )]
+    NoOneFile,
+    #[error(
         "{id} is the compliance of rig {of}, but the record is from rig {rig}; give a compliance of rig {rig}"
     )]
     OtherRig { id: String, of: String, rig: String },
@@ -196,6 +200,15 @@ impl ComplianceCorrections {
             CorrectionChoice::This(Box::new(shelf.find(name)?.clone()))
         };
         Ok(Self { choice, shelf })
+    }
+
+    /// The file of the compliance that corrects depths; `None` where they stay raw.
+    pub fn file(&self) -> Result<Option<&Path>, ComplianceCorrectionError> {
+        match &self.choice {
+            CorrectionChoice::Raw => Ok(None),
+            CorrectionChoice::InForce => Err(ComplianceCorrectionError::NoOneFile),
+            CorrectionChoice::This(stored) => Ok(Some(&stored.path)),
+        }
     }
 
     /// The document for a record of a rig, and whether depths are corrected with it; a table has no rig.

@@ -6,7 +6,7 @@ use super::new_file;
 use super::output::Output;
 use super::{Failure, compliance, study};
 use clap::Args;
-use palpate_analysis::fit::FitRecipe;
+use palpate_analysis::fit::{FitRecipe, StoredFitError};
 use palpate_analysis::population::{
     PopulationError, PopulationMethod, PopulationReport, PopulationRequest, SavePopulationError,
     check_new_name, population, save_population, study_recipe, write_results,
@@ -37,6 +37,9 @@ pub struct PopulationArgs {
     /// Take each session's best values and their covariance instead of its curve
     #[arg(long)]
     two_stage: bool,
+    /// Take these values and covariances from the fits that the lake stores, and read no curve
+    #[arg(long, requires = "two_stage")]
+    stored: bool,
     /// Leave each group and session out in turn, and print on which of them the population rests
     #[arg(long)]
     influence: bool,
@@ -67,7 +70,11 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
         parameters: &args.parameters,
         levels: &args.by,
         effects: &args.effect,
-        method: if args.two_stage { PopulationMethod::TwoStage } else { PopulationMethod::Curves },
+        method: match (args.two_stage, args.stored) {
+            (false, _) => PopulationMethod::Curves,
+            (true, false) => PopulationMethod::TwoStage,
+            (true, true) => PopulationMethod::Stored,
+        },
         is_drawn: args.out.is_some(),
         is_influence_wanted: args.influence,
         wanted_percent: args.wanted,
@@ -136,10 +143,12 @@ pub(super) fn recipe(
 pub(super) fn failure(err: PopulationError) -> Failure {
     match err {
         PopulationError::Read(err) => study::failure(err),
+        PopulationError::Stored(StoredFitError::Lake(_)) => Failure::failed(err),
         PopulationError::Design(_)
         | PopulationError::Parameter(_)
         | PopulationError::ParameterTwice { .. }
-        | PopulationError::InSession { .. } => Failure::usage(err),
+        | PopulationError::InSession { .. }
+        | PopulationError::Stored(_) => Failure::usage(err),
         err => Failure::failed(err),
     }
 }

@@ -31,6 +31,7 @@ mod records;
 mod report;
 mod scene;
 mod select;
+mod stored_population;
 mod study;
 mod support;
 mod support_bundle;

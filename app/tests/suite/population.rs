@@ -12,7 +12,7 @@ const STIFFNESS: [(&str, &str, [u32; 2]); 4] = [
 ];
 
 /// Two presses on each specimen.
-pub fn record_study(at: &Path) {
+pub(crate) fn record_study(at: &Path) {
     for (animal, treatment, stiffness) in STIFFNESS {
         for (specimen, percent) in stiffness.iter().enumerate() {
             for repeat in 1..=2 {

@@ -17,6 +17,16 @@ pub struct CurveEvidence {
 }
 
 impl CurveEvidence {
+    /// Of a covariance by its rows, whose halves differ by rounding.
+    #[must_use]
+    pub fn of_rows(centre: Vec<f64>, rows: &[Vec<f64>]) -> Self {
+        let count = centre.len();
+        let covariance = DMatrix::from_fn(count, count, |row, column| {
+            0.5 * (rows[row][column] + rows[column][row])
+        });
+        Self { centre, covariance }
+    }
+
     /// The evidence of a session; `None` where the covariance is none.
     #[must_use]
     pub fn evidence(&self) -> Option<Evidence> {

@@ -1,13 +1,13 @@
 //! Means, effects and standard deviations of a population, and how well they are known.
 
 use crate::likelihood::{ShiftEstimate, SpreadFactor};
+use crate::profile::Profile;
 use crate::search::{Coordinates, Criterion, Optimum};
 use crate::study::{NestedStudy, Study, StudyError};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use palpate_model::estimate::student_t975;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, StudentsT};
-use std::cell::RefCell;
 
 /// A standard deviation below this share of the scatter of the values is zero.
 const ZERO: f64 = 1e-4;
@@ -17,12 +17,6 @@ const SLOPE_STEP: f64 = 1e-5;
 const FREEDOM_MAX: f64 = 1e9;
 /// Coverage probability of every interval.
 pub const COVERAGE: f64 = 0.95;
-/// How often the place where the upper end of an interval is looked for grows by half: to more than a billion scales.
-const ENDS_MAX: i32 = 60;
-/// The smallest place where it is looked for, over the scale.
-const END_MIN: f64 = 0.1;
-/// An end of an interval is right to this share of itself: three digits are printed.
-const END_TOLERANCE: f64 = 1e-3;
 
 /// What a mean or an effect is known to be.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -280,27 +274,8 @@ impl Fitter<'_> {
     fn interval(&self, level: usize, parameter: usize) -> [Option<f64>; 2] {
         let kept = self.coordinates().place(level, parameter);
         let limit = ChiSquared::new(1.0).map_or(f64::NAN, |one| one.inverse_cdf(COVERAGE));
-        let lowest = self.optimum.evaluation.criterion;
-        // Each place starts from the one before.
-        let start = RefCell::new(self.optimum.at.clone());
-        let rise = |value: f64| {
-            let mut start = start.borrow_mut();
-            start[kept] = value;
-            match self.criterion.profile(&start, kept, &self.optimum.curvature) {
-                Some((criterion, at)) => {
-                    *start = at;
-                    criterion - lowest - limit
-                }
-                None => f64::INFINITY,
-            }
-        };
-        let best = self.optimum.at[kept].abs();
-        let low = if rise(0.0) <= 0.0 { Some(0.0) } else { crossing(0.0, best, rise) };
-        start.borrow_mut().clone_from(&self.optimum.at);
-        let outwards = (1..ENDS_MAX).map(|k| best.max(END_MIN) * 1.5f64.powi(k));
-        let outside = outwards.into_iter().find(|value| rise(*value) > 0.0);
-        let high = outside.and_then(|outside| crossing(outside, best, rise));
-        [low, high].map(|end| end.map(|end| end * self.coordinates().scales[parameter]))
+        let ends = Profile::of(&self.criterion, &self.optimum, kept, limit).ends();
+        ends.map(|end| end.map(|end| end * self.coordinates().scales[parameter]))
     }
 
     fn groups(&self, shifts: &[Vec<ShiftEstimate>]) -> Vec<GroupShift> {
@@ -336,34 +311,6 @@ pub(crate) fn quantile(student: &StudentsT) -> f64 {
     (0..steps).fold(student_t975(freedom), |at, _| {
         at - (student.cdf(at) - (0.5 + 0.5 * COVERAGE)) / student.pdf(at)
     })
-}
-
-/// Where a function changes sign between a point where it is above zero and one where it is not, by the secant with halving of
-/// the end that stays (the Illinois method of Dowell & Jarratt, BIT 11 (1971) 168-174).
-fn crossing(outside: f64, inside: f64, of: impl Fn(f64) -> f64) -> Option<f64> {
-    let (mut above, mut below) = ((outside, of(outside)), (inside, of(inside)));
-    let mut before = None;
-    for _ in 0..60 {
-        let (width, size) = (above.0 - below.0, above.0.abs().max(below.0.abs()));
-        if width.abs() <= END_TOLERANCE * size {
-            return Some(0.5 * (above.0 + below.0));
-        }
-        let share = if above.1.is_finite() { below.1 / (below.1 - above.1) } else { 0.5 };
-        // Not nearer to an end than half of the tolerance, so that both ends close in.
-        let edge = 0.5 * END_TOLERANCE * size / width.abs();
-        let middle = below.0 + share.clamp(edge, 1.0 - edge) * width;
-        let value = of(middle);
-        // An end that stays twice counts half.
-        let side = Some(value > 0.0);
-        let share = if side == before { 0.5 } else { 1.0 };
-        if value > 0.0 {
-            (above, below.1) = ((middle, value), share * below.1);
-        } else {
-            (below, above.1) = ((middle, value), share * above.1);
-        }
-        before = side;
-    }
-    None
 }
 
 #[cfg(test)]

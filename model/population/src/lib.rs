@@ -15,6 +15,7 @@ mod fit;
 mod influence;
 mod likelihood;
 mod plan;
+mod profile;
 mod scores;
 mod search;
 mod study;

@@ -309,6 +309,23 @@ fn intervals_of_a_balanced_study_are_those_of_its_mean_squares() {
     }
 }
 
+#[test]
+fn both_ends_of_an_interval_are_where_the_profile_of_the_mean_squares_has_risen() {
+    let squares = [6.0, 1.0, 0.8];
+    let options = PopulationOptions { has_deviation_intervals: true, ..Default::default() };
+    let fit = fit_population(&balanced(squares[0], squares[1], squares[2]), &options).unwrap();
+    let lowest = (0..4000).map(|k| profile_of_animals(squares, f64::from(k) * 2.5e-4));
+    let lowest = lowest.fold(f64::INFINITY, f64::min);
+    let animals = &fit.standard_deviations[0];
+    let ends = animals.interval.map(Option::unwrap);
+    assert!(0.0 < ends[0] && ends[0] < animals.value && animals.value < ends[1], "{animals:?}");
+    for end in ends {
+        // An end is right to a thousandth of itself, over which the profile rises by less than this.
+        let rise = profile_of_animals(squares, end * end) - lowest;
+        assert!((rise - 3.841_459).abs() < 0.02, "{end} {rise}");
+    }
+}
+
 /// A difference of two treatments is the effect of one of them in a design whose first treatment is the other one.
 #[test]
 fn a_contrast_is_the_effect_of_another_first_value() {

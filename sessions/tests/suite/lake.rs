@@ -6,7 +6,7 @@ use palpate_sessions::{EntryKind, LogEntry, Session, SessionOutline};
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
     FitFile, FitState, LakeAddition, LakeError, LakeQuality, LakeResult, add_session, find_fit,
-    is_lake, list_sessions, read_session, store_fit,
+    is_lake, list_models, list_sessions, read_fit, read_session, store_fit,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -167,6 +167,12 @@ fn a_fit_is_kept_once_and_made_with_other_settings_refused() {
     assert_eq!(find_fit(&file).unwrap(), FitState::Missing);
     store_fit(&file, &serde_json::json!({"r2": 0.5})).unwrap();
     assert_eq!(find_fit(&file).unwrap(), FitState::There);
+    let read = |model: &str| read_fit::<serde_json::Value>(file.lake, model, file.session_id);
+    let stored = read("kelvin/3").unwrap().unwrap();
+    assert_eq!((&stored.settings, &stored.fit), (&settings, &serde_json::json!({"r2": 0.5})));
+    assert!(read("kelvin").unwrap().is_none());
+    assert_eq!(list_models(file.lake, LakeResult::Fit).unwrap(), ["kelvin%2F3"]);
+    assert!(list_models(file.lake, LakeResult::Modulus).unwrap().is_empty());
     let path = folder.path().join("v1/fits/model=kelvin%2F3/20260305T141507Z-0badcafe.json");
     assert_eq!(files(folder.path()), [path]);
     let other = FitFile { settings: &others, ..file };

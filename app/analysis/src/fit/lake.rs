@@ -7,7 +7,7 @@ use crate::material::MaterialError;
 use crate::pool::{WorkEvent, WorkFailure, in_order};
 use crate::recordings::recovered_originals_note;
 use crate::source;
-use palpate_rheology::fit::{FitReport, SystematicUncertainty};
+use palpate_rheology::fit::{FitOptions, FitReport, LogarithmStatistics, SystematicUncertainty};
 use palpate_sessions::recover::recovered_id;
 use palpate_tables::export::ExportError;
 use palpate_tables::lake::{
@@ -24,6 +24,8 @@ use thiserror::Error;
 
 /// The folder of fits of the body that is fitted where no family is named.
 const MODEL: &str = "modified-kelvin";
+/// Version of the stored form, a setting of each fit: the second has the statistics of the parameters' logarithms.
+pub(super) const FIT_VERSION: u32 = 2;
 
 #[derive(Debug)]
 pub struct LakeFitRequest<'a> {
@@ -96,7 +98,16 @@ struct StoredFit<'a> {
     systematic: Option<&'a SystematicUncertainty>,
     #[serde(skip_serializing_if = "Option::is_none")]
     compliance: Option<&'a ComplianceCorrection>,
+    logarithms: &'a LogarithmStatistics,
     notes: &'a [String],
+}
+
+/// The key of a family's fits in a lake. Named or not, the modified Kelvin body is one, whose fits are in one folder.
+pub(super) fn lake_model(options: &FitOptions) -> String {
+    match options.family().key() {
+        key if key == "series-3" => MODEL.to_owned(),
+        key => key,
+    }
 }
 
 /// Fits the sessions. Once `is_ending` is set no fit is begun; asked again it goes on.
@@ -105,16 +116,11 @@ pub fn fit_lake(
     is_ending: &AtomicBool,
     hear: impl FnMut(LakeFitEvent<'_>),
 ) -> Result<LakeTally, LakeFitError> {
-    // Named or not, it is one body, whose fits are kept in one folder.
-    let key = request.recipe.options.family().key();
-    let model = match key.as_str() {
-        "series-3" => MODEL,
-        key => key,
-    };
-    let settings = request.settings(model);
+    let model = lake_model(&request.recipe.options);
+    let settings = request.settings(&model);
     let LakeFitRequest { lake, shard, jobs, .. } = *request;
-    let part = LakePart { lake, shard, jobs, model };
-    part.fit_each(is_ending, |one| request.fit_one(one, model, &settings), hear)
+    let part = LakePart { lake, shard, jobs, model: &model };
+    part.fit_each(is_ending, |one| request.fit_one(one, &model, &settings), hear)
 }
 
 /// Sessions of a lake to be fitted with a model or a law.
@@ -190,6 +196,7 @@ impl LakeFitRequest<'_> {
             report: &report,
             systematic: fitted.systematic.as_ref(),
             compliance: fitted.compliance.as_ref(),
+            logarithms: &fitted.logarithms,
             notes: &fitted.notes,
         };
         store_fit(&file, &stored)?;
@@ -204,7 +211,7 @@ impl LakeFitRequest<'_> {
             json!(words)
         };
         let mut settings = json!({
-            "software_version": env!("CARGO_PKG_VERSION"), "model": model,
+            "software_version": env!("CARGO_PKG_VERSION"), "fit_version": FIT_VERSION, "model": model,
             "fixed": sorted(self.fixed), "free": sorted(self.free),
             "systematic": self.recipe.is_systematic,
             "compliance_sha256": self.compliance_sha256,

@@ -4,12 +4,14 @@ mod choice;
 mod depths;
 mod lake;
 pub(crate) mod last;
+mod stored;
 mod together;
 
 pub use choice::{FitChoice, FitChoiceError};
 pub(crate) use lake::LakePart;
 pub use lake::{LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally, fit_lake};
 pub use last::{KnownFit, KnownFitError, is_poorly_identified, remember};
+pub use stored::{StoredFitError, StoredFits};
 pub use together::{JointFit, JointFitRequest, fit_together};
 
 use crate::compliance::{ComplianceCorrection, ComplianceCorrections};
@@ -21,7 +23,8 @@ use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty
 use palpate_model::units::Seconds;
 use palpate_rheology::fit::{
     self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample, FitSolution,
-    ProfileInterval, Signal, SignalRecord, SystematicUncertainty, TracedRecord,
+    LogarithmStatistics, ProfileInterval, Signal, SignalRecord, SystematicUncertainty,
+    TracedRecord,
 };
 use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
@@ -114,6 +117,8 @@ pub struct SourceFit {
     pub offset: Seconds,
     pub notes: Vec<String>,
     pub result: Result<FitReport, FitError>,
+    /// What a population needs of it; empty without a result.
+    pub logarithms: LogarithmStatistics,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
     /// The calibration its forces were read with; `None` for a table.
@@ -160,6 +165,8 @@ impl SourceFit {
             let richer = solution.richer_words(0, report);
             report.warnings.extend(richer);
         }
+        let logarithms = solution.as_ref().map(|one| LogarithmStatistics::of(one, 0));
+        let logarithms = logarithms.unwrap_or_default();
         let mut systematic = None;
         if let (Ok(solution), Ok(report), true) = (&solution, &mut result, is_systematic) {
             let origin = Origin::of(calibration.as_ref(), compliance.as_ref());
@@ -183,6 +190,7 @@ impl SourceFit {
             offset,
             notes,
             result,
+            logarithms,
             seconds,
             calibration,
             signal,

@@ -6,7 +6,7 @@ use crate::pool::{WorkEvent, WorkFailure, in_order};
 use crate::progress::Progress;
 use crate::source::{self, SourceError};
 use crate::study_table::{StudyRow, StudyTable};
-use palpate_population::{CurveEvidence, SymmetricMatrix};
+use palpate_population::CurveEvidence;
 use palpate_rheology::fit::{
     CurveLikelihood, FitError, FitOptions, FitSample, FitSolution, LikelihoodExpansion, Signal,
     SignalRecord,
@@ -69,12 +69,7 @@ impl Workers<'_> {
 }
 
 pub(super) fn curve_evidence(found: LikelihoodExpansion) -> CurveEvidence {
-    let count = found.centre.len();
-    // Rounding makes both halves differ.
-    let covariance = SymmetricMatrix::from_fn(count, count, |row, column| {
-        0.5 * (found.covariance[row][column] + found.covariance[column][row])
-    });
-    CurveEvidence { centre: found.centre, covariance }
+    CurveEvidence::of_rows(found.centre, &found.covariance)
 }
 
 /// The record of every row of the table, or why it has none.

@@ -10,6 +10,7 @@ mod report;
 mod results;
 mod saved;
 mod specimens;
+mod stored;
 
 pub use agreement::{
     AgreementFailure, AgreementReport, AgreementRequest, ParameterAgreement, PlaceDifference,
@@ -25,22 +26,25 @@ pub use saved::{PopulationOrigin, SavePopulationError, check_new_name, save_popu
 pub use specimens::{CurveKind, PopulationCurves};
 
 use crate::compliance::ComplianceCorrections;
-use crate::fit::{FitChoice, FitChoiceError, FitRecipe};
+use crate::fit::{FitChoice, FitChoiceError, FitRecipe, StoredFitError};
 use crate::progress::Progress;
 use crate::report::text::counted;
 use crate::source::{RecordStretch, SourceSelection};
-use crate::study_table::{StudyReadError, StudyTable, read_study};
+use crate::study_table::{StudyReadError, StudyRow, StudyTable, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
-    CurveEvidence, CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession,
-    expand_curves, fit_population,
+    CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession, expand_curves,
+    fit_population,
 };
-use palpate_rheology::fit::{CurveLikelihood, FitError, FitOptions, FitSolution, SignalRecord};
+use palpate_rheology::fit::{
+    CurveLikelihood, FitError, FitOptions, FitSolution, LikelihoodExpansion, SignalRecord,
+};
 use palpate_tables::lake::LakeError;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::PathBuf;
+use stored::read_stored;
 use thiserror::Error;
 
 /// How sessions enter.
@@ -52,6 +56,8 @@ pub enum PopulationMethod {
     Curves,
     /// Each with the values that fit it best and their covariance.
     TwoStage,
+    /// The same, as the fits of a lake stored them: no curve is read.
+    Stored,
 }
 
 /// How the sessions of a study are fitted: their loading and hold, by a family, or without one by the modified Kelvin model.
@@ -105,7 +111,9 @@ pub enum PopulationError {
     #[error("{name} is given twice as a parameter; give it once")]
     ParameterTwice { name: String },
     #[error("{session}: {reason}")]
-    InSession { session: String, reason: FitError },
+    InSession { session: String, reason: String },
+    #[error(transparent)]
+    Stored(#[from] StoredFitError),
     #[error("no thread can be started ({0}); try again")]
     Threads(io::Error),
     #[error("the population was not found, because the command was interrupted")]
@@ -123,7 +131,8 @@ pub struct Population {
     pub fit: PopulationFit,
     /// Where they are wanted and all parameters of the model are in the population.
     pub curves: Option<PopulationCurves>,
-    pub origin: PopulationOrigin,
+    /// None of stored fits, which know no depths.
+    pub origin: Option<PopulationOrigin>,
 }
 
 impl Population {
@@ -144,10 +153,19 @@ pub fn population(
     Design::of(&table, request.levels, request.effects)?;
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
+    let options = &request.recipe.options;
+    if request.method == PopulationMethod::Stored {
+        let stored = read_stored(request, &table, &workers)?;
+        let stored = keep(&mut table, stored, &mut not_fitted)?;
+        let design = Design::of(&table, request.levels, request.effects)?;
+        let best = stored.iter().map(|one| one.of_parameters(&names));
+        let study = study(&names, &design, &table, best)?;
+        let found = StudyFound { design, study, rounds: None, table, not_fitted };
+        return found.population(request, &workers, |_, _| (None, None));
+    }
     let curves = read_curves(request.paths, request.recipe, &table, &workers)?;
     let curves = keep(&mut table, curves, &mut not_fitted)?;
     let records: Vec<SignalRecord<'_>> = curves.iter().map(Curve::record).collect();
-    let options = &request.recipe.options;
     let fits = workers.all("fits", &records, |record| {
         FitSolution::fit_signals(&[*record], options, &[]).map_err(|err| err.to_string())
     })?;
@@ -156,51 +174,80 @@ pub fn population(
     let fits = keep(&mut table, fits, &mut not_fitted)?;
     let likelihoods = likelihoods(&names, &table, &fits)?;
     let design = Design::of(&table, request.levels, request.effects)?;
-    let mut study = study(&names, &design, &table, &likelihoods)?;
-    let rounds = match request.method {
-        PopulationMethod::TwoStage => None,
-        PopulationMethod::Curves => Some(expand_curves(&mut study, |modes| {
-            let pieces: Vec<_> = likelihoods.iter().zip(modes).collect();
-            workers.all("curves", &pieces, |(likelihood, mode)| {
-                likelihood.expand(mode).map(curve_evidence)
-            })
-        })?),
+    let best =
+        likelihoods.iter().map(|one| one.expand_at_best().ok_or_else(|| inseparable(&names)));
+    let mut study = study(&names, &design, &table, best)?;
+    let expand = |modes: &[Vec<f64>]| {
+        let pieces: Vec<_> = likelihoods.iter().zip(modes).collect();
+        workers.all("curves", &pieces, |(likelihood, mode)| {
+            likelihood.expand(mode).map(curve_evidence)
+        })
     };
-    let contrasts = questions::contrasts(&design);
-    let fit =
-        fit_population(&study, &PopulationOptions { has_deviation_intervals: true, contrasts })?;
-    let influence = request.is_influence_wanted;
-    let influence = influence.then(|| questions::influences(&study, &fit, &workers)).transpose()?;
-    let plan = request.wanted_percent;
-    let plan = plan.map(|wanted| questions::plan(&study, &fit, wanted, &workers)).transpose()?;
+    let is_of_curves = request.method == PopulationMethod::Curves;
+    let rounds = is_of_curves.then(|| expand_curves(&mut study, expand)).transpose()?;
+    let found = StudyFound { design, study, rounds, table, not_fitted };
     // A specimen is drawn whole or not at all.
     let is_drawn = request.is_drawn && names.len() == options.body_names().len();
-    let drawn = is_drawn.then(|| {
-        let reports: Vec<_> = fits.iter().map(FitSolution::report).collect();
-        specimens::curves(&design, &table.rows, &fitted, &reports, (&study, &fit))
-    });
-    let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
-    let specimen = &known[..known.len().min(options.body_names().len())];
-    let origin = PopulationOrigin::of(&design, &table, (specimen, &names), &fitted, &fits);
-    let unit = |name: &str| known.iter().find(|one| one.name == name).map(|one| one.unit.clone());
-    let effect = |one| EffectRow::of(one, unit(&one.parameter), &fit);
-    let report = PopulationReport {
-        model: options.family().key(),
-        method: request.method,
-        rounds: rounds.map(|one| one.rounds),
-        sessions: study.sessions.len(),
-        levels: LevelRow::all(&study),
-        effects: fit.effects.iter().map(effect).collect(),
-        comparisons: questions::comparisons(&design, &study, &fit),
-        standard_deviations: DeviationRow::all(&fit),
-        groups: fit.groups.clone(),
-        outlying: Outlying::all(&study, &fit),
-        influence,
-        plan,
-        not_fitted,
-        notes: notes(&design, &table, rounds, fit.is_bounded),
-    };
-    Ok(Population { report, study, fit, curves: drawn.flatten(), origin })
+    found.population(request, &workers, |found, fit| {
+        let StudyFound { design, study, table, .. } = found;
+        let reports = || fits.iter().map(FitSolution::report).collect::<Vec<_>>();
+        let curves = is_drawn
+            .then(|| specimens::curves(design, &table.rows, &fitted, &reports(), (study, fit)));
+        let known = fits.first().map(FitSolution::report).unwrap_or_default().parameters;
+        let specimen = &known[..known.len().min(options.body_names().len())];
+        let origin = PopulationOrigin::of(design, table, (specimen, &names), &fitted, &fits);
+        (curves.flatten(), Some(origin))
+    })
+}
+
+/// The sessions of a study, and what they say.
+struct StudyFound {
+    design: Design,
+    study: Study,
+    rounds: Option<CurveRounds>,
+    table: StudyTable,
+    not_fitted: BTreeMap<String, String>,
+}
+
+impl StudyFound {
+    fn population(
+        self,
+        request: &PopulationRequest<'_>,
+        workers: &Workers<'_>,
+        of_curves: impl FnOnce(
+            &Self,
+            &PopulationFit,
+        ) -> (Option<PopulationCurves>, Option<PopulationOrigin>),
+    ) -> Result<Population, PopulationError> {
+        let (study, options) = (&self.study, &request.recipe.options);
+        let contrasts = questions::contrasts(&self.design);
+        let wanted = PopulationOptions { has_deviation_intervals: true, contrasts };
+        let fit = fit_population(study, &wanted)?;
+        let influence = request.is_influence_wanted;
+        let influence = influence.then(|| questions::influences(study, &fit, workers));
+        let plan = request.wanted_percent;
+        let plan = plan.map(|wanted| questions::plan(study, &fit, wanted, workers)).transpose()?;
+        let unit = |name: &str| options.unit(name).map(str::to_owned);
+        let effect = |one| EffectRow::of(one, unit(&one.parameter), &fit);
+        let (curves, origin) = of_curves(&self, &fit);
+        let report = PopulationReport {
+            model: options.family().key(),
+            method: request.method,
+            rounds: self.rounds.map(|one| one.rounds),
+            sessions: study.sessions.len(),
+            levels: LevelRow::all(study),
+            effects: fit.effects.iter().map(effect).collect(),
+            comparisons: questions::comparisons(&self.design, study, &fit),
+            standard_deviations: DeviationRow::all(&fit),
+            groups: fit.groups.clone(),
+            outlying: Outlying::all(study, &fit),
+            influence: influence.transpose()?,
+            plan,
+            not_fitted: self.not_fitted,
+            notes: notes(&self.design, &self.table, self.rounds, fit.is_bounded),
+        };
+        Ok(Population { report, study: self.study, fit, curves, origin })
+    }
 }
 
 /// The results of sessions that have one; the others leave the table with their reasons.
@@ -283,26 +330,21 @@ fn likelihoods<'f, 'a>(
 ) -> Result<Vec<CurveLikelihood<'f, 'a>>, PopulationError> {
     let wanted: Vec<&str> = names.iter().map(String::as_str).collect();
     let each = fits.iter().zip(&table.rows).map(|(fit, row)| {
-        CurveLikelihood::of(fit, 0, &wanted)
-            .map_err(|reason| PopulationError::InSession { session: row.session.clone(), reason })
+        CurveLikelihood::of(fit, 0, &wanted).map_err(|reason| in_session(row, reason))
     });
     each.collect()
 }
 
+/// The study of sessions with what each says of the parameters.
 fn study(
     names: &[String],
     design: &Design,
     table: &StudyTable,
-    likelihoods: &[CurveLikelihood<'_, '_>],
+    best: impl Iterator<Item = Result<LikelihoodExpansion, String>>,
 ) -> Result<Study, PopulationError> {
-    let sessions = table.rows.iter().zip(likelihoods).map(|(row, likelihood)| {
-        let best = likelihood.expand(likelihood.best()).map(curve_evidence);
-        let evidence = best.as_ref().and_then(CurveEvidence::evidence);
-        let (Some(best), Some(evidence)) = (best, evidence) else {
-            let advice = "leave one of the parameters out".to_owned();
-            let reason = FitError::Inseparable { names: names.to_vec(), advice };
-            return Err(PopulationError::InSession { session: row.session.clone(), reason });
-        };
+    let sessions = table.rows.iter().zip(best).map(|(row, best)| {
+        let best = curve_evidence(best.map_err(|reason| in_session(row, reason))?);
+        let evidence = best.evidence().ok_or_else(|| in_session(row, inseparable(names)))?;
         Ok(StudySession {
             name: row.session.clone(),
             groups: design.groups(row),
@@ -315,6 +357,15 @@ fn study(
         parameters: names.to_vec(),
         effects: design.effects(),
         levels: design.levels(),
-        sessions: sessions.collect::<Result<_, _>>()?,
+        sessions: sessions.collect::<Result<_, PopulationError>>()?,
     })
+}
+
+fn in_session(row: &StudyRow, reason: impl ToString) -> PopulationError {
+    PopulationError::InSession { session: row.session.clone(), reason: reason.to_string() }
+}
+
+fn inseparable(names: &[String]) -> String {
+    let advice = "leave one of the parameters out".to_owned();
+    FitError::Inseparable { names: names.to_vec(), advice }.to_string()
 }

@@ -192,7 +192,9 @@ pub fn paragraph(report: &PopulationReport) -> String {
         report.levels.iter().rev().map(|one| counted(one.groups, &one.level)).collect();
     let entered = match report.method {
         PopulationMethod::Curves => "each curve with its own likelihood (Lindstrom & Bates 1990)",
-        PopulationMethod::TwoStage => "from the best values of each session and their covariance",
+        PopulationMethod::TwoStage | PopulationMethod::Stored => {
+            "from the best values of each session and their covariance"
+        }
     };
     let version = env!("CARGO_PKG_VERSION");
     let mut text = format!(

@@ -2,7 +2,7 @@
 
 use super::curves::Curve;
 use super::design::{Design, MEAN};
-use super::{Population, PopulationMethod};
+use super::{Population, PopulationMethod, PopulationReport};
 use crate::study_table::StudyTable;
 use palpate_model::estimate::FittedParameter;
 use palpate_rheology::fit::FitSolution;
@@ -65,6 +65,10 @@ pub enum SavePopulationError {
     Name(String),
     #[error("the library already has a population '{name}' ({id}); choose another name")]
     Taken { name: String, id: String },
+    #[error(
+        "stored fits have neither depths nor the other parameters of a specimen; find the population without --stored to save it"
+    )]
+    Stored,
     #[error(transparent)]
     Library(#[from] LibraryError),
 }
@@ -85,11 +89,15 @@ pub fn save_population(
     found: &Population,
 ) -> Result<StoredPopulation, SavePopulationError> {
     check_new_name(library, name)?;
-    Ok(save_document(library, &document(name, found))?)
+    let origin = found.origin.as_ref().ok_or(SavePopulationError::Stored)?;
+    Ok(save_document(library, &document(name, &found.report, origin))?)
 }
 
-fn document(name: &str, found: &Population) -> PopulationDocument {
-    let Population { report, origin, .. } = found;
+fn document(
+    name: &str,
+    report: &PopulationReport,
+    origin: &PopulationOrigin,
+) -> PopulationDocument {
     let means = report.effects.iter().filter(|row| row.effect == MEAN);
     let parameters = means.map(|mean| {
         let effects = report.effects.iter();
@@ -113,6 +121,7 @@ fn document(name: &str, found: &Population) -> PopulationDocument {
         method: match report.method {
             PopulationMethod::Curves => "curves",
             PopulationMethod::TwoStage => "two-stage",
+            PopulationMethod::Stored => "stored",
         }
         .to_owned(),
         levels: report.levels.iter().map(|one| one.level.clone()).collect(),

@@ -1,5 +1,6 @@
 //! What a record says of its parameters at any values of them, and not only at those that fit it best.
 
+use super::columns::ParameterPoint;
 use super::refine::{GAIN_THIN, StopRule, refine};
 use super::sample::FitError;
 use super::solve::FitSolution;
@@ -68,7 +69,6 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
     /// of the parameters.
     pub fn expand(&self, logarithms: &[f64]) -> Option<LikelihoodExpansion> {
         let (system, record) = (&self.solution.system, self.record);
-        let scatter = self.solution.uncertainty().scatter?;
         let apart = self.best.iter().zip(&self.widening).zip(logarithms);
         let inside: Vec<f64> = apart.map(|((best, wide), at)| best + (at - best) / wide).collect();
         let (mut pinned, mut points) = (system.clone(), self.solution.refined.points.clone());
@@ -79,15 +79,27 @@ impl<'f, 'a> CurveLikelihood<'f, 'a> {
         if !pinned.unknowns.is_empty() {
             points = refine(&pinned, &points, Rows::All, StopRule::Gain(GAIN_THIN))?.points;
         }
-        let pass = system.pass(&points, Rows::All)?;
+        self.around(&points, &inside)
+    }
+
+    /// The likelihood around the best fit, where nothing has to follow; `None` as of [`Self::expand`].
+    pub fn expand_at_best(&self) -> Option<LikelihoodExpansion> {
+        self.around(&self.solution.refined.points, &self.best)
+    }
+
+    /// Around points at which the parameters have the logarithms `inside`.
+    fn around(&self, points: &[ParameterPoint], inside: &[f64]) -> Option<LikelihoodExpansion> {
+        let (system, record) = (&self.solution.system, self.record);
+        let scatter = self.solution.uncertainty().scatter?;
+        let pass = system.pass(points, Rows::All)?;
         let step = pass.joint.solve(system.unknowns.len());
-        let combinations = self.parameters.iter().zip(&inside).map(|(&parameter, at)| {
+        let combinations = self.parameters.iter().zip(inside).map(|(&parameter, at)| {
             let own = system.combination(record, parameter, &points[record]);
             own.into_iter().map(|share| share * (-at).exp()).collect()
         });
         let combinations: Vec<Vec<f64>> = combinations.collect();
         let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
-        let centre = combinations.iter().zip(&inside).zip(&self.best).zip(&self.widening);
+        let centre = combinations.iter().zip(inside).zip(&self.best).zip(&self.widening);
         let centre = centre.map(|(((combination, at), best), wide)| {
             best + wide * (at + product(combination, &step) - best)
         });

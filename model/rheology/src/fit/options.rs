@@ -151,6 +151,11 @@ impl FitOptions {
         self.known.iter().map(|one| one.name.as_str()).collect()
     }
 
+    /// The unit of a parameter, if the fit has it.
+    pub fn unit(&self, name: &str) -> Option<&'static str> {
+        self.known.iter().find(|one| one.name == name).map(|one| one.unit)
+    }
+
     /// Names of the parameters of the specimen: what records may share.
     pub fn body_names(&self) -> Vec<&str> {
         let mut names = self.names();

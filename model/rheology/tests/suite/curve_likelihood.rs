@@ -3,7 +3,9 @@
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
-use palpate_rheology::fit::{CurveLikelihood, FitError, FitOptions, FitSample, FitSolution, fit};
+use palpate_rheology::fit::{
+    CurveLikelihood, FitError, FitOptions, FitSample, FitSolution, LogarithmStatistics, fit,
+};
 
 const NAMES: [&str; 2] = ["tau_eps", "mu1"];
 
@@ -108,4 +110,39 @@ fn a_parameter_that_has_no_logarithm_is_refused() {
     assert!(matches!(refused, FitError::NotFitted { .. }), "{refused}");
     let unknown = CurveLikelihood::of(&solution, 0, &["mu9"]).unwrap_err();
     assert!(matches!(unknown, FitError::UnknownParameter { .. }), "{unknown}");
+}
+
+/// Stored statistics give what the fit itself gives of any parameters, also after they were written and read; the standard
+/// errors of the report are those of values and not of logarithms.
+#[test]
+fn statistics_of_a_fit_are_its_likelihood_at_the_best_values() {
+    for memory in [0.0, 0.8] {
+        let samples = record(memory);
+        let mut options = FitOptions::default();
+        options.fix("mu2", ModifiedKelvin::THESIS.mu[1]).unwrap();
+        let solution = FitSolution::of(&samples, &options).unwrap();
+        let text = serde_json::to_string(&LogarithmStatistics::of(&solution, 0)).unwrap();
+        let stored: LogarithmStatistics = serde_json::from_str(&text).unwrap();
+        let report = solution.report();
+        for names in [&["tau_eps", "mu1", "mu3", "tau_sig"][..], &["mu3", "tau_eps"], &["mu1"]] {
+            let own: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+            let found = stored.of_parameters(&own).unwrap();
+            let likelihood = CurveLikelihood::of(&solution, 0, names).unwrap();
+            let expected = likelihood.expand_at_best().unwrap();
+            for (k, name) in names.iter().enumerate() {
+                let parameter = report.parameter(name).unwrap();
+                let error = parameter.std_error.unwrap() / parameter.value;
+                // Rounding, which the decomposition of the record multiplies by its condition.
+                assert!((found.centre[k] - expected.centre[k]).abs() < 1e-9 * error, "{name}");
+                assert!((found.covariance[k][k].sqrt() / error - 1.0).abs() < 1e-3, "{name}");
+                for (one, other) in found.covariance[k].iter().zip(&expected.covariance[k]) {
+                    assert!((one / other - 1.0).abs() < 1e-9, "{name}: {one} {other}");
+                }
+            }
+        }
+        let refused = stored.of_parameters(&["mu2".to_owned()]).unwrap_err();
+        assert!(refused.starts_with("mu2 is fixed"), "{refused}");
+        let unknown = stored.of_parameters(&["mu9".to_owned()]).unwrap_err();
+        assert!(unknown.contains("'mu9'"), "{unknown}");
+    }
 }

@@ -1,12 +1,15 @@
 //! Fits and moduli in a lake: one file each, with settings and result.
 
 use super::layout::{encode_value, is_file_name, root};
+use super::read::LakeError;
 use crate::export::atomic::{io_error, write_or_same};
 use crate::export::{ExportError, WriteOutcome};
 use palpate_sessions::text::sha256;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// What was fitted to a session of a lake.
@@ -49,15 +52,60 @@ pub enum FitState {
 
 impl FitFile<'_> {
     pub fn path(&self) -> PathBuf {
-        let [folder, key, _] = self.result.names();
-        let folder = root(self.lake).join(folder);
-        let folder = folder.join(format!("{key}={}", encode_value(self.model)));
-        folder.join(format!("{}.json", self.session_id))
+        model_folder(self.lake, self.result, self.model).join(format!("{}.json", self.session_id))
     }
 
     fn settings_sha256(&self) -> String {
         sha256(self.settings.to_string().as_bytes())
     }
+}
+
+/// The folder of the results of a model or a law.
+#[must_use]
+pub fn model_folder(lake: &Path, result: LakeResult, model: &str) -> PathBuf {
+    let [folder, key, _] = result.names();
+    root(lake).join(folder).join(format!("{key}={}", encode_value(model)))
+}
+
+/// Keys of the models or laws that a lake has results of, by name.
+pub fn list_models(lake: &Path, result: LakeResult) -> Result<Vec<String>, LakeError> {
+    let [folder, key, _] = result.names();
+    let path = root(lake).join(folder);
+    let failed = |source| LakeError::Io { path: path.clone(), source };
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let mut models = Vec::new();
+    for entry in fs::read_dir(&path).map_err(failed)? {
+        let name = entry.map_err(failed)?.file_name();
+        let model = name.to_str().and_then(|name| name.strip_prefix(key)?.strip_prefix('='));
+        models.extend(model.map(str::to_owned));
+    }
+    models.sort();
+    Ok(models)
+}
+
+/// The settings of a stored fit and, as far as `T` takes them, its numbers; `None` where the session has none.
+pub fn read_fit<T: DeserializeOwned>(
+    lake: &Path,
+    model: &str,
+    session_id: &str,
+) -> Result<Option<StoredFitFile<T>>, LakeError> {
+    let folder = model_folder(lake, LakeResult::Fit, model);
+    let path = folder.join(format!("{session_id}.json"));
+    let text = match fs::read(&path) {
+        Err(err) if err.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(|source| LakeError::Io { path: path.clone(), source })?,
+    };
+    let read = serde_json::from_slice(&text);
+    read.map(Some).map_err(|err| LakeError::BadFit { path, reason: err.to_string() })
+}
+
+/// What [`store_fit`] stored of a fit.
+#[derive(Clone, Debug, Deserialize)]
+pub struct StoredFitFile<T> {
+    pub settings: Value,
+    pub fit: T,
 }
 
 /// Refuses a fit with other settings, because files in a lake are never overwritten.

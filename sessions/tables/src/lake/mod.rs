@@ -20,7 +20,10 @@ mod read;
 mod rows;
 mod write;
 
-pub use fits::{FitFile, FitState, LakeResult, find_fit, store_fit};
+pub use fits::{
+    FitFile, FitState, LakeResult, StoredFitFile, find_fit, list_models, model_folder, read_fit,
+    store_fit,
+};
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
 pub use read::{LakeError, LakeSession, list_sessions, read_manifest, read_session};
 pub use write::{LakeAddition, LakeQuality, add_session};

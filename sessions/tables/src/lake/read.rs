@@ -25,6 +25,8 @@ pub enum LakeError {
     Bad { path: PathBuf, reason: String },
     #[error("{} is a session of record version {version}, which this palpate is too old to read; update palpate", path.display())]
     Newer { path: PathBuf, version: u32 },
+    #[error("{} is not a whole fit ({reason}); move it away and fit the lake again", path.display())]
+    BadFit { path: PathBuf, reason: String },
     #[error("cannot read {} ({source}); check its permissions", path.display())]
     Io { path: PathBuf, source: io::Error },
 }
@@ -86,7 +88,7 @@ fn read_outline(
 ) -> Result<(Manifest, StoredOutline, Option<String>), LakeError> {
     let path = path_of(lake, one, LakePart::Sessions);
     let sum = checksums.of_part(LakePart::Sessions);
-    let outline = read_table(&path, sum, session_of)?;
+    let outline = read_table(&path, sum, Some(&OUTLINE_COLUMNS), session_of)?;
     let version = outline.0.record_version;
     match version > RECORD_VERSION {
         true => Err(LakeError::Newer { path, version }),
@@ -103,7 +105,7 @@ pub fn read_session(
     let (manifest, mut session, rejection) = read_outline(lake, one, &checksums)?;
     let samples = path_of(lake, one, LakePart::Samples);
     let sum = checksums.of_part(LakePart::Samples);
-    let rows = read_table(&samples, sum, rows)?;
+    let rows = read_table(&samples, sum, None, rows)?;
     if rows.len() as u64 != session.samples {
         return Err(LakeError::Bad {
             reason: format!("it has {} of {} samples", rows.len(), session.samples),
@@ -111,7 +113,7 @@ pub fn read_session(
         });
     }
     let sum = checksums.of_part(LakePart::Events);
-    let entries = read_table(&path_of(lake, one, LakePart::Events), sum, entries)?;
+    let entries = read_table(&path_of(lake, one, LakePart::Events), sum, None, entries)?;
     let session = Session {
         path: samples,
         manifest,
@@ -125,10 +127,11 @@ pub fn read_session(
     Ok((session, rejection))
 }
 
-/// Reads a table after its checksum, because the decoder trusts its input.
+/// Reads a table, or some of its columns, after its checksum, because the decoder trusts its input.
 fn read_table<T>(
     path: &Path,
     checksum: Option<u32>,
+    columns: Option<&[&str]>,
     parse: impl FnOnce(&DataFrame) -> PolarsResult<T>,
 ) -> Result<T, LakeError> {
     let failed = |source| LakeError::Io { path: path.into(), source };
@@ -137,7 +140,9 @@ fn read_table<T>(
         return Err(LakeError::Bad { path: path.into(), reason: "its checksum is wrong".into() });
     }
     file.rewind().map_err(failed)?;
-    let parsed = ParquetReader::new(file).finish().and_then(|frame| parse(&frame));
+    let columns = columns.map(|names| names.iter().map(|&name| name.to_owned()).collect());
+    let reader = ParquetReader::new(file).with_columns(columns);
+    let parsed = reader.finish().and_then(|frame| parse(&frame));
     parsed.map_err(|err| LakeError::Bad { path: path.into(), reason: err.to_string() })
 }
 
@@ -147,6 +152,10 @@ struct StoredOutline {
     end: Option<palpate_sessions::record::EndRecord>,
     notes: Vec<String>,
 }
+
+/// The columns that are read of the sessions table: the others say the same again, for other programs.
+const OUTLINE_COLUMNS: [&str; 6] =
+    ["manifest", "samples", "end", "notes", "verdict", "verdict_reason"];
 
 fn bad(reason: impl ToString) -> PolarsError {
     PolarsError::ComputeError(reason.to_string().into())
