@@ -48,6 +48,7 @@ def population(
     levels: Sequence[str] = (),
     effects: Sequence[str] = (),
     two_stage: bool = False,
+    stored: bool = False,
     influence: bool = False,
     wanted: Optional[float] = None,
     compliance: Optional[str] = None,
@@ -56,7 +57,8 @@ def population(
 ) -> Population:
     """The population of sessions, folders of sessions, or one lake, as ``palpate population`` finds it.
 
-    ``levels`` are those of ``--by``, ``effects`` those of ``--effect``. ``influence`` leaves each group out in turn, ``wanted`` is
+    ``levels`` are those of ``--by``, ``effects`` those of ``--effect``. ``two_stage`` takes the best values of each session instead of its
+    curve, ``stored`` those that the fits of a lake stored. ``influence`` leaves each group out in turn, ``wanted`` is
     the percent that no end of an interval is to be off by, for which studies of other sizes are drawn. ``out`` is a new folder for
     tables, figures and a paragraph.
     """
@@ -66,6 +68,7 @@ def population(
         "levels": list(levels),
         "effects": list(effects),
         "two_stage": two_stage,
+        "stored": stored,
         "influence": influence,
         "wanted": wanted,
         "compliance": compliance,

@@ -20,6 +20,7 @@ pub struct PopulationOptions {
     levels: Vec<String>,
     effects: Vec<String>,
     two_stage: bool,
+    stored: bool,
     influence: bool,
     wanted: Option<f64>,
     compliance: Option<String>,
@@ -46,9 +47,10 @@ pub fn find_population(
         parameters: &options.parameters,
         levels: &options.levels,
         effects: &options.effects,
-        method: match options.two_stage {
-            true => PopulationMethod::TwoStage,
-            false => PopulationMethod::Curves,
+        method: match (options.stored, options.two_stage) {
+            (true, _) => PopulationMethod::Stored,
+            (false, true) => PopulationMethod::TwoStage,
+            (false, false) => PopulationMethod::Curves,
         },
         is_drawn: options.out.is_some(),
         is_influence_wanted: options.influence,

@@ -44,7 +44,7 @@ pub struct PopulationArgs {
     #[arg(long)]
     influence: bool,
     /// Draw studies of other sizes from the population, and print in which no end of an interval is off by more than PERCENT
-    #[arg(long, value_name = "PERCENT", value_parser = positive)]
+    #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     wanted: Option<f64>,
     /// Write tables (CSV, LaTeX), figures, a paragraph and a page for a paper into this new folder
     #[arg(long, value_name = "FOLDER")]
@@ -54,7 +54,7 @@ pub struct PopulationArgs {
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
     /// Save the population in the library under this name, for simulated specimens population:NAME#NUMBER
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "stored")]
     save: Option<String>,
     /// Number of sessions fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
