@@ -14,7 +14,7 @@ const ANIMALS: [usize; 3] = [4, 6, 12];
 const SITES: usize = 3;
 const REPEATS: usize = 2;
 /// Standard deviations of logarithms from animal to animal, from site to site, from repeat to repeat, and of one fit.
-const SPREADS: [f64; 3] = [0.25, 0.15, 0.1];
+const DEVIATIONS: [f64; 3] = [0.25, 0.15, 0.1];
 const NOISE: f64 = 0.05;
 const MEAN: f64 = 1.5;
 const EFFECT: f64 = 0.3;
@@ -35,19 +35,19 @@ fn study(animals: usize, effect: f64, trouble: Trouble, random: &mut SplitMix) -
     };
     for animal in 0..animals {
         let treated = (animal % 2) as f64;
-        let mut shift = SPREADS[0] * random.normal();
+        let mut shift = DEVIATIONS[0] * random.normal();
         if trouble == Trouble::HeavyTails {
             let squares: f64 = (0..3).map(|_| random.normal().powi(2)).sum();
             // Student's t of three degrees of freedom has a variance of three.
             shift /= squares.sqrt();
         }
         for site in 0..SITES {
-            let mut at = shift + SPREADS[1] * random.normal();
+            let mut at = shift + DEVIATIONS[1] * random.normal();
             if trouble == Trouble::OneBad && animal == 0 && site == 0 {
-                at += 6.0 * SPREADS[1];
+                at += 6.0 * DEVIATIONS[1];
             }
             for _ in 0..REPEATS {
-                let noise = SPREADS[2] * random.normal() + NOISE * random.normal();
+                let noise = DEVIATIONS[2] * random.normal() + NOISE * random.normal();
                 study.sessions.push(StudySession {
                     name: format!("session {}", study.sessions.len() + 1),
                     groups: vec![format!("animal {animal}"), format!("site {site}")],
@@ -69,7 +69,7 @@ fn study(animals: usize, effect: f64, trouble: Trouble, random: &mut SplitMix) -
 struct Tally {
     mean: usize,
     effect: usize,
-    spreads: [usize; 3],
+    deviations: [usize; 3],
     widths: [f64; 2],
     zeros: [usize; 3],
     /// Studies in which a group of any level is said to be outlying, and those in which none is, with how many of the latter have
@@ -92,8 +92,8 @@ impl Tally {
         for (k, one) in fit.standard_deviations.iter().enumerate() {
             let [low, high] = one.interval;
             let ends = [low.unwrap_or(0.0), high.unwrap_or(f64::INFINITY)];
-            let is_covered = covers(ends, SPREADS[k]);
-            self.spreads[k] += is_covered;
+            let is_covered = covers(ends, DEVIATIONS[k]);
+            self.deviations[k] += is_covered;
             self.silent[k] += if is_outlying { 0 } else { is_covered };
             self.zeros[k] += usize::from(one.is_zero);
         }
@@ -121,7 +121,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             false_positives += usize::from(none.effects[1].p_value < 0.05);
         }
         let share = |count: usize| 100.0 * count as f64 / studies as f64;
-        let [animal, site, repeat] = tally.spreads.map(share);
+        let [animal, site, repeat] = tally.deviations.map(share);
         println!(
             "{animals:2} animals: mean {:.1} %, effect {:.1} %, standard deviations of animals {animal:.1} %, sites {site:.1} %, repeats {repeat:.1} %; false positives {:.1} %; said to be outlying {:.1} %, else standard deviations {:.1?} %; zero {:?}; widths {:.3} {:.3}",
             share(tally.mean),

@@ -1,6 +1,6 @@
 //! Means, effects and standard deviations of a population, and how well they are known.
 
-use crate::likelihood::{ShiftEstimate, SpreadFactor};
+use crate::likelihood::{DeviationFactor, ShiftEstimate};
 use crate::profile::Profile;
 use crate::search::{Coordinates, Criterion, Optimum};
 use crate::study::{NestedStudy, Study, StudyError};
@@ -166,7 +166,7 @@ impl Fitter<'_> {
         self.criterion.coordinates
     }
 
-    fn factors(&self) -> Vec<SpreadFactor> {
+    fn factors(&self) -> Vec<DeviationFactor> {
         self.coordinates().factors(&self.optimum.at)
     }
 

@@ -3,7 +3,7 @@
 //! Given what is above it, what a group says of its means is a quadratic form of the group's own shift, the effects and one:
 //! the sum of its members' forms. Integrating the shift out is a step of the size of one group (Pinheiro & Bates,
 //! Mixed-Effects Models in S and S-PLUS, 2000, section 2.2.3), so that cost and storage grow with the number of sessions and
-//! not with its square. The spreads enter by a factor L of their covariance L L', so that a spread of zero is a value like
+//! not with its square. The shifts' covariance enters by its factor, L of L L', so that a standard deviation of zero is a value like
 //! any other. The gradient follows the same steps backwards.
 
 use crate::study::{Evidence, NestedStudy};
@@ -14,13 +14,13 @@ type Form = DMatrix<f64>;
 
 /// The covariance of the shifts of a level: a factor times signs times its transpose.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct SpreadFactor {
+pub(crate) struct DeviationFactor {
     pub root: DMatrix<f64>,
-    /// One, or minus one where a variance is below zero: no spread, but what judges means without a bound in its way.
+    /// One, or minus one where a variance is below zero: of no shift, but what judges means without a bound in its way.
     pub signs: DVector<f64>,
 }
 
-impl SpreadFactor {
+impl DeviationFactor {
     pub fn covariance(&self) -> DMatrix<f64> {
         &self.root * DMatrix::from_diagonal(&self.signs) * self.root.transpose()
     }
@@ -37,7 +37,7 @@ struct Integration {
     columns: DMatrix<f64>,
     /// Those times the inverse of `scaled`.
     weights: DMatrix<f64>,
-    /// The inverse of the signs and the form of the shift in units of its spread.
+    /// The inverse of the signs and the form of the shift in units of its standard deviation.
     inverse: DMatrix<f64>,
     log_determinant: f64,
 }
@@ -45,7 +45,7 @@ struct Integration {
 impl Integration {
     /// `None` where variances below zero outweigh what the form says: the whole is a covariance as long as as many directions
     /// are below zero as signs are (Haynsworth, Linear Algebra and its Applications 1 (1968) 73-81).
-    fn of(form: &Form, factor: &SpreadFactor) -> Option<Self> {
+    fn of(form: &Form, factor: &DeviationFactor) -> Option<Self> {
         let count = factor.signs.len();
         let columns = form.columns(0, count) * &factor.root;
         let mut scaled = factor.root.tr_mul(&columns.rows(0, count));
@@ -99,10 +99,10 @@ fn log_determinant(factor: &Cholesky<f64, Dyn>) -> f64 {
     2.0 * factor.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>()
 }
 
-/// The means at given spreads, and how well these explain the sessions.
+/// The means at given standard deviations, and how well these explain the sessions.
 #[derive(Clone, Debug)]
 pub(crate) struct Evaluation {
-    /// Minus twice the logarithm of the restricted likelihood, without what no spread changes.
+    /// Minus twice the logarithm of the restricted likelihood, without what no standard deviation changes.
     pub criterion: f64,
     /// Effects, those of the first column for all parameters first.
     pub effects: DVector<f64>,
@@ -120,7 +120,7 @@ pub(crate) struct ShiftEstimate {
     pub own_covariance: DMatrix<f64>,
 }
 
-/// Sums over the members of every group at given spreads.
+/// Sums over the members of every group at given standard deviations.
 struct Sums {
     /// Of each level but the sessions' own.
     groups: Vec<Vec<Form>>,
@@ -138,16 +138,16 @@ impl NestedStudy {
         self.parents.len() + 1
     }
 
-    /// Restricted likelihood and means; `None` where a spread of zero leaves a session impossible, or effects cannot be
+    /// Restricted likelihood and means; `None` where a standard deviation of zero leaves a session impossible, or effects cannot be
     /// separated.
-    pub fn evaluate(&self, factors: &[SpreadFactor]) -> Option<Evaluation> {
+    pub fn evaluate(&self, factors: &[DeviationFactor]) -> Option<Evaluation> {
         self.means(&self.sums(factors)?)
     }
 
     /// Those with the gradient of the criterion by the factor of each level, the outermost first.
     pub fn evaluate_with_gradient(
         &self,
-        factors: &[SpreadFactor],
+        factors: &[DeviationFactor],
     ) -> Option<(Evaluation, Vec<DMatrix<f64>>)> {
         let sums = self.sums(factors)?;
         let evaluation = self.means(&sums)?;
@@ -183,7 +183,7 @@ impl NestedStudy {
         extended
     }
 
-    fn sums(&self, factors: &[SpreadFactor]) -> Option<Sums> {
+    fn sums(&self, factors: &[DeviationFactor]) -> Option<Sums> {
         let zero = || DMatrix::zeros(self.width(), self.width());
         let mut groups: Vec<Vec<Form>> =
             self.parents.iter().map(|parents| vec![zero(); parents.len()]).collect();
@@ -269,7 +269,7 @@ impl NestedStudy {
     fn gradient(
         &self,
         sums: &Sums,
-        factors: &[SpreadFactor],
+        factors: &[DeviationFactor],
         root: &Form,
     ) -> Option<Vec<DMatrix<f64>>> {
         let count = self.parameters;
@@ -306,10 +306,10 @@ impl NestedStudy {
     }
 
     /// The most probable shift of every group against the mean of its sessions' effects, with its covariance given the
-    /// spreads and the effects; of each level, then of the sessions.
+    /// standard deviations and the effects; of each level, then of the sessions.
     pub fn shifts(
         &self,
-        factors: &[SpreadFactor],
+        factors: &[DeviationFactor],
         effects: &DVector<f64>,
     ) -> Option<Vec<Vec<ShiftEstimate>>> {
         let sums = self.sums(factors)?;
@@ -368,7 +368,7 @@ impl NestedStudy {
 /// The shift of a group, given that of the group above: `extended` is what the form takes at the shift of the group above.
 fn member(
     form: &Form,
-    factor: &SpreadFactor,
+    factor: &DeviationFactor,
     extended: &DVector<f64>,
     above: &ShiftEstimate,
 ) -> Option<ShiftEstimate> {

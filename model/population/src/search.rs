@@ -1,6 +1,6 @@
 //! The standard deviations that explain the sessions best.
 
-use crate::likelihood::{Evaluation, SpreadFactor};
+use crate::likelihood::{DeviationFactor, Evaluation};
 use crate::study::{Evidence, NestedStudy};
 use argmin::core::{CostFunction, Error, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
@@ -59,11 +59,11 @@ impl Coordinates {
         (Self { is_signed: true, ..self.clone() }, squares)
     }
 
-    pub fn factors(&self, at: &[f64]) -> Vec<SpreadFactor> {
+    pub fn factors(&self, at: &[f64]) -> Vec<DeviationFactor> {
         let level = |at: &[f64]| {
             let sizes = at.iter().zip(&self.scales).map(|(value, scale)| self.size(*value) * scale);
             let sign = |value: &f64| if self.is_signed && *value < 0.0 { -1.0 } else { 1.0 };
-            SpreadFactor {
+            DeviationFactor {
                 root: DMatrix::from_diagonal(&DVector::from_iterator(at.len(), sizes)),
                 signs: DVector::from_iterator(at.len(), at.iter().map(sign)),
             }

@@ -1,4 +1,4 @@
-use crate::likelihood::{Evaluation, SpreadFactor};
+use crate::likelihood::{DeviationFactor, Evaluation};
 use crate::search::Coordinates;
 use crate::study::NestedStudy;
 use crate::{
@@ -39,9 +39,9 @@ pub(crate) fn study(random: &mut SplitMix) -> Study {
     }
 }
 
-fn factors() -> Vec<SpreadFactor> {
+fn factors() -> Vec<DeviationFactor> {
     [[0.9, 0.0, -0.4, 0.5], [0.4, 0.0, 0.1, 0.0], [0.2, 0.0, 0.05, 0.12]]
-        .map(|entries| SpreadFactor {
+        .map(|entries| DeviationFactor {
             root: DMatrix::from_row_slice(2, 2, &entries),
             signs: DVector::from_element(2, 1.0),
         })
@@ -49,7 +49,7 @@ fn factors() -> Vec<SpreadFactor> {
 }
 
 /// The same by the covariance of all values at once.
-fn dense(study: &NestedStudy, factors: &[SpreadFactor]) -> Evaluation {
+fn dense(study: &NestedStudy, factors: &[DeviationFactor]) -> Evaluation {
     let (count, sessions) = (study.parameters, &study.sessions);
     let size = count * sessions.len();
     let [outer, inner, own] = [0, 1, 2].map(|level: usize| factors[level].covariance());
@@ -147,7 +147,7 @@ fn shifts_are_those_of_the_covariance_of_all() {
     let factors = factors();
     let effects = nested.evaluate(&factors).unwrap().effects;
     let shifts = nested.shifts(&factors, &effects).unwrap();
-    // All shifts at once: the least squares of values and shifts, each over its spread.
+    // All shifts at once: the least squares of values and shifts, each over its standard deviation.
     let counts: Vec<usize> = shifts.iter().map(Vec::len).collect();
     let starts = [0, counts[0], counts[0] + counts[1]];
     let total = 2 * counts.iter().sum::<usize>();
@@ -174,7 +174,7 @@ fn shifts_are_those_of_the_covariance_of_all() {
             block += information * &residual;
         }
     }
-    // The spread of sites has one direction only; the other has no shift.
+    // Sites differ in one direction only; in the other they have no shift.
     let along = DVector::from_vec(vec![0.4, 0.1]).normalize();
     let mut keep = DMatrix::identity(total, total);
     for site in 0..counts[1] {
