@@ -47,12 +47,15 @@ fn at_the_best_fit_it_is_the_fit() {
 /// counts in shares of how much wider the intervals of the fit are than the curvature of that sum says.
 #[test]
 fn its_slope_is_that_of_fits_with_fixed_parameters() {
-    for memory in [0.0, 0.8] {
-        check_slope(&record(memory));
+    // By how much the slope may differ: the widening is taken here from the curvature of the sum of squares, and by the fit from
+    // its slopes. Residuals that last bend the sum of squares by a tenth; the difference is the same near the best fit and far
+    // from it.
+    for (memory, tolerance) in [(0.0, 0.05), (0.8, 0.16)] {
+        check_slope(&record(memory), tolerance);
     }
 }
 
-fn check_slope(samples: &[FitSample]) {
+fn check_slope(samples: &[FitSample], tolerance: f64) {
     let solution = FitSolution::of(samples, &FitOptions::default()).unwrap();
     let report = solution.report();
     let likelihood = CurveLikelihood::of(&solution, 0, &NAMES).unwrap();
@@ -92,11 +95,10 @@ fn check_slope(samples: &[FitSample]) {
         -(up - down) / (2.0 * step)
     };
     let slopes = [slope([step, 0.0]) / widening[0], slope([0.0, step]) / widening[1]];
-    // The covariance times the slope of the logarithm of the likelihood is the step to the centre; the curvature of a sum of
-    // squares is that of its slopes to a few percent at this noise.
+    // The covariance times the slope of the logarithm of the likelihood is the step to the centre.
     for ((centre, row), at) in found.centre.iter().zip(&found.covariance).zip(at) {
         let expected: f64 = row.iter().zip(&slopes).map(|(share, slope)| share * slope).sum();
-        assert!(((centre - at) / expected - 1.0).abs() < 0.05, "{} {expected}", centre - at);
+        assert!(((centre - at) / expected - 1.0).abs() < tolerance, "{} {expected}", centre - at);
     }
 }
 
