@@ -107,19 +107,26 @@ fn rows_plot(title: &str, x: &str, rows: &[Row]) -> Plot {
         true => PointLabels::Each(names.collect()),
         false => PointLabels::None,
     };
-    let ends = PlotSeries::dots("", Ink::Series, 0.0, points(|row| row.ends[1])).labelled(names);
+    let named = PlotSeries::dots("", Ink::Series, 0.0, points(|row| row.ends[1])).labelled(names);
     let low = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
     let high = rows.iter().map(|row| row.ends[1]).fold(1.0, f64::max);
     // A margin on the left, and room for names on the right; rows that are all at one are seen too.
-    let width = (high / low).max(1.1);
+    let (before, behind) = (0.08, 0.6);
+    let ratio = (high / low).max(1.1);
     // A logarithmic axis has too few numbers for a narrow range.
-    let axis = if width < 4.0 { PlotAxis::linear } else { PlotAxis::logarithmic };
-    let x = axis(x).with_range([low / width.powf(0.08), high * width.powf(0.6)]);
+    let (axis, ends) = if ratio < 8.0 {
+        let width = low * (ratio - 1.0);
+        (PlotAxis::linear(x), [low - before * width, high + behind * width])
+    } else {
+        (PlotAxis::logarithmic(x), [low / ratio.powf(before), high * ratio.powf(behind)])
+    };
+    let x = axis.with_range(ends).with_visible_values(&ends);
+    let rows = [0.0, at(rows.len())];
     let y = PlotAxis { scale: AxisScale::Rows, ..PlotAxis::linear("") };
+    let y = y.with_range(rows).with_visible_values(&rows);
     Plot {
         x_levels: vec![PlotLevel { is_dashed: true, ..PlotLevel::plain(1.0, Ink::Quiet) }],
-        ..Plot::new(title, x, y.with_range([0.0, at(rows.len())]))
-            .with(intervals.chain([dots, ends]))
+        ..Plot::new(title, x, y).with(intervals.chain([dots, named]))
     }
 }
 

@@ -97,7 +97,7 @@ fn show(
         drawn = drawn.x_axis_formatter(move |mark, _| text(mark.value));
     }
     if plot.y.scale == AxisScale::Rows {
-        drawn = drawn.y_axis_formatter(|_, _| String::new());
+        drawn = drawn.y_axis_formatter(|_, _| String::new()).y_grid_spacer(|_| Vec::new());
     }
     if plot.y.scale == AxisScale::Logarithmic {
         drawn = drawn
@@ -246,10 +246,30 @@ fn paint<'a>(
     for (number, (one, points)) in plot.series.iter().zip(points).enumerate() {
         paint_series(plot_ui, one, points, number, tokens);
     }
+    if plot.y.scale == AxisScale::Rows {
+        paint_row_names(plot_ui, plot, points, tokens);
+    }
     if let Some(remark) = &plot.remark {
         let bounds = plot_ui.plot_bounds();
         let text = Text::new("remark", bounds.center(), remark.as_str());
         plot_ui.text(text.color(tokens.text_quiet).allow_hover(false));
+    }
+}
+
+/// Writes the short names of points behind them.
+fn paint_row_names<'a>(
+    plot_ui: &mut PlotUi<'a>,
+    plot: &'a Plot,
+    points: &'a [Vec<PlotPoint>],
+    tokens: &Tokens,
+) {
+    for (one, points) in plot.series.iter().zip(points) {
+        let PointLabels::Each(names) = &one.labels else { continue };
+        for (at, [name, _]) in points.iter().zip(names) {
+            let text = Text::new(name.as_str(), *at, format!("  {name}"));
+            let text = text.anchor(Align2::LEFT_CENTER).color(tokens.text);
+            plot_ui.text(text.allow_hover(false));
+        }
     }
 }
 

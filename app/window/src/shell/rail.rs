@@ -12,7 +12,7 @@ const WIDTHS: [f32; 2] = [140.0, 60.0];
 /// Points of window below which the words have no room.
 const ROOM_FOR_WORDS: f32 = 1260.0;
 /// Height of an entry in points: large enough for a gloved finger.
-const ENTRY_HEIGHT: f32 = 48.0;
+const ENTRY_HEIGHT: f32 = 44.0;
 
 /// Width of the rail in a window so wide, in points.
 #[must_use]
