@@ -141,7 +141,8 @@ fn effects_plot(report: &PopulationReport) -> Option<Plot> {
     };
     let own = report.effects.iter().filter(|one| !is_mean(&one.effect) && !compared(one));
     let row = |one: &EffectRow| Row {
-        name: format!("{}: {}", one.parameter, one.effect),
+        // The value alone: there is little room.
+        name: format!("{}: {}", one.parameter, one.effect.rsplit(" = ").next().unwrap_or_default()),
         value: one.factor,
         ends: one.factor_interval,
     };
