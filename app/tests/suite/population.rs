@@ -146,7 +146,7 @@ fn one_command_makes_the_tables_figures_and_words_of_a_paper() {
     assert!(paragraph.starts_with("We recorded 16 sessions of 8 specimens of 4 animals."));
     assert!(paragraph.contains("animal.treatment = enzyme"), "{paragraph}");
     let latex = std::fs::read_to_string(results.join("table.tex")).unwrap();
-    assert!(latex.contains("95 \\% interval") && latex.contains("tau\\_eps") == false);
+    assert!(latex.contains("95 \\% interval") && !latex.contains("tau\\_eps"));
     for name in ["effects.svg", "groups.svg", "residuals.svg", "table.tex", "population.html"] {
         assert!(results.join(name).is_file(), "{name}");
     }
