@@ -39,6 +39,13 @@ pub fn find_population(
     sources: Vec<PathBuf>,
     options: PopulationOptions,
 ) -> PyResult<(String, String)> {
+    if let Some(folder) = options.out.as_ref().filter(|folder| folder.exists()) {
+        let folder = folder.display();
+        return Err(refused(format!("{folder} exists already; give out another name")));
+    }
+    if let Some(wanted) = options.wanted.filter(|wanted| !(*wanted > 0.0 && wanted.is_finite())) {
+        return Err(refused(format!("wanted cannot be {wanted}; give a percentage above 0")));
+    }
     let corrections = corrections(options.compliance.as_deref())?;
     let recipe = study_recipe(options.family, corrections).map_err(refused)?;
     let request = PopulationRequest {
@@ -59,7 +66,10 @@ pub fn find_population(
     };
     let found = py.detach(|| population(&request, &NoProgress)).map_err(refused)?;
     if let Some(folder) = &options.out {
-        write_results(&found, folder).map_err(refused)?;
+        write_results(&found, folder).map_err(|err| {
+            let folder = folder.display();
+            refused(format!("the results cannot be written into {folder} ({err}); choose a folder that you may write to"))
+        })?;
     }
     answer(&found.report, found.report.text())
 }

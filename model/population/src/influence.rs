@@ -3,6 +3,7 @@
 use crate::fit::{PopulationFit, PopulationOptions, fit_population};
 use crate::study::{Study, StudyError};
 use serde::Serialize;
+use std::collections::HashSet;
 
 /// The population without one group or session.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,44 +27,63 @@ impl Influence {
     }
 }
 
-impl Study {
-    /// Levels and names of all groups and, last, of the sessions; a name is behind those that it belongs to.
+/// A group of a study, or one of its sessions.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct GroupPlace {
+    pub level: usize,
+    /// Names from the outermost group on.
+    pub path: Vec<String>,
+}
+
+impl GroupPlace {
+    /// As it is printed; a session has its own name alone.
     #[must_use]
-    pub fn all_groups(&self) -> Vec<(usize, String)> {
+    pub fn name(&self, study: &Study) -> String {
+        match self.level + 1 == study.levels.len() {
+            true => self.path.last().cloned().unwrap_or_default(),
+            false => self.path.join(" / "),
+        }
+    }
+}
+
+impl Study {
+    /// All groups and, last, all sessions.
+    #[must_use]
+    pub fn all_groups(&self) -> Vec<GroupPlace> {
         let mut found = Vec::new();
-        let mut known = std::collections::HashSet::new();
+        let mut known = HashSet::new();
         for level in 0..self.levels.len() {
             for session in &self.sessions {
-                let group = (level, session.group(level));
-                if known.insert(group.clone()) {
-                    found.push(group);
+                let path = session.path(level).into_iter().map(str::to_owned).collect();
+                let place = GroupPlace { level, path };
+                if known.insert(place.clone()) {
+                    found.push(place);
                 }
             }
         }
         found
     }
 
-    fn without(&self, level: usize, group: &str) -> Self {
-        let kept = self.sessions.iter().filter(|one| one.group(level) != group);
+    fn without(&self, group: &GroupPlace) -> Self {
+        let kept = self.sessions.iter().filter(|one| one.path(group.level) != group.path);
         Self { sessions: kept.cloned().collect(), ..self.clone() }
     }
 }
 
-/// The population of a study without one group of a level, all standard deviations found again, beside that of the whole.
+/// The population of a study without one group, all standard deviations found again, beside that of the whole.
 ///
 /// # Errors
 /// What is left says nothing of the population, for instance since one animal alone is of a treatment.
 pub fn influence(
     study: &Study,
     whole: &PopulationFit,
-    level: usize,
-    group: &str,
+    group: &GroupPlace,
 ) -> Result<Influence, StudyError> {
-    let rest = fit_population(&study.without(level, group), &PopulationOptions::default())?;
+    let rest = fit_population(&study.without(group), &PopulationOptions::default())?;
     let pairs = whole.effects.iter().zip(&rest.effects);
     Ok(Influence {
-        level: study.levels[level].clone(),
-        group: group.to_owned(),
+        level: study.levels[group.level].clone(),
+        group: group.name(study),
         effects: rest.effects.iter().map(|one| one.value).collect(),
         changes: pairs.map(|(all, rest)| (rest.value - all.value) / all.std_error).collect(),
         standard_deviations: rest.standard_deviations.iter().map(|one| one.value).collect(),
@@ -82,15 +102,16 @@ mod tests {
         let fit = fit_population(&study, &PopulationOptions::default()).unwrap();
         let values = study.sessions.iter().filter(|one| one.groups[0] != "4");
         let mean = values.clone().map(|one| one.values[0]).sum::<f64>() / values.count() as f64;
-        let found = influence(&study, &fit, 0, "4").unwrap();
+        let places = study.all_groups();
+        let found = influence(&study, &fit, &places[4]).unwrap();
         assert!((found.effects[0] - mean).abs() < 1e-9, "{found:?}");
         let change = (mean - 7.0) / fit.effects[0].std_error;
         assert!((found.largest_change() - change.abs()).abs() < 1e-6, "{found:?} {change}");
         // The innermost level is the session itself.
-        let names = study.all_groups();
-        assert_eq!(names.len(), 6 + 18 + 36);
-        assert_eq!(names[8], (1, "0 / 2".to_owned()));
-        let session = influence(&study, &fit, 2, &names[30].1).unwrap();
+        assert_eq!(places.len(), 6 + 18 + 36);
+        assert_eq!((places[8].level, places[8].name(&study)), (1, "0 / 2".to_owned()));
+        assert_eq!(places[24].name(&study), study.sessions[0].name);
+        let session = influence(&study, &fit, &places[30]).unwrap();
         assert!(session.largest_change() < found.largest_change());
     }
 }

@@ -30,7 +30,7 @@ pub use fit::{
     COVERAGE, Contrast, EffectEstimate, GroupShift, LevelDeviation, PopulationFit,
     PopulationOptions, fit_population,
 };
-pub use influence::{Influence, influence};
+pub use influence::{GroupPlace, Influence, influence};
 /// A symmetric matrix of one row for each parameter.
 pub use nalgebra::DMatrix as SymmetricMatrix;
 pub use plan::{ASSURANCE, PlannedEffect, PlannedStudy, plan_study};

@@ -27,9 +27,10 @@ pub struct PlannedStudy {
 pub struct PlannedEffect {
     pub effect: String,
     pub parameter: String,
-    /// Half the length of the 95 % interval, in logarithms, that is not exceeded in [`ASSURANCE`] of the studies.
+    /// Half the length of the 95 % interval, in logarithms, that is not exceeded in [`ASSURANCE`] of the studies; infinite where
+    /// more of them have no answer.
     pub half_width: f64,
-    /// Share of the studies in which the effect is seen: its probability without an effect is below 0.05.
+    /// Share of all studies in which the effect is seen: its probability without an effect is below 0.05.
     pub power: f64,
 }
 
@@ -42,7 +43,8 @@ enum Pattern<'a> {
 impl<'a> Pattern<'a> {
     fn of(study: &Study, sessions: &[&'a StudySession], level: usize) -> Self {
         if level + 1 == study.levels.len() {
-            return Self::Group(sessions.iter().copied().map(Self::Session).collect());
+            let own = sessions.iter().copied().map(|one| vec![one]).collect();
+            return Self::Group(alternating(own).iter().map(|one| Self::Session(one[0])).collect());
         }
         let mut groups: Vec<(&str, Vec<&'a StudySession>)> = Vec::new();
         for session in sessions.iter().copied() {
@@ -52,20 +54,20 @@ impl<'a> Pattern<'a> {
                 None => groups.push((name, vec![session])),
             }
         }
-        let mut groups: Vec<_> = groups.into_iter().map(|(_, own)| own).collect();
-        if level == 0 {
-            groups = alternating(groups);
-        }
+        let groups = alternating(groups.into_iter().map(|(_, own)| own).collect());
         Self::Group(groups.iter().map(|own| Self::of(study, own, level + 1)).collect())
     }
 }
 
 /// Groups of different effects in turn, so that the first few have all of them.
 fn alternating<'a>(groups: Vec<Vec<&'a StudySession>>) -> Vec<Vec<&'a StudySession>> {
+    let kind = |group: &[&'a StudySession]| -> Vec<&'a [f64]> {
+        group.iter().map(|one| one.design.as_slice()).collect()
+    };
     let mut kinds: Vec<Vec<Vec<&'a StudySession>>> = Vec::new();
     for group in groups {
-        match kinds.iter_mut().find(|kind| kind[0][0].design == group[0].design) {
-            Some(kind) => kind.push(group),
+        match kinds.iter_mut().find(|own| kind(&own[0]) == kind(&group)) {
+            Some(own) => own.push(group),
             None => kinds.push(vec![group]),
         }
     }
@@ -100,7 +102,10 @@ impl Drawing<'_> {
         match pattern {
             Pattern::Session(like) => sessions.push(self.session(like, shift, path)),
             Pattern::Group(members) => {
-                for (k, member) in (0..self.counts[level]).zip(members.iter().cycle()) {
+                // Groups begin with other members, so that few members of each have all effects between them.
+                let first = path.last().and_then(|place| place.parse().ok()).unwrap_or(0);
+                let members = members.iter().cycle().skip(first % members.len());
+                for (k, member) in (0..self.counts[level]).zip(members) {
                     let shift = shift + self.shift(level);
                     path.push(k.to_string());
                     self.add(member, &shift, path, sessions);
@@ -189,6 +194,8 @@ pub fn plan_study(
             .iter()
             .map(|fit| 0.5 * (fit.effects[k].interval[1] - fit.effects[k].interval[0]))
             .collect();
+        // A study without an answer has no interval.
+        widths.resize(studies, f64::INFINITY);
         widths.sort_by(f64::total_cmp);
         let seen = found.iter().filter(|fit| fit.effects[k].p_value < SIGNIFICANCE).count();
         let place = (ASSURANCE * widths.len() as f64).ceil() as usize;
@@ -196,7 +203,7 @@ pub fn plan_study(
             effect: one.effect.clone(),
             parameter: one.parameter.clone(),
             half_width: widths.get(place.max(1) - 1).copied().unwrap_or(f64::INFINITY),
-            power: seen as f64 / found.len().max(1) as f64,
+            power: seen as f64 / studies.max(1) as f64,
         }
     });
     PlannedStudy {
@@ -251,5 +258,38 @@ mod tests {
         // Four standard errors of a share of five percent.
         assert!((planned.effects[1].power - 0.05).abs() < 0.055, "{planned:?}");
         assert!(planned.effects[0].power > 0.99);
+    }
+
+    /// Twelve sessions, the first six of one treatment, or two operators in each place in the order in which they measured: small
+    /// studies have both all the same, so that each has an answer.
+    #[test]
+    fn small_studies_have_all_effects() {
+        let mut random = SplitMix::seeded(2);
+        let mut one_level = balanced(9.0, 2.0, 1.0);
+        one_level.effects.push("treated".into());
+        one_level.levels = vec!["session".into()];
+        one_level.sessions.truncate(12);
+        for (k, one) in one_level.sessions.iter_mut().enumerate() {
+            one.groups.clear();
+            one.design.push(f64::from(u8::from(k >= 6)));
+            one.values[0] = random.normal();
+        }
+        let mut within = balanced(9.0, 2.0, 1.0);
+        within.effects.push("operator".into());
+        for (k, one) in within.sessions.iter_mut().enumerate() {
+            one.design.push((k % 2) as f64);
+            one.values[0] += random.normal();
+        }
+        for (study, sizes) in
+            [(one_level, vec![vec![4], vec![6]]), (within, vec![vec![4, 3, 1], vec![4, 1, 2]])]
+        {
+            let fit = fit_population(&study, &PopulationOptions::default()).unwrap();
+            for counts in sizes {
+                let planned = plan_study(&study, &fit, &counts, 10, 1);
+                assert!(planned.studies >= 8, "{planned:?}");
+                let widths = planned.effects.iter().map(|one| one.half_width);
+                assert!(widths.into_iter().all(f64::is_finite), "{planned:?}");
+            }
+        }
     }
 }

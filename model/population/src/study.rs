@@ -214,12 +214,11 @@ impl StudySession {
         DVector::from_column_slice(&self.values)
     }
 
-    /// Its group of a level behind those that this belongs to; of the last level its own name.
+    /// Names of its group of a level and of those that this belongs to, the outermost first; of the last level with its own name.
     #[must_use]
-    pub fn group(&self, level: usize) -> String {
-        match self.groups.get(..=level) {
-            Some(path) => path.join(" / "),
-            None => self.name.clone(),
-        }
+    pub fn path(&self, level: usize) -> Vec<&str> {
+        let groups = self.groups.iter().take(level + 1).map(String::as_str);
+        let own = (level >= self.groups.len()).then_some(self.name.as_str());
+        groups.chain(own).collect()
     }
 }

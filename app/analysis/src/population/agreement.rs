@@ -1,15 +1,15 @@
 //! How far the sessions of two operators, rigs, sites or storages agree in one place.
 
 use super::curves::{Workers, best_values, read_curves};
+use super::design::{Design, name_of};
 use super::{PopulationError, keep, parameter_names};
 use crate::fit::FitRecipe;
 use crate::progress::Progress;
 use crate::report::panels::FigurePanels;
 use crate::report::text::{counted, table};
-use crate::study_table::{StudyRow, StudyTable, WITHIN, read_study};
+use crate::study_table::{StudyTable, WITHIN, read_study};
 use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries};
 use palpate_figures::uncertain::significant;
-use palpate_model::metadata::plain_value;
 use palpate_population::{Agreement, AgreementError, PairedPlace, agreement};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -55,6 +55,8 @@ pub struct AgreementReport {
     pub not_fitted: BTreeMap<String, String>,
     /// Sessions that are rejected or press no specimen.
     pub left_out: usize,
+    /// Sessions that lack the entry.
+    pub without_entry: usize,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -77,7 +79,8 @@ pub struct PlaceDifference {
 /// Compares the best values of the sessions of each place.
 ///
 /// # Errors
-/// The entry has more or fewer than two values, fewer than three places have both, or a session has no logarithm of a parameter.
+/// The entry has more or fewer than two values, or fewer than three places have both. A session that has no logarithm of a
+/// parameter counts as not fitted.
 pub fn agreements(
     request: &AgreementRequest<'_>,
     progress: &dyn Progress,
@@ -87,7 +90,11 @@ pub fn agreements(
     let entry = entry.ok_or_else(|| AgreementFailure::UnknownEntry { name: name() })?;
     let names = parameter_names(&request.recipe.options, request.parameters)?;
     let mut table = read_study(request.paths).map_err(PopulationError::from)?;
+    // The design of the places: every session must say where it was, without a contradiction.
+    let levels = ["animal", "specimen"].map(str::to_owned);
+    Design::of(&table, &levels, &[]).map_err(PopulationError::from)?;
     let values = two_values(&table, entry)?;
+    let without_entry = table.rows.iter().filter(|row| name_of(row, entry).is_none()).count();
     let workers = Workers { jobs: request.jobs, progress };
     let mut not_fitted = BTreeMap::new();
     let curves = read_curves(request.paths, request.recipe, &table, &workers)?;
@@ -102,15 +109,13 @@ pub fn agreements(
         Ok(ParameterAgreement { parameter, agreement, places: paired })
     });
     let parameters = parameters.collect::<Result<Vec<_>, AgreementFailure>>()?;
-    Ok(AgreementReport { entry, values, parameters, not_fitted, left_out: table.left_out.len() })
-}
-
-fn value(row: &StudyRow, entry: &str) -> Option<String> {
-    row.covariates.get(entry).filter(|value| !value.is_null()).map(plain_value)
+    let left_out = table.left_out.len();
+    Ok(AgreementReport { entry, values, parameters, not_fitted, left_out, without_entry })
 }
 
 fn two_values(table: &StudyTable, entry: &'static str) -> Result<[String; 2], AgreementFailure> {
-    let values: BTreeSet<String> = table.rows.iter().filter_map(|row| value(row, entry)).collect();
+    let values: BTreeSet<String> =
+        table.rows.iter().filter_map(|row| name_of(row, entry)).collect();
     let values: Vec<String> = values.into_iter().collect();
     values.try_into().map_err(|values: Vec<String>| AgreementFailure::Values {
         entry,
@@ -139,7 +144,7 @@ fn places(
             first: Vec::new(),
             second: Vec::new(),
         });
-        match value(row, entry) {
+        match name_of(row, entry) {
             Some(own) if own == values[0] => place.first.push(best[parameter]),
             Some(_) => place.second.push(best[parameter]),
             None => {}
@@ -187,6 +192,10 @@ impl AgreementReport {
         );
         for (session, reason) in &self.not_fitted {
             let _ = write!(text, "\n{session} was not fitted: {reason}");
+        }
+        if self.without_entry > 0 {
+            let sessions = counted(self.without_entry, "session");
+            let _ = write!(text, "\n{sessions} without {} left out", self.entry);
         }
         if self.left_out > 0 {
             let sessions = counted(self.left_out, "session");

@@ -16,6 +16,9 @@ const SESSION: &str = "session";
 /// The effect that all sessions have.
 pub(super) const MEAN: &str = "mean";
 
+/// How the note begins that says of which value of an entry the mean is.
+pub(super) const MEAN_AT: &str = "the mean is at ";
+
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DesignError {
     #[error("there is no level '{name}'; choose from {}, or an entry such as specimen.storage", LEVELS.join(", "))]
@@ -161,7 +164,7 @@ impl Design {
         let numbers: Vec<f64> = values.iter().filter_map(|(_, value)| value.as_f64()).collect();
         if numbers.len() == values.len() {
             let mean = numbers.iter().sum::<f64>() / numbers.len() as f64;
-            self.notes.push(format!("the mean is at {entry} = {mean:.4}"));
+            self.notes.push(format!("{MEAN_AT}{entry} = {mean:.4}"));
             self.columns.push(Column::From { entry, mean });
             return Ok(());
         }
@@ -171,7 +174,7 @@ impl Design {
         self.values.push((entry, words.iter().cloned().collect()));
         let mut words = words.into_iter();
         if let Some(first) = words.next() {
-            self.notes.push(format!("the mean is at {entry} = {first}"));
+            self.notes.push(format!("{MEAN_AT}{entry} = {first}"));
         }
         self.columns.extend(words.map(|value| Column::Is { entry, value }));
         Ok(())
@@ -302,7 +305,7 @@ fn entry_of(level: &str) -> &str {
     }
 }
 
-fn name_of(row: &StudyRow, level: &str) -> Option<String> {
+pub(super) fn name_of(row: &StudyRow, level: &str) -> Option<String> {
     match level {
         "animal" => row.animal.clone(),
         "specimen" => row.specimen.clone(),

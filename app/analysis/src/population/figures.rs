@@ -10,7 +10,7 @@ use palpate_population::{GroupShift, PopulationFit, normal_scores};
 
 pub(super) const CURVES: &str = "curves";
 /// Most rows of a plot that are named; more leave no room for their names.
-const NAMED_MAX: usize = 30;
+const NAMED_MAX: usize = 60;
 /// Standard errors in half of the interval of a shift.
 const HALF: f64 = 1.96;
 
@@ -136,19 +136,27 @@ fn effects_plot(report: &PopulationReport) -> Option<Plot> {
     // Those of an entry with three or more values are among its comparisons.
     let compared = |row: &EffectRow| {
         let mut entries = report.comparisons.iter().map(|one| one.difference.effect.as_str());
-        let entry = row.effect.split(" = ").next().unwrap_or_default();
-        entries.any(|name| name.split(" = ").next() == Some(entry))
+        entries.any(|name| entry_of(name) == entry_of(&row.effect))
     };
     let own = report.effects.iter().filter(|one| !is_mean(&one.effect) && !compared(one));
     let row = |one: &EffectRow| Row {
         // The value alone: there is little room.
-        name: format!("{}: {}", one.parameter, one.effect.rsplit(" = ").next().unwrap_or_default()),
+        name: format!("{}: {}", one.parameter, value_of(&one.effect)),
         value: one.factor,
         ends: one.factor_interval,
     };
     let mut rows: Vec<Row> = own.chain(comparisons).map(row).collect();
     rows.reverse();
     (!rows.is_empty()).then(|| rows_plot("", "factor", &rows))
+}
+
+/// An effect of a text is `entry = value`; entries have no equals sign.
+fn entry_of(effect: &str) -> &str {
+    effect.split_once(" = ").map_or(effect, |(entry, _)| entry)
+}
+
+fn value_of(effect: &str) -> &str {
+    effect.split_once(" = ").map_or(effect, |(_, value)| value)
 }
 
 fn groups_plot(

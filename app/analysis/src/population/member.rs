@@ -70,9 +70,16 @@ pub fn draw_member(library: &Path, text: &str) -> Result<PopulationMember, Membe
     let (described, number) =
         text.strip_prefix(PREFIX).and_then(|rest| rest.rsplit_once('#')).ok_or_else(form)?;
     let number: u32 = number.parse().map_err(|_| form())?;
-    let mut values = described.split('/');
-    let name = values.next().unwrap_or_default();
-    let values = values.map(|one| one.split_once('=').ok_or_else(form));
+    let (name, values) = described.split_once('/').unwrap_or((described, ""));
+    let mut pairs: Vec<String> = Vec::new();
+    for part in values.split('/').filter(|_| !values.is_empty()) {
+        match pairs.last_mut() {
+            // A value may have a slash, as in 5 mg/kg.
+            Some(before) if !part.contains('=') => *before += &format!("/{part}"),
+            _ => pairs.push(part.to_owned()),
+        }
+    }
+    let values = pairs.iter().map(|one| one.split_once('=').ok_or_else(form));
     let values = values.collect::<Result<Vec<_>, _>>()?;
     let store = PopulationStore::open(library);
     let stored = store.find(name)?;

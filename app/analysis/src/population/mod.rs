@@ -16,6 +16,7 @@ pub use agreement::{
     AgreementFailure, AgreementReport, AgreementRequest, ParameterAgreement, PlaceDifference,
     agreements,
 };
+use design::MEAN_AT;
 pub use design::{Design, DesignError};
 pub use figures::PopulationFigure;
 pub use member::{MemberError, PopulationMember, draw_member, is_member, library_member};
@@ -100,6 +101,8 @@ pub enum PopulationError {
     Read(#[from] StudyReadError),
     #[error(transparent)]
     Design(#[from] DesignError),
+    #[error("{reason}; {first}, which was not fitted: {why}")]
+    Fitted { reason: DesignError, first: String, why: String },
     #[error(transparent)]
     Study(#[from] StudyError),
     #[error(transparent)]
@@ -157,7 +160,7 @@ pub fn population(
     if request.method == PopulationMethod::Stored {
         let stored = read_stored(request, &table, &workers)?;
         let stored = keep(&mut table, stored, &mut not_fitted)?;
-        let design = Design::of(&table, request.levels, request.effects)?;
+        let design = design_of_fitted(request, &table, &not_fitted)?;
         let best = stored.iter().map(|one| one.of_parameters(&names));
         let study = study(&names, &design, &table, best)?;
         let found = StudyFound { design, study, rounds: None, table, not_fitted };
@@ -173,7 +176,7 @@ pub fn population(
     let fitted: Vec<&Curve> = fitted.map(|(curve, _)| curve).collect();
     let fits = keep(&mut table, fits, &mut not_fitted)?;
     let likelihoods = likelihoods(&names, &table, &fits)?;
-    let design = Design::of(&table, request.levels, request.effects)?;
+    let design = design_of_fitted(request, &table, &not_fitted)?;
     let best =
         likelihoods.iter().map(|one| one.expand_at_best().ok_or_else(|| inseparable(&names)));
     let mut study = study(&names, &design, &table, best)?;
@@ -197,6 +200,21 @@ pub fn population(
         let specimen = &known[..known.len().min(options.body_names().len())];
         let origin = PopulationOrigin::of(design, table, (specimen, &names), &fitted, &fits);
         (curves.flatten(), Some(origin))
+    })
+}
+
+/// The design of the sessions that were fitted. Where the others are missed, a refusal says why they were not.
+fn design_of_fitted(
+    request: &PopulationRequest<'_>,
+    table: &StudyTable,
+    not_fitted: &BTreeMap<String, String>,
+) -> Result<Design, PopulationError> {
+    let design = Design::of(table, request.levels, request.effects);
+    design.map_err(|reason| match not_fitted.first_key_value() {
+        None => reason.into(),
+        Some((first, why)) => {
+            PopulationError::Fitted { reason, first: format!("without {first}"), why: why.clone() }
+        }
     })
 }
 

@@ -12,6 +12,8 @@ use std::collections::BTreeMap;
 
 /// Number of studies drawn for each size of a study.
 const DRAWN_STUDIES: usize = 50;
+/// Of more sessions than this, groups alone are left out in turn: each takes a fit of all others.
+const SESSIONS_LEFT_OUT_MAX: usize = 500;
 /// Numbers of outermost groups of the studies that are drawn, as many as are measured in practice.
 const GROUPS: [usize; 7] = [4, 6, 8, 12, 16, 24, 32];
 /// Numbers of sessions in each innermost group: more help little where groups differ.
@@ -88,15 +90,17 @@ pub(super) fn influences(
     fit: &PopulationFit,
     workers: &Workers<'_>,
 ) -> Result<InfluenceReport, PopulationError> {
-    let groups = study.all_groups();
-    let found = workers
-        .all("groups left out", &groups, |(level, group)| influence(study, fit, *level, group))?;
+    let mut groups = study.all_groups();
+    if study.sessions.len() > SESSIONS_LEFT_OUT_MAX {
+        groups.retain(|one| one.level + 1 < study.levels.len());
+    }
+    let found = workers.all("groups left out", &groups, |group| influence(study, fit, group))?;
     let mut report = InfluenceReport::default();
-    for ((level, group), found) in groups.into_iter().zip(found) {
+    for (group, found) in groups.into_iter().zip(found) {
         match found {
             Ok(found) => report.groups.push(found),
             Err(reason) => {
-                let name = format!("{} {group}", study.levels[level]);
+                let name = format!("{} {}", study.levels[group.level], group.name(study));
                 report.impossible.insert(name, reason.to_string());
             }
         }
@@ -135,7 +139,7 @@ pub(super) fn plan(
 /// The number of members in a group of each level but the last, rounded, of the levels between the outermost and the sessions.
 fn typical_members(study: &Study) -> Vec<usize> {
     let count = |level: usize| {
-        let names = study.sessions.iter().map(|one| one.group(level));
+        let names = study.sessions.iter().map(|one| one.path(level));
         names.collect::<std::collections::BTreeSet<_>>().len()
     };
     let counts: Vec<usize> = (0..study.levels.len() - 1).map(count).collect();

@@ -257,7 +257,7 @@ impl PopulationReport {
         let outlying = self.outlying.iter().map(|one| {
             let Outlying { parameter, level, group, .. } = one;
             format!(
-                "{parameter}: {level} {group} is farther from the others than normal ones are; look at it, since one such {level} makes the interval of the standard deviation between {level}s wrong"
+                "{parameter}: {level} {group} is farther from the others than normal ones are; look at it, since one such {level} may make the interval of the standard deviation between {level}s wrong; one of twenty such tests says so of normal {level}s"
             )
         });
         let not_fitted = self.not_fitted.iter();
@@ -338,7 +338,10 @@ impl PlanReport {
             let widest = one.effects.iter().max_by(|a, b| a.half_width.total_cmp(&b.half_width));
             let widest = widest.map_or("-".to_owned(), |one| {
                 let percent = 100.0 * one.half_width.exp_m1();
-                format!("{percent:.0} % ({} of {})", one.effect, one.parameter)
+                match percent.is_finite() {
+                    true => format!("{percent:.0} % ({} of {})", one.effect, one.parameter),
+                    false => "no answer".to_owned(),
+                }
             });
             let effects = one.effects.iter().filter(|one| !is_mean(&one.effect));
             let seen: Vec<String> = effects
@@ -356,11 +359,14 @@ impl PlanReport {
         let _ = match self.smallest() {
             Some(one) => write!(
                 text,
-                "\nthe smallest study in which no interval is wider than {wanted} % has {} ({} sessions)",
+                "\nthe smallest study in which no end of an interval is off by more than {wanted} % has {} ({} sessions)",
                 counted(one.counts[0], &self.levels[0]),
                 one.sessions
             ),
-            None => write!(text, "\nno study of these sizes has intervals of {wanted} % or less"),
+            None => write!(
+                text,
+                "\nin no study of these sizes all ends of intervals are off by {wanted} % or less"
+            ),
         };
         text
     }

@@ -5,7 +5,7 @@ use super::report::{
     COMPARISON_HEAD, ComparisonRow, DEVIATION_HEAD, DeviationRow, EFFECT_HEAD, EffectRow,
     PopulationReport, is_mean, probability,
 };
-use super::{Population, PopulationMethod};
+use super::{MEAN_AT, Population, PopulationMethod};
 use crate::report::text::counted;
 use palpate_figures::page::{HtmlBody, document};
 use palpate_figures::uncertain::significant;
@@ -41,13 +41,18 @@ pub fn write_results(population: &Population, folder: &Path) -> io::Result<()> {
 }
 
 fn csv(head: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let cell = |text: &String| match text.contains([',', '"', '\n']) {
+    let cell = |text: &String| match text.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
         false => text.clone(),
     };
     let line = |cells: &[String]| cells.iter().map(cell).collect::<Vec<_>>().join(",") + "\n";
     let rows = rows.into_iter().map(|row| line(&row));
     std::iter::once(line(head)).chain(rows).collect()
+}
+
+/// A text that a spreadsheet does not run as a formula.
+fn harmless(text: &str) -> String {
+    if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() }
 }
 
 fn names<const N: usize>(names: [&str; N]) -> Vec<String> {
@@ -141,13 +146,13 @@ fn sessions_csv(population: &Population) -> String {
         let covariances =
             pairs.iter().map(|pair| optional(covariance.as_ref().map(|all| all[*pair])));
         let numbers = one.design.iter().chain(&one.values).map(f64::to_string);
-        let words = std::iter::once(one.name.clone()).chain(one.groups.iter().cloned());
+        let words = std::iter::once(&one.name).chain(&one.groups).map(|text| harmless(text));
         words.chain(numbers).chain(covariances).collect()
     });
     csv(&head.collect::<Vec<_>>(), rows)
 }
 
-/// Both tables for LaTeX, without a package.
+/// The tables for LaTeX, without a package.
 fn latex(report: &PopulationReport) -> String {
     let table = |head: &str, rows: Vec<Vec<String>>| {
         let columns = head.split(" | ").count();
@@ -164,7 +169,12 @@ fn latex(report: &PopulationReport) -> String {
     };
     let effects = report.effects.iter().map(EffectRow::cells).collect();
     let deviations = report.standard_deviations.iter().map(DeviationRow::cells).collect();
-    format!("{}\n{}", table(EFFECT_HEAD, effects), table(DEVIATION_HEAD, deviations))
+    let mut tables = vec![table(EFFECT_HEAD, effects), table(DEVIATION_HEAD, deviations)];
+    if !report.comparisons.is_empty() {
+        let comparisons = report.comparisons.iter().map(ComparisonRow::cells).collect();
+        tables.insert(1, table(COMPARISON_HEAD, comparisons));
+    }
+    tables.join("\n")
 }
 
 fn latex_text(text: &str) -> String {
@@ -175,6 +185,9 @@ fn latex_text(text: &str) -> String {
             '~' => out += "\\textasciitilde{}",
             '^' => out += "\\textasciicircum{}",
             '<' => out += "$<$",
+            '>' => out += "$>$",
+            '|' => out += "\\textbar{}",
+            '"' => out += "''",
             '·' => out += "$\\cdot$",
             '²' => out += "$^2$",
             '³' => out += "$^3$",
@@ -202,6 +215,11 @@ pub fn paragraph(report: &PopulationReport) -> String {
         groups.join(" of "),
         find_family(&report.model).map_or_else(|_| report.model.clone(), |one| one.name()),
     );
+    let reference: Vec<&str> =
+        report.notes.iter().filter_map(|note| note.strip_prefix(MEAN_AT)).collect();
+    if !reference.is_empty() {
+        text += &format!(" Medians are those at {}.", reference.join(", "));
+    }
     for one in report.effects.iter().filter(|one| is_mean(&one.effect)) {
         text += &parameter_sentences(report, one);
     }
@@ -226,9 +244,13 @@ fn parameter_sentences(report: &PopulationReport, mean: &EffectRow) -> String {
                 small if small.starts_with('<') => format!("p {small}"),
                 p => format!("p = {p}"),
             };
+            // A number has an effect for each unit, a text for each of its values.
+            let with = match one.effect.contains(" = ") {
+                true => format!("With {}", one.effect),
+                false => format!("For each unit of {}", one.effect),
+            };
             text += &format!(
-                " With {} it was {} times that ({}; {:.1} degrees of freedom; {p}).",
-                one.effect,
+                " {with} it was {} times that ({}; {:.1} degrees of freedom; {p}).",
                 significant(one.factor, 3),
                 ends(one.factor_interval),
                 one.freedom,
@@ -249,11 +271,15 @@ fn parameter_sentences(report: &PopulationReport, mean: &EffectRow) -> String {
         between.collect::<Vec<_>>().join(", ")
     );
     text += &match rows.next_back() {
-        Some(last) => format!(
-            "; 95 % of pairs of {}s in one place are within a factor of {}.",
-            last.estimate.level,
-            significant(last.pair_factor, 3)
-        ),
+        Some(last) => {
+            let place = rows.next_back().map(|outer| format!(" of one {}", outer.estimate.level));
+            format!(
+                "; without the noise of their curves 95 % of pairs of {}s{} are within a factor of {}.",
+                last.estimate.level,
+                place.unwrap_or_default(),
+                significant(last.pair_factor, 3)
+            )
+        }
         None => ".".to_owned(),
     };
     text
@@ -285,7 +311,7 @@ fn page(report: &PopulationReport, figures: &[PopulationFigure]) -> String {
         body.figure(&figure.panels.drawing().svg(), &figure.caption);
     }
     if figures.iter().all(|one| one.stem != CURVES) {
-        body.paragraph("Curves are drawn where all parameters of the model are in the population.");
+        body.paragraph("Curves are drawn where all parameters of the model are in the population, and the model describes most of its specimens.");
     }
     document("Population", body)
 }

@@ -6,11 +6,14 @@ use crate::study_table::StudyRow;
 use palpate_figures::thin::thin;
 use palpate_model::random::SplitMix;
 use palpate_population::{PopulationFit, Study};
+use palpate_rheology::families::find_family;
 use palpate_rheology::fit::{FitReport, FitSample};
 
 /// Specimens that a band is drawn from: its edges are their fifth from either end.
 const SPECIMENS: usize = 200;
 const OUTSIDE: usize = 5;
+/// Most specimens that are tried for these: of fewer than half the model says nothing, and a band would say too much.
+const TRIES_MAX: usize = 2 * SPECIMENS;
 /// Columns in which samples that lie above each other are drawn as two.
 const COLUMNS: usize = 300;
 const CONTACT: &str = "x_contact";
@@ -30,7 +33,8 @@ pub struct CurveKind {
     pub band: [Vec<[f64; 2]>; 2],
 }
 
-/// Curves of all kinds, those of the population along the motion of one session.
+/// Curves of all kinds, those of the population along the motion of one session; none where the model does not describe more than half
+/// of the specimens.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PopulationCurves {
     pub kinds: Vec<CurveKind>,
@@ -50,7 +54,7 @@ pub(super) fn curves(
     let mut kinds: Vec<CurveKind> = Vec::new();
     for (name, columns) in design.kinds("sessions") {
         let [low, median, high] =
-            expected(first, &motion.samples, &columns, population, &mut random);
+            expected(first, &motion.samples, &columns, population, &mut random)?;
         kinds.push(CurveKind { name, curves: Vec::new(), median, band: [low, high] });
     }
     for ((row, record), report) in rows.iter().zip(records).zip(reports).take(CURVES_MAX) {
@@ -85,7 +89,8 @@ fn expected(
     columns: &[f64],
     (study, fit): (&Study, &PopulationFit),
     random: &mut SplitMix,
-) -> [Vec<[f64; 2]>; 3] {
+) -> Option<[Vec<[f64; 2]>; 3]> {
+    let outer = find_family(&report.body.family).ok()?.outer();
     let count = study.parameters.len();
     let mean = |k: usize| -> f64 {
         let own = fit.effects.iter().skip(k).step_by(count);
@@ -95,17 +100,31 @@ fn expected(
         let own = fit.standard_deviations.iter().skip(k).step_by(count);
         own.map(|one| one.value.powi(2)).sum::<f64>().sqrt()
     };
+    // None of a specimen that the family does not describe, such as one with an exponent beyond its range.
     let forces = |shifts: &[f64]| {
         let values = (0..count).map(|k| (mean(k) + deviation(k) * shifts[k]).exp());
-        let values = study.parameters.iter().map(String::as_str).zip(values);
-        let report = report.clone().with_values(values.chain([(OFFSET, 0.0)]));
-        report.predict(samples).into_iter().map(|force| force.0).collect::<Vec<f64>>()
+        let values: Vec<(&str, f64)> =
+            study.parameters.iter().map(String::as_str).zip(values).collect();
+        let is_allowed = |name: &str, value: f64| {
+            outer.iter().all(|one| one.name != name || one.range.allows(value).is_ok())
+        };
+        if !values.iter().all(|(name, value)| is_allowed(name, *value)) {
+            return None;
+        }
+        let report = report.clone().with_values(values.into_iter().chain([(OFFSET, 0.0)]));
+        let forces = report.predict(samples).into_iter().map(|force| force.0);
+        let forces: Vec<f64> = forces.collect();
+        forces.iter().all(|force| force.is_finite()).then_some(forces)
     };
-    let specimens = (0..SPECIMENS).map(|_| {
+    let median = forces(&vec![0.0; count])?;
+    let specimens = (0..TRIES_MAX).filter_map(|_| {
         let shifts: Vec<f64> = (0..count).map(|_| random.normal()).collect();
         forces(&shifts)
     });
-    let specimens: Vec<Vec<f64>> = specimens.collect();
+    let specimens: Vec<Vec<f64>> = specimens.take(SPECIMENS).collect();
+    if specimens.len() < SPECIMENS {
+        return None;
+    }
     let mut edges = [Vec::new(), Vec::new()];
     for sample in 0..samples.len() {
         let mut all: Vec<f64> = specimens.iter().map(|one| one[sample]).collect();
@@ -121,5 +140,5 @@ fn expected(
         whole.into_iter().step_by(stride).collect()
     };
     let [low, high] = edges.map(line);
-    [low, line(forces(&vec![0.0; count])), high]
+    Some([low, line(median), high])
 }

@@ -162,9 +162,10 @@ fn read(
     if let Ok(library) = library_folder() {
         super::recover::recover_unfinished(&library, output);
     }
-    let bench = super::rig::open(&options.rig.with_specimen(&options.specimen)?)?;
-    let (protocol, written, _) = super::protocol::load_checked(name, values, &bench, output)?;
     let mut labels = labels(options)?;
+    // Wherever the specimen was named, its tissue is that of the name.
+    let bench = super::rig::open(&options.rig.with_specimen(&labels.specimen)?)?;
+    let (protocol, written, _) = super::protocol::load_checked(name, values, &bench, output)?;
     if let Ok(library) = library_folder() {
         // Whoever measures may be blinded, so what is added is not shown.
         complete_labels(&mut labels, &library).map_err(Failure::usage)?;
