@@ -6,6 +6,15 @@ use serde::{Deserialize, Serialize};
 /// Version of the document. A reader refuses a higher one.
 pub const POPULATION_FORMAT: u32 = 1;
 
+/// How the specimens of a population begin where they are written: `population:NAME#7`.
+pub const MEMBER_PREFIX: &str = "population:";
+
+/// Whether a text means a specimen of a population.
+#[must_use]
+pub fn is_member(text: &str) -> bool {
+    text.starts_with(MEMBER_PREFIX)
+}
+
 /// Letters that end a name where a specimen of a population is written.
 const ENDS_OF_NAME: [char; 2] = ['/', '#'];
 

@@ -123,6 +123,13 @@ fn names(sessions: &[String]) -> String {
     }
 }
 
+/// How many sessions do not count and why; none where all do.
+#[must_use]
+pub(crate) fn left_out_words(count: usize) -> Option<String> {
+    let sessions = counted(count, "session");
+    (count > 0).then(|| format!("{sessions} left out: rejected, or a calibration or daily check"))
+}
+
 #[derive(Debug, Error)]
 pub enum StudyReadError {
     #[error(transparent)]
@@ -205,9 +212,8 @@ impl StudyTable {
         let head = head.collect::<Vec<_>>().join(" | ");
         let mut text = table(&head, self.rows.iter().map(|row| row.cells(&known)));
         text += &format!("\n{}", counted(self.rows.len(), "session"));
-        if !self.left_out.is_empty() {
-            let left_out = counted(self.left_out.len(), "session");
-            text += &format!("; {left_out} rejected or without a specimen left out");
+        if let Some(words) = left_out_words(self.left_out.len()) {
+            text += &format!("; {words}");
         }
         for problem in &self.problems {
             text += &format!("\n{problem}");

@@ -103,7 +103,30 @@ fn specimens_that_cannot_be_simulated_are_refused_in_one_sentence() {
         assert_refused(&typed(at, &line), 2, says);
     }
     assert!(!at.join("run").exists());
+    // However the specimen is named, its tissue is simulated or the run is refused.
+    let about = "run ramp-hold --speed 3 --depth 6 --hold 1 --time-scale max --out named --truth named.json --about";
+    succeeded(&typed(at, &format!("{about} specimen=population:pad#1")));
+    assert_ne!(read(&at.join("named.json"))["parameters"]["mu1"], Value::Null);
+    assert!(read(&at.join("named.json"))["settings"]["mu1"].is_string());
+    std::fs::write(at.join("mounted.toml"), MOUNTED).unwrap();
+    let refused = typed(at, "run mounted.toml --time-scale max --out mounted");
+    assert_refused(&refused, 1, "the rig does not simulate 'population:pad#1'");
 }
+
+/// A programme whose specimen is named in it.
+const MOUNTED: &str = r#"
+palpate-programme = 1
+name = "mounted"
+title = "One press"
+
+[about]
+specimen = "population:pad#1"
+
+[[task]]
+name = "press"
+protocol = "ramp-hold"
+set = { depth = "6 mm", hold = "1 s", speed = "3 mm/s" }
+"#;
 
 /// What is saved is what was printed, and a specimen of it is recorded like any other.
 #[test]

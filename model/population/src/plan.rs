@@ -292,4 +292,24 @@ mod tests {
             }
         }
     }
+
+    /// Without one of two treatments no study has an answer, and none is said to be narrow.
+    #[test]
+    fn studies_without_an_answer_are_infinitely_wide() {
+        let mut study = balanced(9.0, 2.0, 1.0);
+        study.effects.push("treated".into());
+        let count = study.sessions.len();
+        for (k, one) in study.sessions.iter_mut().enumerate() {
+            one.design.push(f64::from(u8::from(k + 1 == count)));
+        }
+        let fit = fit_population(&study, &PopulationOptions::default()).unwrap();
+        for one in &mut study.sessions {
+            one.design[1] = 0.0;
+        }
+        let planned = plan_study(&study, &fit, &[4, 2, 2], 5, 1);
+        assert_eq!(planned.studies, 0);
+        for one in &planned.effects {
+            assert!(one.half_width.is_infinite() && one.power == 0.0, "{one:?}");
+        }
+    }
 }

@@ -9,9 +9,11 @@ use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::metadata::SessionLabels;
 use palpate_model::rig::{Limits, RigDescription};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::engine::{ENGINE_VERSION, EngineConfig};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
+use palpate_sessions::populations::is_member;
 use palpate_sessions::{
     Manifest, RECORD_VERSION, RecordingPace, SessionFolder, SessionWriter, check_free_space,
     library_folder, new_session_folder, new_session_id, spare_folder,
@@ -97,6 +99,14 @@ pub(super) fn start(
         complete_labels(&mut labels, &library).map_err(|err| refused(err.to_string()))?;
     }
     labels.check().map_err(|err| refused(err.to_string()))?;
+    // A session must not name a simulated specimen that was not simulated.
+    let is_simulated = context.rig.settings.contains_key(ModifiedKelvin::THESIS.named()[0].0);
+    if is_member(&labels.specimen) && !is_simulated {
+        return Err(refused(format!(
+            "the rig does not simulate '{}'; start this run with --specimen on the command line, or give the name of the specimen on the rig",
+            labels.specimen
+        )));
+    }
 
     let started_at = wall_now();
     let session_id = new_session_id(started_at.into());

@@ -7,7 +7,7 @@ use crate::fit::FitRecipe;
 use crate::progress::Progress;
 use crate::report::panels::FigurePanels;
 use crate::report::text::{counted, table};
-use crate::study_table::{StudyTable, WITHIN, read_study};
+use crate::study_table::{StudyTable, WITHIN, left_out_words, read_study};
 use palpate_figures::figure::{Ink, Plot, PlotAxis, PlotLevel, PlotSeries};
 use palpate_figures::uncertain::significant;
 use palpate_population::{Agreement, AgreementError, PairedPlace, agreement};
@@ -197,9 +197,8 @@ impl AgreementReport {
             let sessions = counted(self.without_entry, "session");
             let _ = write!(text, "\n{sessions} without {} left out", self.entry);
         }
-        if self.left_out > 0 {
-            let sessions = counted(self.left_out, "session");
-            let _ = write!(text, "\n{sessions} rejected or without a specimen left out");
+        if let Some(words) = left_out_words(self.left_out) {
+            let _ = write!(text, "\n{words}");
         }
         text
     }

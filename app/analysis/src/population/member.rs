@@ -6,13 +6,12 @@ use palpate_population::MemberDistribution;
 use palpate_sessions::LibraryError;
 use palpate_sessions::folder::{FolderError, library_folder};
 use palpate_sessions::populations::{
-    PopulationDocument, PopulationEffect, PopulationParameter, PopulationStore,
+    MEMBER_PREFIX, PopulationDocument, PopulationEffect, PopulationParameter, PopulationStore,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use thiserror::Error;
 
-const PREFIX: &str = "population:";
 /// Families whose members are modified Kelvin models, with the number of their elastic coefficients.
 const FAMILIES: [(&str, usize); 3] = [("series-1", 1), ("series-2", 2), ("series-3", 3)];
 
@@ -52,12 +51,6 @@ pub struct PopulationMember {
     pub depth_max_mm: f64,
 }
 
-/// Whether a text means a member of a population.
-#[must_use]
-pub fn is_member(text: &str) -> bool {
-    text.starts_with(PREFIX)
-}
-
 /// Draws the member that a text means from the library of this computer.
 pub fn library_member(text: &str) -> Result<PopulationMember, MemberError> {
     draw_member(&library_folder()?, text)
@@ -68,7 +61,7 @@ pub fn library_member(text: &str) -> Result<PopulationMember, MemberError> {
 pub fn draw_member(library: &Path, text: &str) -> Result<PopulationMember, MemberError> {
     let form = || MemberError::Form { text: text.to_owned() };
     let (described, number) =
-        text.strip_prefix(PREFIX).and_then(|rest| rest.rsplit_once('#')).ok_or_else(form)?;
+        text.strip_prefix(MEMBER_PREFIX).and_then(|rest| rest.rsplit_once('#')).ok_or_else(form)?;
     let number: u32 = number.parse().map_err(|_| form())?;
     let (name, values) = described.split_once('/').unwrap_or((described, ""));
     let mut pairs: Vec<String> = Vec::new();

@@ -19,7 +19,8 @@ pub use agreement::{
 use design::MEAN_AT;
 pub use design::{Design, DesignError};
 pub use figures::PopulationFigure;
-pub use member::{MemberError, PopulationMember, draw_member, is_member, library_member};
+pub use member::{MemberError, PopulationMember, draw_member, library_member};
+pub use palpate_sessions::populations::is_member;
 pub use questions::{ComparisonRow, InfluenceReport, PlanReport};
 pub use report::{DeviationRow, EffectRow, LevelRow, Outlying, ParameterLines, PopulationReport};
 pub use results::{paragraph, write_results};
@@ -29,9 +30,8 @@ pub use specimens::{CurveKind, PopulationCurves};
 use crate::compliance::ComplianceCorrections;
 use crate::fit::{FitChoice, FitChoiceError, FitRecipe, StoredFitError};
 use crate::progress::Progress;
-use crate::report::text::counted;
 use crate::source::{RecordStretch, SourceSelection};
-use crate::study_table::{StudyReadError, StudyRow, StudyTable, read_study};
+use crate::study_table::{StudyReadError, StudyRow, StudyTable, left_out_words, read_study};
 use curves::{Curve, Workers, curve_evidence, read_curves};
 use palpate_population::{
     CurveRounds, PopulationFit, PopulationOptions, Study, StudyError, StudySession, expand_curves,
@@ -41,7 +41,7 @@ use palpate_rheology::fit::{
     CurveLikelihood, FitError, FitOptions, FitSolution, LikelihoodExpansion, SignalRecord,
 };
 use palpate_tables::lake::LakeError;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::PathBuf;
@@ -49,8 +49,7 @@ use stored::read_stored;
 use thiserror::Error;
 
 /// How sessions enter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PopulationMethod {
     /// Each with the likelihood of its curve, around what the population says of it.
     #[default]
@@ -59,6 +58,24 @@ pub enum PopulationMethod {
     TwoStage,
     /// The same, as the fits of a lake stored them: no curve is read.
     Stored,
+}
+
+impl PopulationMethod {
+    /// As files and machines name it.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::Curves => "curves",
+            Self::TwoStage => "two-stage",
+            Self::Stored => "stored",
+        }
+    }
+}
+
+impl Serialize for PopulationMethod {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.key())
+    }
 }
 
 /// How the sessions of a study are fitted: their loading and hold, by a family, or without one by the modified Kelvin model.
@@ -300,10 +317,7 @@ fn notes(
     is_bounded: bool,
 ) -> Vec<String> {
     let mut notes = design.notes.clone();
-    if !table.left_out.is_empty() {
-        let sessions = counted(table.left_out.len(), "session");
-        notes.push(format!("{sessions} rejected or without a specimen left out"));
-    }
+    notes.extend(left_out_words(table.left_out.len()));
     if let Some(CurveRounds { rounds, is_converged: false }) = rounds {
         notes.push(format!(
             "the expansions of the curves still moved after {rounds} rounds; compare with the best values of the sessions"

@@ -2,7 +2,7 @@
 
 use super::curves::Curve;
 use super::design::{Design, MEAN};
-use super::{Population, PopulationMethod, PopulationReport};
+use super::{Population, PopulationReport};
 use crate::study_table::StudyTable;
 use palpate_model::estimate::FittedParameter;
 use palpate_rheology::fit::FitSolution;
@@ -118,12 +118,7 @@ fn document(
         estimated_at: format_time(wall_now()),
         software_version: env!("CARGO_PKG_VERSION").to_owned(),
         family: report.model.clone(),
-        method: match report.method {
-            PopulationMethod::Curves => "curves",
-            PopulationMethod::TwoStage => "two-stage",
-            PopulationMethod::Stored => "stored",
-        }
-        .to_owned(),
+        method: report.method.key().to_owned(),
         levels: report.levels.iter().map(|one| one.level.clone()).collect(),
         effects: origin.effects.clone(),
         parameters: parameters.collect(),

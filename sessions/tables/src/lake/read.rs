@@ -10,7 +10,7 @@ use palpate_sessions::manifest::{Manifest, RECORD_VERSION};
 use palpate_sessions::record::{EntryKind, LogEntry};
 use palpate_sessions::text::crc32_of;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
-use polars_io::prelude::{ParquetReader, SerReader};
+use polars_io::prelude::{ParallelStrategy, ParquetReader, SerReader};
 use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
@@ -140,8 +140,10 @@ fn read_table<T>(
         return Err(LakeError::Bad { path: path.into(), reason: "its checksum is wrong".into() });
     }
     file.rewind().map_err(failed)?;
+    // One row needs no threads, whose start takes longer than the reading.
+    let threads = if columns.is_some() { ParallelStrategy::None } else { ParallelStrategy::Auto };
     let columns = columns.map(|names| names.iter().map(|&name| name.to_owned()).collect());
-    let reader = ParquetReader::new(file).with_columns(columns);
+    let reader = ParquetReader::new(file).with_columns(columns).read_parallel(threads);
     let parsed = reader.finish().and_then(|frame| parse(&frame));
     parsed.map_err(|err| LakeError::Bad { path: path.into(), reason: err.to_string() })
 }
