@@ -11,6 +11,9 @@ const STIFFNESS: [(&str, &str, [u32; 2]); 4] = [
     ("pig-4", "enzyme", [140, 150]),
 ];
 
+/// How both specimens of an animal were stored.
+const STORAGES: [&str; 2] = ["fresh", "frozen"];
+
 /// Two presses on each specimen.
 pub(crate) fn record_study(at: &Path) {
     for (animal, treatment, stiffness) in STIFFNESS {
@@ -20,6 +23,7 @@ pub(crate) fn record_study(at: &Path) {
                     format!("animal.name={animal}"),
                     format!("animal.treatment={treatment}"),
                     format!("series.repeat={repeat}"),
+                    format!("specimen.storage={}", STORAGES[specimen]),
                 ];
                 let specimen = format!("{animal} liver {specimen}");
                 let (percent, seed) = (percent.to_string(), (percent * 10 + repeat).to_string());
@@ -207,4 +211,36 @@ fn two_operators_agree_but_for_their_bias() {
     };
     refused(" --between weather", 2, "two of 'weather' cannot be compared");
     refused(" --between rig", 2, "two values of rig are compared, and these sessions have 1 (sim)");
+}
+
+/// Both halves of a pair are of one animal: the effect is the mean of their ratios, and is judged by the four animals.
+#[test]
+fn an_effect_within_animals_is_judged_by_its_pairs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    record_study(at);
+    let line = "population study --family series-1 --parameters mu1 --effect specimen.storage";
+    let found = answer(&typed(at, &format!("{line} --by animal,specimen.storage --json")));
+    let levels: Vec<(&str, u64)> = found["levels"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| (one["level"].as_str().unwrap(), one["groups"].as_u64().unwrap()))
+        .collect();
+    assert_eq!(levels, [("animal", 4), ("specimen.storage", 8), ("session", 16)]);
+    let frozen = &found["effects"][1];
+    assert_eq!(frozen["effect"], "specimen.storage = frozen");
+    let ratios = STIFFNESS.map(|(.., [fresh, frozen])| (f64::from(frozen) / f64::from(fresh)).ln());
+    let mean = ratios.iter().sum::<f64>() / 4.0;
+    let [value, error, freedom] =
+        ["value", "std_error", "freedom"].map(|key| frozen[key].as_f64().unwrap());
+    // The tissue of every session is drawn with its seed, to a few percent.
+    assert!((value - mean).abs() < 4.0 * error && error < 0.05, "{frozen:#}");
+    // Four pairs have three degrees of freedom, the treated among them as many as all.
+    assert!((2.0..=14.0).contains(&freedom), "{frozen:#}");
+    assert_refused(
+        &typed(at, &format!("{line} --by specimen,specimen.weather")),
+        2,
+        "there is no level 'specimen.weather'",
+    );
 }

@@ -110,7 +110,7 @@ fn specimens_that_cannot_be_simulated_are_refused_in_one_sentence() {
     assert!(read(&at.join("named.json"))["settings"]["mu1"].is_string());
     std::fs::write(at.join("mounted.toml"), MOUNTED).unwrap();
     let refused = typed(at, "run mounted.toml --time-scale max --out mounted");
-    assert_refused(&refused, 1, "the rig does not simulate 'population:pad#1'");
+    assert_refused(&refused, 2, "the rig does not simulate 'population:pad#1'");
 }
 
 /// A programme whose specimen is named in it.

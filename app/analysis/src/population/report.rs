@@ -345,7 +345,10 @@ impl PlanReport {
             });
             let effects = one.effects.iter().filter(|one| !is_mean(&one.effect));
             let seen: Vec<String> = effects
-                .map(|one| format!("{} {:.0} %", one.parameter, 100.0 * one.power))
+                .map(|one| {
+                    let percent = 100.0 * one.power;
+                    format!("{percent:.0} % ({} of {})", one.effect, one.parameter)
+                })
                 .collect();
             let counts = one.counts.iter().map(usize::to_string).collect::<Vec<_>>();
             let seen = if seen.is_empty() { "-".to_owned() } else { seen.join(", ") };
