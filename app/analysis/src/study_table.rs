@@ -11,6 +11,7 @@ use palpate_model::metadata::{
 use palpate_protocols::plans::Plan;
 use palpate_sessions::{DataQuality, Edits, Manifest, SessionSummary};
 use palpate_tables::lake::{LakeError, is_lake, list_sessions, read_manifest};
+use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -149,8 +150,10 @@ pub fn read_study(paths: &[PathBuf]) -> Result<StudyTable, StudyReadError> {
     };
     match paths {
         [lake] if is_lake(lake) => {
-            for one in list_sessions(lake)? {
-                let (manifest, rejection) = read_manifest(lake, &one)?;
+            let listed = list_sessions(lake)?;
+            let read: Vec<_> = listed.par_iter().map(|one| read_manifest(lake, one)).collect();
+            for (one, read) in listed.into_iter().zip(read) {
+                let (manifest, rejection) = read?;
                 take(one.id, manifest, rejection.is_some());
             }
         }

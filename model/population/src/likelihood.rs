@@ -225,45 +225,44 @@ impl NestedStudy {
         Some(Sums { groups, root, log_determinant: logarithm })
     }
 
-    /// One and the effects of a session.
-    fn multipliers(&self, session: usize) -> impl Iterator<Item = f64> {
-        std::iter::once(1.0).chain(self.sessions[session].design.iter().copied())
+    /// One and the effects of a session that are not zero, each with its place in a form.
+    fn multipliers(&self, session: usize) -> impl Iterator<Item = (usize, f64)> {
+        let effects = self.sessions[session].design.iter().copied();
+        std::iter::once(1.0).chain(effects).enumerate().filter(|(_, share)| *share != 0.0)
     }
 
     /// Adds what a session says, whose residual is shift + effects - values, each weighted.
     fn add_session(&self, sum: &mut Form, session: usize, weight: &DMatrix<f64>) {
         let (count, last) = (self.parameters, self.width() - 1);
-        let values = self.sessions[session].vector();
-        let weighted = weight * &values;
-        for (a, first) in self.multipliers(session).enumerate() {
-            for (b, second) in self.multipliers(session).enumerate() {
-                let share = first * second;
-                if share != 0.0 {
-                    let mut block = sum.view_mut((a * count, b * count), (count, count));
-                    block += weight * share;
+        let values = &self.sessions[session].values;
+        for row in 0..count {
+            let weighted: f64 = (0..count).map(|k| weight[(row, k)] * values[k]).sum();
+            for (a, first) in self.multipliers(session) {
+                for (b, second) in self.multipliers(session) {
+                    let share = first * second;
+                    for column in 0..count {
+                        sum[(a * count + row, b * count + column)] += share * weight[(row, column)];
+                    }
                 }
+                sum[(a * count + row, last)] -= first * weighted;
+                sum[(last, a * count + row)] -= first * weighted;
             }
-            for k in 0..count {
-                sum[(a * count + k, last)] -= first * weighted[k];
-                sum[(last, a * count + k)] -= first * weighted[k];
-            }
+            sum[(last, last)] += weighted * values[row];
         }
-        sum[(last, last)] += weighted.dot(&values);
     }
 
     /// The adjoint of a session's weight.
     fn weight_adjoint(&self, adjoint: &Form, session: usize) -> DMatrix<f64> {
         let (count, last) = (self.parameters, self.width() - 1);
-        let values = self.sessions[session].vector();
-        let mut sum = &values * values.transpose() * adjoint[(last, last)];
-        for (a, first) in self.multipliers(session).enumerate() {
-            for (b, second) in self.multipliers(session).enumerate() {
-                sum += adjoint.view((a * count, b * count), (count, count)) * (first * second);
-            }
-            let column = adjoint.view((a * count, last), (count, 1)) * first;
-            sum -= &column * values.transpose() + &values * column.transpose();
-        }
-        sum
+        let values = &self.sessions[session].values;
+        // By a row of the residual, then by a column: every step over the few entries that are not zero.
+        let residual = |of: &dyn Fn(usize) -> f64, row: usize| {
+            let means = self.multipliers(session).map(|(a, first)| first * of(a * count + row));
+            means.sum::<f64>() - values[row] * of(last)
+        };
+        DMatrix::from_fn(count, count, |row, column| {
+            residual(&|at| residual(&|other| adjoint[(at, other)], column), row)
+        })
     }
 
     fn gradient(
