@@ -11,6 +11,7 @@ mod entry;
 mod field;
 mod heads;
 mod history;
+mod mirrored;
 mod schema;
 mod search;
 mod typed;
@@ -23,6 +24,7 @@ pub use entry::{
 };
 pub use field::{FieldWords, SearchField};
 pub use history::{HistoryEvent, HistorySubject};
+pub use mirrored::{LocalSession, MirroredSession, MirroredTable};
 pub use schema::VERSION as CATALOG_VERSION;
 pub use search::{
     CatalogChoices, CatalogOrder, CatalogPage, CatalogQuery, QualityFilter, ReviewFilter,

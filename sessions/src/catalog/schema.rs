@@ -7,11 +7,12 @@ use std::error::Error;
 /// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and their content. An older catalog is replaced; only the table `head` is kept.
-pub const VERSION: i64 = 10;
+pub const VERSION: i64 = 11;
 
 /// `entry` is the whole entry as JSON, with a checksum because SQLite has none; the other columns are for search. `head`
 /// has the recorded heads of JSON-lines files, each row with its checksum. `words` has all text of an entry in `text`, and
-/// again the text of each [`SearchField`](super::SearchField) in a column of its name.
+/// again the text of each [`SearchField`](super::SearchField) in a column of its name. `mirrored` says up to where the table of a
+/// store was read, and `pushed` which of this computer's folders it has as they are; both are empty in a library's catalog.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -57,6 +58,15 @@ CREATE TABLE head (
     stamp TEXT NOT NULL,
     checksum TEXT NOT NULL,
     PRIMARY KEY (file, name)
+) STRICT, WITHOUT ROWID;
+CREATE TABLE mirrored (
+    id TEXT NOT NULL,
+    version INTEGER NOT NULL,
+    schema TEXT NOT NULL
+) STRICT;
+CREATE TABLE pushed (
+    folder TEXT PRIMARY KEY,
+    fingerprint TEXT NOT NULL
 ) STRICT, WITHOUT ROWID;
 CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3');
 ";

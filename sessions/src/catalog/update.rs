@@ -81,7 +81,7 @@ impl Catalog {
                 flow = progress(done, new.len());
             }
             self.write(|db| {
-                entries.iter().try_for_each(|(session, entry)| put(db, session, entry))
+                entries.iter().try_for_each(|(session, entry)| put(db, &session.fingerprint, entry))
             })?;
         }
         changes.read = done;
@@ -160,7 +160,7 @@ impl Catalog {
         Ok(pairs.map_err(self.failed())?.into_iter().collect())
     }
 
-    fn write(
+    pub(super) fn write(
         &mut self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<()>,
     ) -> Result<(), CatalogError> {
@@ -183,7 +183,11 @@ pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<CatalogEntry
     serde_json::from_str(&text).map_err(bad_text)
 }
 
-fn put(db: &Connection, session: &LibrarySession, entry: &CatalogEntry) -> rusqlite::Result<()> {
+pub(super) fn put(
+    db: &Connection,
+    fingerprint: &str,
+    entry: &CatalogEntry,
+) -> rusqlite::Result<()> {
     forget(db, &entry.folder)?;
     let text = serde_json::to_string(entry)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
@@ -205,7 +209,7 @@ fn put(db: &Connection, session: &LibrarySession, entry: &CatalogEntry) -> rusql
     )?
     .execute(params![
         entry.folder,
-        session.fingerprint,
+        fingerprint,
         started.map_or(0, |at| at.timestamp_millis()),
         entry.operator,
         entry.specimen,

@@ -84,6 +84,11 @@ fn is_segment(name: &OsString) -> bool {
     name.to_str().and_then(segment_number).is_some()
 }
 
+/// Sizes and times of the files of a folder; empty where it cannot be read.
+pub(super) fn fingerprint_of(folder: &Path) -> String {
+    files_of(folder).map_or_else(|_| String::new(), |files| fingerprint(folder, &files))
+}
+
 fn fingerprint(folder: &Path, files: &[OsString]) -> String {
     let mut text = String::new();
     for name in files.iter().filter(|name| *name != LOCK_FILE) {

@@ -40,6 +40,15 @@ const FRAME_ROWS: usize = 1 << 18;
 /// Samples that are copied into columns at once: few enough to stay in the processor's cache for all columns.
 const HAND_ROWS: usize = 1 << 10;
 
+/// A Parquet file of one frame.
+pub fn parquet_bytes(frame: DataFrame) -> PolarsResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut encoder = Encoder::new(TableFormat::Parquet, &mut bytes, &frame, Vec::new())?;
+    encoder.write(frame)?;
+    encoder.finish()?;
+    Ok(bytes)
+}
+
 /// A table could not be written.
 #[derive(Debug, Error)]
 pub enum ExportError {

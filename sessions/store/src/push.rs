@@ -1,0 +1,278 @@
+//! Pushing sessions: their objects first, then one change of the table for several sessions.
+
+use crate::delta::{Action, Metadata, commit_info, first_actions};
+use crate::error::StoreError;
+use crate::files::{FileList, FolderFault, local_files};
+use crate::location::Store;
+use crate::mirror::{Hear, Mirror};
+use crate::rows::{SessionRow, part, schema_with};
+use chrono::{DateTime, SecondsFormat, Utc};
+use object_store::ObjectStoreExt;
+use palpate_sessions::catalog::LocalSession;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Sessions in one change of the table. More at once are fewer files of rows; fewer are sooner in the table.
+const BATCH: usize = 64;
+/// How often another writer may be faster before a push gives up: with sixteen writers each is first in time.
+const TRIES_MAX: usize = 200;
+
+/// Why a session was not pushed, although it could be.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PushRefusal {
+    pub session: String,
+    pub reason: String,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct PushOutcome {
+    /// Sessions of which the store has a new version.
+    pub pushed: Vec<String>,
+    /// Sessions that the store has as they are.
+    pub known: usize,
+    /// Sessions that are being recorded, or whose recording was interrupted.
+    pub unfinished: Vec<String>,
+    pub refused: Vec<PushRefusal>,
+    /// Bytes that were sent.
+    pub bytes: u64,
+}
+
+/// A session whose objects are stored.
+struct Stored<'a> {
+    folder: PathBuf,
+    local: &'a LocalSession,
+    row: SessionRow,
+    list: FileList,
+}
+
+/// What becomes of a session.
+enum Verdict {
+    Push { version: u64 },
+    Known,
+    Refused(String),
+}
+
+impl Store {
+    /// Pushes finished sessions below a folder, each named by the folder of its entry. What the store has already is not
+    /// sent again, and an upload that was cut off goes on.
+    pub fn push(
+        &self,
+        mirror: &mut Mirror,
+        (library, sessions): (&Path, &[LocalSession]),
+        now: fn() -> DateTime<Utc>,
+        hear: Hear<'_>,
+    ) -> Result<PushOutcome, StoreError> {
+        self.wait(self.probe())?;
+        self.wait(self.ensure_table(now()))?;
+        mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
+        let mut outcome = PushOutcome::default();
+        let mut done = 0;
+        for batch in sessions.chunks(BATCH) {
+            let mut stored = Vec::new();
+            for local in batch {
+                let folder = library.join(&local.entry.folder);
+                stored.extend(self.store_files(mirror, folder, local, &mut outcome)?);
+                done += 1;
+                if hear(done, sessions.len()).is_break() {
+                    self.list(mirror, stored, now, &mut outcome)?;
+                    return Err(StoreError::Ended);
+                }
+            }
+            self.list(mirror, stored, now, &mut outcome)?;
+        }
+        Ok(outcome)
+    }
+
+    /// Makes the table, unless there is one.
+    async fn ensure_table(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
+        if self.read_commit(0).await?.is_none() {
+            self.commit(0, &first_actions(&schema_with(None).0, now)).await?;
+        }
+        Ok(())
+    }
+
+    /// Stores the files of a session, if it is one to push.
+    fn store_files<'a>(
+        &self,
+        mirror: &Mirror,
+        folder: PathBuf,
+        local: &'a LocalSession,
+        outcome: &mut PushOutcome,
+    ) -> Result<Option<Stored<'a>>, StoreError> {
+        let entry = &local.entry;
+        let mut refuse = |reason: String| {
+            outcome.refused.push(PushRefusal { session: entry.folder.clone(), reason });
+        };
+        if let Some(trouble) = &entry.trouble {
+            refuse(trouble.clone());
+            return Ok(None);
+        }
+        if entry.ending.is_none() {
+            outcome.unfinished.push(entry.folder.clone());
+            return Ok(None);
+        }
+        if mirror.catalog.is_pushed(&folder, &local.fingerprint)?
+            && mirror.catalog.mirrored_content(&entry.session_id)?.is_some()
+        {
+            outcome.known += 1;
+            return Ok(None);
+        }
+        let files = match local_files(&folder) {
+            Ok(files) => files,
+            Err(FolderFault::Unreadable(err)) => return Err(err),
+            Err(FolderFault::Spare) => {
+                refuse("a part of it is in a spare folder; recover it to one folder first".into());
+                return Ok(None);
+            }
+        };
+        let list = FileList::of(&entry.session_id, &files)?;
+        let (content, bytes) = self.wait(self.put_files(&folder, &list))?;
+        outcome.bytes += bytes;
+        if !local.is_unchanged(&folder) {
+            refuse("it changed while it was read; push it once more".into());
+            return Ok(None);
+        }
+        // The version is known when the table is written.
+        let row =
+            SessionRow { version: 0, content, pushed_at: String::new(), entry: entry.clone() };
+        Ok(Some(Stored { folder, local, row, list }))
+    }
+
+    /// Writes the rows of sessions whose files are stored. Of several writers one is first; the others read what it wrote.
+    fn list(
+        &self,
+        mirror: &mut Mirror,
+        stored: Vec<Stored<'_>>,
+        now: fn() -> DateTime<Utc>,
+        outcome: &mut PushOutcome,
+    ) -> Result<(), StoreError> {
+        for _ in 0..TRIES_MAX {
+            let Some(table) = mirror.table()? else {
+                return Err(StoreError::bad(&crate::delta::log_folder(), "the table is gone"));
+            };
+            let mut rows = Vec::new();
+            let (mut refused, mut known) = (Vec::new(), 0);
+            let at = now();
+            for one in &stored {
+                match self.verdict(mirror, one, &rows)? {
+                    Verdict::Known => known += 1,
+                    Verdict::Refused(reason) => {
+                        let session = one.local.entry.folder.clone();
+                        refused.push(PushRefusal { session, reason });
+                    }
+                    Verdict::Push { version } => {
+                        let pushed_at = at.to_rfc3339_opts(SecondsFormat::Millis, true);
+                        rows.push(SessionRow { version, pushed_at, ..one.row.clone() });
+                    }
+                }
+            }
+            let is_there = rows.is_empty() || {
+                let version = table.version + 1;
+                self.wait(self.add_rows(version, &table.schema, &rows, at))?
+            };
+            mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
+            if is_there {
+                let is_refused = |one: &&Stored<'_>| {
+                    refused.iter().any(|refusal| refusal.session == one.local.entry.folder)
+                };
+                let pushed = stored.iter().filter(|one| !is_refused(one));
+                let pushed: Vec<_> = pushed
+                    .map(|one| (one.folder.as_path(), one.local.fingerprint.as_str()))
+                    .collect();
+                mirror.catalog.set_pushed(&pushed)?;
+                outcome.pushed.extend(rows.into_iter().map(|row| row.entry.session_id));
+                outcome.known += known;
+                outcome.refused.extend(refused);
+                return Ok(());
+            }
+        }
+        Err(StoreError::Crowded { tries: TRIES_MAX })
+    }
+
+    /// What becomes of a session after `rows` of the same change.
+    fn verdict(
+        &self,
+        mirror: &Mirror,
+        one: &Stored<'_>,
+        rows: &[SessionRow],
+    ) -> Result<Verdict, StoreError> {
+        let id = &one.row.entry.session_id;
+        if rows.iter().any(|row| row.entry.session_id == *id) {
+            return Ok(Verdict::Refused(format!("another folder has session {id} too")));
+        }
+        let Some((version, content)) = mirror.catalog.mirrored_content(id)? else {
+            return Ok(Verdict::Push { version: 1 });
+        };
+        if content == one.row.content {
+            return Ok(Verdict::Known);
+        }
+        let theirs = self.wait(self.file_list(&content))?;
+        Ok(match theirs.first_not_continued(&one.folder)? {
+            None => Verdict::Push { version: version + 1 },
+            Some(_) if self.wait(self.continues(&theirs, &one.list, &one.folder))? => {
+                Verdict::Known
+            }
+            Some(file) => Verdict::Refused(format!(
+                "version {version} in the store has another {file}; pull the session, and make the edits of this folder there"
+            )),
+        })
+    }
+
+    /// Adds rows to the table as its next version; `false` where another writer was faster.
+    async fn add_rows(
+        &self,
+        version: u64,
+        schema: &str,
+        rows: &[SessionRow],
+        now: DateTime<Utc>,
+    ) -> Result<bool, StoreError> {
+        let part = part(rows, now)?;
+        let path = part.path();
+        self.create(&path, part.bytes).await?;
+        let mut actions = vec![commit_info("WRITE", now)];
+        let (schema, has_more) = schema_with(Some(schema));
+        if has_more {
+            actions.push(self.with_schema(schema).await?);
+        }
+        actions.push(part.add.clone().into());
+        match self.commit(version, &actions).await {
+            Ok(true) => {
+                self.checkpoint_at(version).await;
+                Ok(true)
+            }
+            // A change whose answer was lost is sent again, and then finds its own name taken.
+            Ok(false) if self.names(version, &part.add.path).await? => Ok(true),
+            Ok(false) => {
+                // Nothing names these rows, and the next try writes its own.
+                let _ = self.objects.delete(&path).await;
+                Ok(false)
+            }
+            // The change may have arrived although its answer did not: the file of rows stays.
+            Err(err) => Err(err),
+        }
+    }
+
+    /// Whether the change of a version adds a file of rows.
+    pub(crate) async fn names(&self, version: u64, part: &str) -> Result<bool, StoreError> {
+        let commit = self.read_commit(version).await?;
+        let adds = commit.iter().flat_map(|one| &one.actions).filter_map(|one| one.add.as_ref());
+        Ok(adds.into_iter().any(|add| add.path == part))
+    }
+
+    /// The table described again, with more columns.
+    async fn with_schema(&self, schema_string: String) -> Result<Action, StoreError> {
+        let missing = || StoreError::bad(&crate::delta::log_folder(), "the table is gone");
+        let snapshot = self.snapshot().await?.ok_or_else(missing)?;
+        let metadata = Metadata { schema_string, ..snapshot.metadata()?.clone() };
+        Ok(Action { meta_data: Some(metadata), ..Action::default() })
+    }
+
+    /// Writes a checkpoint where one is due. Without it everything can be read all the same, so that its failure is no fault.
+    async fn checkpoint_at(&self, version: u64) {
+        if version.is_multiple_of(crate::checkpoint::COMMITS)
+            && let Ok(Some(snapshot)) = self.snapshot().await
+        {
+            let _ = self.write_checkpoint(&snapshot).await;
+        }
+    }
+}
