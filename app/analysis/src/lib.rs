@@ -54,6 +54,7 @@ pub mod scene_bench;
 pub mod select;
 pub mod session_actions;
 pub mod session_entries;
+pub mod shared_library;
 pub mod source;
 pub mod specimen_queue;
 pub mod study_table;

@@ -3,13 +3,14 @@
 use super::arguments::{Choice, choice};
 use super::catalog::use_updated_catalog;
 use super::output::Output;
-use super::{Command, Failure};
+use super::{Command, Failure, library};
 use chrono::{DateTime, Utc};
 use clap::Args;
 use palpate_analysis::catalog_search::find;
 use palpate_analysis::report::catalog as report;
+use palpate_analysis::shared_library::SharedLibrary;
 use palpate_sessions::catalog::{
-    CatalogOrder, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end,
+    CatalogOrder, CatalogPage, CatalogQuery, Condition, QualityFilter, ReviewFilter, parse_end,
     parse_query_line, parse_start,
 };
 use palpate_sessions::library_folder;
@@ -22,6 +23,9 @@ pub struct FindArgs {
     /// and tag: look in one field, and depth>=2mm is a condition
     #[arg(value_name = "WORD")]
     words: Vec<String>,
+    /// Search a store instead of this computer's library, as in s3://bucket/folder or file:///folder
+    #[arg(long, value_name = "STORE")]
+    store: Option<String>,
     /// The specimen, exactly
     #[arg(long, value_name = "NAME")]
     specimen: Option<String>,
@@ -118,16 +122,39 @@ pub fn find_query(line: &str, options: &[String]) -> Result<CatalogQuery, Failur
 }
 
 pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
-    let library = library_folder().map_err(Failure::usage)?;
     let (limit, page) = (args.limit.get(), args.page.get());
     let query = args.query("")?;
-    let (found, doubts) = use_updated_catalog(&library, output, |catalog| find(catalog, &query))?;
+    let (library, (found, doubts)) = match &args.store {
+        Some(store) => find_in_store(store, &query, output)?,
+        None => {
+            let library = library_folder().map_err(Failure::usage)?;
+            let found = use_updated_catalog(&library, output, |catalog| find(catalog, &query))?;
+            (library.display().to_string(), found)
+        }
+    };
     doubts.iter().for_each(|doubt| output.note(doubt));
     let pages = found.count.div_ceil(limit);
     let object = serde_json::json!({
-        "library": library.display().to_string(), "count": found.count, "page": page, "pages": pages,
+        "library": library, "count": found.count, "page": page, "pages": pages,
         "sessions": found.entries,
     });
     output.answer("find", &object, || report::list(&found, page, pages));
     Ok(())
+}
+
+/// Finds a page of a store's sessions. A store that does not answer is searched as it was last seen.
+fn find_in_store(
+    store: &str,
+    query: &CatalogQuery,
+    output: &Output,
+) -> Result<(String, (CatalogPage, Vec<String>)), Failure> {
+    let mut library = SharedLibrary::open(store).map_err(library::failure)?;
+    let bar = output.count_bar(0);
+    let updated = library.update(&bar);
+    drop(bar);
+    if let Err(err) = updated {
+        output.note(&format!("{err}; the search is of what was last seen of the store"));
+    }
+    let found = find(library.catalog(), query).map_err(Failure::failed)?;
+    Ok((library.address().to_owned(), found))
 }

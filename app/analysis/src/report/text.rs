@@ -216,6 +216,12 @@ pub fn counted(count: usize, noun: &str) -> String {
     }
 }
 
+/// A number of bytes in MB.
+#[must_use]
+pub fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 * 1e-6)
+}
+
 /// A table in columns under its head.
 pub(crate) fn table(names: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     in_columns(&std::iter::once(head(names)).chain(rows).collect::<Vec<_>>())

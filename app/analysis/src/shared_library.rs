@@ -1,0 +1,165 @@
+//! A library that many rigs share, in an object store: push finished sessions, pull them, search them, look after them.
+
+use crate::progress::Progress;
+use crate::report::text::{counted, megabytes};
+use chrono::{DateTime, Utc};
+use palpate_sessions::Catalog;
+use palpate_sessions::catalog::{CatalogError, LocalSession};
+use palpate_sessions::{FolderError, library_folder};
+use palpate_store::{
+    Compaction, Mirror, Pulled, PushOutcome, Store, StoreError, StoreFault, StoreUrl,
+};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Folder of the library with a catalog of each store that was used.
+const STORES_FOLDER: &str = "stores";
+
+#[derive(Debug, Error)]
+pub enum SharedLibraryError {
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    #[error("{} is not a session; give the folder of one", path.display())]
+    NotASession { path: PathBuf },
+}
+
+impl SharedLibraryError {
+    /// Whether what was given is wrong, and not the store, the disk or the network.
+    #[must_use]
+    pub fn is_wrong_use(&self) -> bool {
+        matches!(
+            self,
+            Self::NotASession { .. }
+                | Self::Folder(_)
+                | Self::Store(
+                    StoreError::Address { .. }
+                        | StoreError::NoSession { .. }
+                        | StoreError::Unconditional { .. }
+                )
+        )
+    }
+}
+
+/// A store and this computer's catalog of it.
+#[derive(Debug)]
+pub struct SharedLibrary {
+    store: Store,
+    mirror: Mirror,
+}
+
+fn now() -> DateTime<Utc> {
+    Utc::now()
+}
+
+impl SharedLibrary {
+    /// Opens the store of an address.
+    pub fn open(address: &str) -> Result<Self, SharedLibraryError> {
+        let url = StoreUrl::parse(address)?;
+        let folder = library_folder()?.join(STORES_FOLDER).join(url.folder_name());
+        let mirror = Mirror::open(&folder)?;
+        Ok(Self { store: Store::open(&url)?, mirror })
+    }
+
+    #[must_use]
+    pub fn address(&self) -> &str {
+        self.store.url().as_str()
+    }
+
+    /// The catalog as of the last update; the folder of an entry is the session's identifier.
+    #[must_use]
+    pub fn catalog(&self) -> &Catalog {
+        self.mirror.catalog()
+    }
+
+    /// Reads what other rigs pushed since; number of versions of sessions that were read.
+    pub fn update(&mut self, progress: &dyn Progress) -> Result<usize, SharedLibraryError> {
+        let mut hear = |done, of| progress.report(done, of, "reading the table");
+        Ok(self.mirror.update(&self.store, &mut hear)?)
+    }
+
+    /// Pushes sessions, or all of this computer's library where none is named.
+    pub fn push(
+        &mut self,
+        sessions: &[PathBuf],
+        progress: &dyn Progress,
+    ) -> Result<PushOutcome, SharedLibraryError> {
+        let mut hear = |done, of| progress.report(done, of, "pushing sessions");
+        let (root, local) = match sessions {
+            [] => {
+                let library = library_folder()?;
+                let local = sessions_of(&library)?;
+                (library, local)
+            }
+            sessions => (PathBuf::new(), read_all(sessions)?),
+        };
+        Ok(self.store.push(&mut self.mirror, (&root, &local), now, &mut hear)?)
+    }
+
+    /// Pulls sessions, or all where none is named, into folders below `out`.
+    pub fn pull(
+        &mut self,
+        ids: &[String],
+        out: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Pulled>, SharedLibraryError> {
+        self.update(progress)?;
+        let all = if ids.is_empty() { self.catalog().mirrored_ids()? } else { ids.to_vec() };
+        let mut hear = |done, of| progress.report(done, of, "pulling sessions");
+        Ok(self.store.pull(&self.mirror, &all, out, &mut hear)?)
+    }
+
+    /// Number of versions of sessions that were looked at, and what is wrong.
+    pub fn verify(
+        &self,
+        is_deep: bool,
+        progress: &dyn Progress,
+    ) -> Result<(usize, Vec<StoreFault>), SharedLibraryError> {
+        let mut hear = |done, of| progress.report(done, of, "verifying sessions");
+        Ok(self.store.verify(is_deep, &mut hear)?)
+    }
+
+    pub fn compact(&self) -> Result<Compaction, SharedLibraryError> {
+        Ok(self.store.compact(now)?)
+    }
+}
+
+fn sessions_of(library: &Path) -> Result<Vec<LocalSession>, CatalogError> {
+    Catalog::with(library, |catalog| {
+        catalog.update(&mut |_, _| {})?;
+        catalog.local_sessions()
+    })
+}
+
+fn read_all(sessions: &[PathBuf]) -> Result<Vec<LocalSession>, SharedLibraryError> {
+    let read = sessions.iter().map(|path| {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.clone());
+        match palpate_sessions::folder::is_session_folder(&path) {
+            true => Ok(LocalSession::read(&path)),
+            false => Err(SharedLibraryError::NotASession { path }),
+        }
+    });
+    read.collect()
+}
+
+/// What a push did, in words.
+#[must_use]
+pub fn push_words(outcome: &PushOutcome) -> String {
+    let pushed = counted(outcome.pushed.len(), "session");
+    let mut text = format!("{pushed} pushed, {} sent", megabytes(outcome.bytes));
+    if outcome.known > 0 {
+        text += &format!("; the store had {} as they are", counted(outcome.known, "session"));
+    }
+    if !outcome.unfinished.is_empty() {
+        let unfinished = counted(outcome.unfinished.len(), "session");
+        text +=
+            &format!("\n{unfinished} without an end left out: {}", outcome.unfinished.join(", "));
+    }
+    for one in &outcome.refused {
+        text += &format!("\n{}: {}", one.session, one.reason);
+    }
+    text
+}
