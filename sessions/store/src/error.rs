@@ -14,7 +14,7 @@ pub enum StoreError {
     #[error("the store cannot be read or written at {path}: {source}")]
     Object { path: String, source: object_store::Error },
     #[error(
-        "the store {url} writes an object although its name is taken, so that two rigs would overwrite each other; use one that knows If-None-Match"
+        "the store {url} lets two writers have one name, so that rigs would overwrite each other; use a store that keeps to If-None-Match"
     )]
     Unconditional { url: String },
     #[error("{path} in the store is not what palpate wrote: {reason}")]

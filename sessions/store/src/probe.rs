@@ -1,23 +1,38 @@
-//! Whether a store refuses a name that is taken. One that does not would let two rigs overwrite each other.
+//! Whether a store refuses a name that is taken. One that does not would let two rigs overwrite each other, and so would one
+//! that looks for the name before it has received the bytes, as some small servers do.
 
 use crate::error::StoreError;
 use crate::location::Store;
 use bytes::Bytes;
+use futures_util::future::join_all;
 use object_store::ObjectStoreExt;
 use object_store::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+/// Writers of one name at a time.
+const WRITERS: u8 = 8;
+/// Bytes of each: enough that a server is still receiving one while it looks at another's name.
+const BYTES: usize = 1 << 16;
+
 impl Store {
-    /// Puts one name twice; the second time must fail.
+    /// Puts one name several times at once and once more: one of them may succeed, and its bytes must stay.
     pub(crate) async fn probe(&self) -> Result<(), StoreError> {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
         let path = Path::from(format!("probe/{now}-{}", std::process::id()));
-        let (first, second) = (Bytes::from_static(b"first"), Bytes::from_static(b"second"));
-        self.create(&path, first.clone()).await?;
-        let is_overwritten = self.create(&path, second).await?;
+        let body = |writer: u8| Bytes::from(vec![writer; BYTES]);
+        let racing = (0..WRITERS).map(|writer| self.create(&path, body(writer)));
+        let mut written = join_all(racing).await.into_iter().collect::<Result<Vec<bool>, _>>()?;
+        written.push(self.create(&path, body(WRITERS)).await?);
         let kept = self.read(&path).await?;
         self.objects.delete(&path).await.map_err(StoreError::object(&path))?;
-        match !is_overwritten && kept == Some(first) {
+        let winners: Vec<usize> = (0..written.len()).filter(|writer| written[*writer]).collect();
+        // Where the answer to the one that succeeded was lost and it was sent again, none says that it did.
+        let is_kept = match winners[..] {
+            [] => kept.is_some_and(|kept| kept.first() != Some(&WRITERS)),
+            [one] => kept == u8::try_from(one).ok().map(body),
+            _ => false,
+        };
+        match is_kept {
             true => Ok(()),
             false => Err(StoreError::Unconditional { url: self.url.as_str().to_owned() }),
         }
