@@ -16,12 +16,18 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// Adds an entity without its empty properties, unless one with its id is there.
+    /// Adds an entity without its empty properties, a list of one as its item, unless one with its id is there.
     pub fn add(&mut self, mut entity: Value) {
         if let Some(fields) = entity.as_object_mut() {
             fields.retain(|_, value| {
-                !value.is_null() && value.as_array().is_none_or(|list| !list.is_empty())
+                let is_empty = value.as_array().is_some_and(Vec::is_empty) || *value == "";
+                !value.is_null() && !is_empty
             });
+            for value in fields.values_mut() {
+                if let Some([one]) = value.as_array().map(Vec::as_slice) {
+                    *value = one.clone();
+                }
+            }
         }
         let id = entity["@id"].as_str().unwrap_or_default().to_owned();
         if self.ids.insert(id) {
@@ -205,7 +211,7 @@ mod tests {
     #[test]
     fn an_entity_is_there_once_and_without_what_is_empty() {
         let mut graph = Graph::default();
-        graph.add(json!({ "@id": "#a", "name": "one", "nothing": null, "none": [] }));
+        graph.add(json!({ "@id": "#a", "name": ["one"], "nothing": null, "none": [] }));
         graph.add(json!({ "@id": "#a", "name": "two" }));
         assert_eq!(graph.entities, [json!({ "@id": "#a", "name": "one" })]);
     }

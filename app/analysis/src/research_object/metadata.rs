@@ -81,7 +81,7 @@ pub(super) fn text(about: &CrateDescription<'_>) -> String {
     }));
     root(about, &mut graph);
     graph.add(json!({
-        "@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5",
+        "@id": PROFILE, "@type": ["CreativeWork", "Profile"], "name": "Process Run Crate", "version": "0.5",
     }));
     people(about, &mut graph);
     program(about.origin, &mut graph);
@@ -229,8 +229,14 @@ fn program(origin: &CrateOrigin, graph: &mut Graph) {
     graph.add(json!({
         "@id": PROGRAM, "@type": "SoftwareApplication", "name": "palpate",
         "description": "Workbench for soft-tissue indentation",
-        "softwareVersion": origin.version, "version": origin.version, "additionalProperty": ids,
+        "softwareVersion": origin.version, "url": package_url(&origin.version),
+        "additionalProperty": ids,
     }));
+}
+
+/// The address of a version by its name alone, as bills of materials give it (ECMA-427, package URL).
+fn package_url(version: &str) -> String {
+    format!("pkg:generic/palpate@{version}")
 }
 
 /// The program that recorded a session, or imported it.
@@ -239,7 +245,7 @@ fn recorder(session: &CrateSession, graph: &mut Graph) -> Value {
     let id = local_id("palpate", version);
     graph.add(json!({
         "@id": id, "@type": "SoftwareApplication", "name": "palpate",
-        "softwareVersion": version, "version": version,
+        "softwareVersion": version, "url": package_url(version),
     }));
     reference(&id)
 }
