@@ -169,8 +169,8 @@ fn older_crate_is_compared_within_bounds_and_explained_by_the_changelog() {
     make(at, "crate");
     let own = at.join("crate");
     forge(&own, "ro-crate-metadata.json", |text| {
-        let version = format!("\"softwareVersion\": \"{}\"", env!("CARGO_PKG_VERSION"));
-        text.replace(&version, "\"softwareVersion\": \"0.1.0\"")
+        let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
+        text.replace(&version, "\"version\": \"0.1.0\"")
     });
     let output = own.join("results/fit/output.json");
     let fit: Value = serde_json::from_str(&fs::read_to_string(&output).unwrap()).unwrap();
@@ -190,7 +190,7 @@ fn older_crate_is_compared_within_bounds_and_explained_by_the_changelog() {
     assert_prints(&refused, "0.2.0, ");
     // A newer one says so.
     forge(&own, "ro-crate-metadata.json", |text| {
-        text.replace("\"softwareVersion\": \"0.1.0\"", "\"softwareVersion\": \"99.0.0\"")
+        text.replace("\"version\": \"0.1.0\"", "\"version\": \"99.0.0\"")
     });
     assert_says(&palpate(at, &["reproduce", "crate"]), "a newer palpate made the crate");
 }

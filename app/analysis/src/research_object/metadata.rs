@@ -24,8 +24,8 @@ const ROOT: &str = "./";
 const CONTEXT: &str = "https://w3id.org/ro/crate/1.2/context";
 const SPECIFICATION: &str = "https://w3id.org/ro/crate/1.2";
 const PROFILE: &str = "https://w3id.org/ro/wfrun/process/0.5";
-/// Id of the entity of this program.
-const PROGRAM: &str = "#palpate";
+/// Beginning of the id of this program, before its version.
+const PROGRAM: &str = "pkg:generic/palpate@";
 
 /// With what a crate was made, as far as its numbers depend on it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -220,32 +220,31 @@ fn program(origin: &CrateOrigin, graph: &mut Graph) {
     ];
     let mut ids = Vec::new();
     for (name, value) in facts.into_iter().filter(|(_, value)| !value.is_null() && value != "") {
-        let id = format!("{PROGRAM}-{name}");
+        let id = local_id("palpate", name);
         graph.add(json!({
             "@id": id, "@type": "PropertyValue", "name": name, "propertyID": name, "value": value,
         }));
         ids.push(reference(&id));
     }
     graph.add(json!({
-        "@id": PROGRAM, "@type": "SoftwareApplication", "name": "palpate",
-        "description": "Workbench for soft-tissue indentation",
-        "softwareVersion": origin.version, "url": package_url(&origin.version),
-        "additionalProperty": ids,
+        "@id": program_id(&origin.version), "@type": "SoftwareApplication", "name": "palpate",
+        "description": "Workbench for soft-tissue indentation", "version": origin.version,
+        "url": program_id(&origin.version), "additionalProperty": ids,
     }));
 }
 
-/// The address of a version by its name alone, as bills of materials give it (ECMA-427, package URL).
-fn package_url(version: &str) -> String {
-    format!("pkg:generic/palpate@{version}")
+/// The id of a version of this program, as bills of materials give it (ECMA-427, package URL).
+fn program_id(version: &str) -> String {
+    format!("{PROGRAM}{version}")
 }
 
 /// The program that recorded a session, or imported it.
 fn recorder(session: &CrateSession, graph: &mut Graph) -> Value {
     let version = &session.manifest.software_version;
-    let id = local_id("palpate", version);
+    let id = program_id(version);
     graph.add(json!({
         "@id": id, "@type": "SoftwareApplication", "name": "palpate",
-        "softwareVersion": version, "url": package_url(version),
+        "version": version, "url": id,
     }));
     reference(&id)
 }
@@ -315,7 +314,7 @@ fn step_entities(about: &CrateDescription<'_>, record: &StepRecord, graph: &mut 
     let agent = authors(about).first().map(|id| reference(id));
     graph.add(json!({
         "@id": local_id("step", &step.name), "@type": "CreateAction", "name": step.name,
-        "description": step.line(), "instrument": reference(PROGRAM), "object": objects,
+        "description": step.line(), "instrument": reference(&program_id(&about.origin.version)), "object": objects,
         "result": results, "agent": agent,
         "startTime": time(record.started_at), "endTime": time(record.ended_at),
         "actionStatus": "http://schema.org/CompletedActionStatus",
@@ -327,14 +326,19 @@ pub(super) fn read_origin(text: &str) -> Result<CrateOrigin, String> {
     let object: Value = serde_json::from_str(text).map_err(|err| err.to_string())?;
     let graph = object["@graph"].as_array().ok_or("it has no @graph")?;
     let find = |id: &str| graph.iter().find(|one| one["@id"] == id);
-    let program = find(PROGRAM).ok_or_else(|| format!("it has no entity {PROGRAM}"))?;
+    // Programs that recorded sessions have no properties.
+    let is_maker = |one: &&Value| {
+        let id = one["@id"].as_str().unwrap_or_default();
+        id.starts_with(PROGRAM) && !one["additionalProperty"].is_null()
+    };
+    let program = graph.iter().find(is_maker).ok_or("it does not say which palpate made it")?;
     let words = |value: &Value| value.as_str().map(str::to_owned);
-    let fact = |name: &str| words(&find(&format!("{PROGRAM}-{name}"))?["value"]);
+    let fact = |name: &str| words(&find(&local_id("palpate", name))?["value"]);
     let made_at = find(ROOT).and_then(|root| words(&root["dateCreated"]));
     let made_at = made_at.ok_or("it has no dateCreated")?;
     let made_at = DateTime::parse_from_rfc3339(&made_at).map_err(|err| err.to_string())?;
     Ok(CrateOrigin {
-        version: words(&program["softwareVersion"]).ok_or("it states no version of palpate")?,
+        version: words(&program["version"]).ok_or("it states no version of palpate")?,
         commit: fact("commit"),
         computer: ComputerClass {
             architecture: fact("architecture").unwrap_or_default(),
