@@ -52,7 +52,7 @@ def validate(crate, severity="REQUIRED", context=CONTEXT):
             enable_profile_inheritance=False,
             abort_on_first=False,
             disable_remote_crate_download=True,
-            # The addresses of people, licences and papers are not asked whether they answer today.
+            # Whether the addresses of people, licences and papers answer today is another question.
             skip_availability_check=True,
         )
         result = services.validate(settings)

@@ -195,6 +195,22 @@ fn older_crate_is_compared_within_bounds_and_explained_by_the_changelog() {
     assert_says(&palpate(at, &["reproduce", "crate"]), "a newer palpate made the crate");
 }
 
+/// Functions of the mathematics library that round otherwise make another class of computer.
+#[cfg(all(target_os = "linux", target_env = "gnu", target_arch = "x86_64"))]
+#[test]
+fn crate_of_another_class_of_computer_is_equal_within_the_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    make(at, "crate");
+    let mut other = command(at, &["reproduce", "crate", "--json"]);
+    let found =
+        answer(&other.env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4").output().unwrap());
+    let functions = |with: &str| found[with]["computer"]["functions"].clone();
+    let is_same = functions("made_with") == functions("computed_with");
+    let says = [&found["is_equal"], &found["is_same_computer"], &found["is_exact"]];
+    assert_eq!(says, [&true.into(), &is_same.into(), &is_same.into()], "{found:#}");
+}
+
 #[test]
 fn zip_file_is_computed_again_and_sealed() {
     let folder = tempfile::tempdir().unwrap();

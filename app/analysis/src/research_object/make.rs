@@ -2,12 +2,12 @@
 
 use super::archive;
 use super::completeness::{self, Finding};
-use super::contents::{
-    CrateSession, SESSIONS, copy_compliances, copy_files, copy_sessions, read_sessions,
-};
+use super::contents::{CrateSession, copy_compliances, copy_files, copy_sessions, read_sessions};
 use super::error::CrateError;
 use super::files::{self, SUMS_FILE, Sums};
-use super::metadata::{self, CrateDescription, CrateOrigin, METADATA_FILE, PAGE_FILE};
+use super::metadata::{
+    self, CrateDescription, CrateOrigin, FileDescriptions, METADATA_FILE, PAGE_FILE,
+};
 use super::page;
 use super::run_steps::{FailedStep, StepsRun, run_steps};
 use super::steps::{CrateStep, RESULTS, StepRunner};
@@ -16,8 +16,8 @@ use crate::progress::Progress;
 use crate::report::text::counted;
 use chrono::{DateTime, Utc};
 use palpate_protocols::file::ProtocolProblem;
+use palpate_sessions::text::sha256;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -103,34 +103,35 @@ fn fill(
     let before = files::hash(folder)?;
     let origin = CrateOrigin::here(request.made_at);
     let run = run_steps(&study.steps, folder, origin.made_at, (runner, failed), progress)?;
-    check_unchanged(folder, &before)?;
     let StepsRun { records, left_out } = run;
     let study = CrateStudy { steps: records.iter().map(|one| one.step.clone()).collect(), ..study };
     let text = text.unwrap_or_else(|| study.text());
     files::write(&folder.join(STUDY_FILE), text.as_bytes())?;
+    let mut described = describe_files(folder)?;
+    check_unchanged(&described, &before)?;
     let findings = completeness::check(&study, &sessions);
-    let mut described = sizes(folder)?;
-    let mut about = CrateDescription {
+    let none = FileDescriptions::new();
+    let about = CrateDescription {
         study: &study,
         sessions: &sessions,
         steps: &records,
         findings: &findings,
         origin: &origin,
-        files: &described,
+        files: &none,
     };
-    files::write(&folder.join(PAGE_FILE), page::page(&about).as_bytes())?;
-    let with_page = sizes(folder)?;
-    about.files = &with_page;
-    files::write(&folder.join(METADATA_FILE), metadata::text(&about).as_bytes())?;
-    described = with_page;
-    let sums = files::sums_text(&files::hash(folder)?);
-    files::write(&folder.join(SUMS_FILE), sums.as_bytes())?;
+    // The page lists the files before it, and the metadata those and the page.
+    let page = page::page(&CrateDescription { files: &described, ..about });
+    add_file(folder, PAGE_FILE, &page, &mut described)?;
+    let metadata = metadata::text(&CrateDescription { files: &described, ..about });
+    add_file(folder, METADATA_FILE, &metadata, &mut described)?;
+    let sums = described.iter().map(|(name, (_, sum))| (name.clone(), sum.clone())).collect();
+    files::write(&folder.join(SUMS_FILE), files::sums_text(&sums).as_bytes())?;
     Ok(MadeCrate {
         path: request.to.to_owned(),
         title: study.title.clone(),
         sessions: sessions.iter().map(|one| one.name.clone()).collect(),
         steps: study.steps.iter().map(|one| one.name.clone()).collect(),
-        files: files::list(folder)?.len(),
+        files: described.len() + 1,
         bytes: described.values().map(|(bytes, _)| bytes).sum(),
         findings,
         left_out,
@@ -171,20 +172,17 @@ fn default_study(sessions: &[CrateSession]) -> CrateStudy {
     CrateStudy { title, steps, ..CrateStudy::default() }
 }
 
-fn check_unchanged(folder: &Path, before: &Sums) -> Result<(), CrateError> {
-    let now = files::hash(&folder.join(SESSIONS))?;
-    let changed = before.iter().find(|(name, sum)| {
-        let inside = name.strip_prefix(SESSIONS).and_then(|rest| rest.strip_prefix('/'));
-        inside.is_some_and(|inside| now.get(inside) != Some(sum))
-    });
-    match changed {
+/// Steps only read what was there before them.
+fn check_unchanged(now: &FileDescriptions, before: &Sums) -> Result<(), CrateError> {
+    let is_changed =
+        |(name, sum): &(&String, &String)| now.get(*name).is_none_or(|(_, after)| after != *sum);
+    match before.iter().find(is_changed) {
         Some((name, _)) => Err(CrateError::Changed { file: name.clone() }),
         None => Ok(()),
     }
 }
 
-/// Size and hash of every file.
-fn sizes(folder: &Path) -> Result<BTreeMap<String, (u64, String)>, CrateError> {
+fn describe_files(folder: &Path) -> Result<FileDescriptions, CrateError> {
     let sums = files::hash(folder)?.into_iter();
     let sized = sums.map(|(name, sum)| {
         let path = files::path_of(folder, &name);
@@ -192,4 +190,16 @@ fn sizes(folder: &Path) -> Result<BTreeMap<String, (u64, String)>, CrateError> {
         Ok((name, (about.len(), sum)))
     });
     sized.collect()
+}
+
+/// Writes a file of the crate, and adds it to the others.
+fn add_file(
+    folder: &Path,
+    name: &str,
+    text: &str,
+    described: &mut FileDescriptions,
+) -> Result<(), CrateError> {
+    files::write(&folder.join(name), text.as_bytes())?;
+    described.insert(name.to_owned(), (text.len() as u64, sha256(text.as_bytes())));
+    Ok(())
 }

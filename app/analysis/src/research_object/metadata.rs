@@ -61,15 +61,18 @@ impl CrateOrigin {
     }
 }
 
+/// Size and hash of every file by name.
+pub(super) type FileDescriptions = BTreeMap<String, (u64, String)>;
+
 /// Everything that a crate is described from.
+#[derive(Clone, Copy)]
 pub(super) struct CrateDescription<'a> {
     pub study: &'a CrateStudy,
     pub sessions: &'a [CrateSession],
     pub steps: &'a [StepRecord],
     pub findings: &'a [Finding],
     pub origin: &'a CrateOrigin,
-    /// Size and hash of every file by name.
-    pub files: &'a BTreeMap<String, (u64, String)>,
+    pub files: &'a FileDescriptions,
 }
 
 /// The text of the metadata file.

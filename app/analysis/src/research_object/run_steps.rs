@@ -33,7 +33,7 @@ pub(super) struct StepsRun {
 /// What becomes of a step that fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FailedStep {
-    /// A person asked for it, so there is no crate without it.
+    /// A person wants it, so there is no crate without it.
     Refused,
     /// The program chose it, and the crate is made without it.
     LeftOut,
