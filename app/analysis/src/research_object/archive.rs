@@ -9,6 +9,7 @@ use super::steps::leads_out;
 use palpate_sessions::atomic::{Draft, ExistingFile};
 use palpate_sessions::folder::free_bytes;
 use palpate_sessions::text::sha256_of;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -26,14 +27,18 @@ pub(super) fn pack(folder: &Path, to: &Path) -> Result<(), CrateError> {
     let failed = |err: io::Error| CrateError::write(to, err);
     let draft = Draft::new(to).map_err(failed)?;
     let mut zip = ZipWriter::new(draft.writer());
-    for name in files::list(folder)? {
+    let options = SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
+    let names = files::list(folder)?;
+    // The metadata describe folders too, and readers look for them.
+    for name in folders_of(&names) {
+        let options = options.unix_permissions(0o755);
+        zip.add_directory(name, options).map_err(io::Error::from).map_err(failed)?;
+    }
+    for name in names {
         let path = files::path_of(folder, &name);
         let mut file = File::open(&path).map_err(|err| CrateError::read(&path, err))?;
         let length = file.metadata().map_err(|err| CrateError::read(&path, err))?.len();
-        let options = SimpleFileOptions::default()
-            .last_modified_time(zip::DateTime::default())
-            .unix_permissions(0o644)
-            .large_file(length > LARGE);
+        let options = options.unix_permissions(0o644).large_file(length > LARGE);
         zip.start_file(name, options).map_err(io::Error::from).map_err(failed)?;
         io::copy(&mut file, &mut zip).map_err(failed)?;
     }
@@ -45,6 +50,12 @@ pub(super) fn pack(folder: &Path, to: &Path) -> Result<(), CrateError> {
     drop(out);
     seal(&draft).map_err(failed)?;
     draft.persist(ExistingFile::Keep).map_err(failed)
+}
+
+/// All folders in which files are.
+fn folders_of(names: &[String]) -> BTreeSet<&str> {
+    let ends = |name: &'_ str| name.match_indices('/').map(|(end, _)| end).collect::<Vec<_>>();
+    names.iter().flat_map(|name| ends(name).into_iter().map(|end| &name[..end])).collect()
 }
 
 fn seal(draft: &Draft) -> io::Result<()> {
