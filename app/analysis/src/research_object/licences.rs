@@ -11,19 +11,14 @@ pub struct Licence {
 }
 
 /// Identifier and name of licences that data are published under (<https://spdx.org/licenses/>).
-const KNOWN: [(&str, &str); 13] = [
+const KNOWN: [(&str, &str); 11] = [
     ("CC0-1.0", "Creative Commons Zero v1.0 Universal"),
     ("CC-BY-4.0", "Creative Commons Attribution 4.0 International"),
     ("CC-BY-SA-4.0", "Creative Commons Attribution Share Alike 4.0 International"),
     ("CC-BY-NC-4.0", "Creative Commons Attribution Non Commercial 4.0 International"),
-    ("CC-BY-ND-4.0", "Creative Commons Attribution No Derivatives 4.0 International"),
     (
         "CC-BY-NC-SA-4.0",
         "Creative Commons Attribution Non Commercial Share Alike 4.0 International",
-    ),
-    (
-        "CC-BY-NC-ND-4.0",
-        "Creative Commons Attribution Non Commercial No Derivatives 4.0 International",
     ),
     ("ODbL-1.0", "Open Data Commons Open Database License v1.0"),
     ("ODC-By-1.0", "Open Data Commons Attribution License v1.0"),
