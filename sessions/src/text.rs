@@ -39,8 +39,13 @@ pub fn sha256(bytes: &[u8]) -> String {
 
 /// SHA-256 of a file, which is read in pieces.
 pub fn sha256_of_file(path: &Path) -> io::Result<String> {
+    sha256_of(File::open(path)?)
+}
+
+/// SHA-256 of the rest of a stream.
+pub fn sha256_of(from: impl Read) -> io::Result<String> {
     let mut hasher = Sha256::new();
-    read_pieces(File::open(path)?, |piece| hasher.update(piece))?;
+    read_pieces(from, |piece| hasher.update(piece))?;
     Ok(hex(&hasher.finalize()))
 }
 

@@ -46,6 +46,7 @@ pub mod protocol_sources;
 pub mod recordings;
 pub mod relaxation;
 pub mod report;
+pub mod research_object;
 pub mod run_quality;
 #[cfg(feature = "haptics")]
 pub mod scene;

@@ -1,8 +1,10 @@
 //! Values of arguments that several commands share.
 
-use super::Failure;
+use super::{Failure, steps};
+use chrono::{DateTime, Utc};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use palpate_model::typed_number::plain_text;
+use palpate_runner::wall_now;
 use std::str::FromStr;
 
 /// A word, the value it stands for, and its help.
@@ -52,4 +54,11 @@ pub(super) fn parse_columns<T: FromStr<Err: ToString>>(
 ) -> Result<Option<T>, Failure> {
     let columns = names.map(str::parse).transpose();
     columns.map_err(|reason: T::Err| Failure::usage(format!("--columns: {}", reason.to_string())))
+}
+
+/// When a page is made: now, or the time that the environment states, so that the same page can be made again.
+pub(super) fn date_of_pages() -> DateTime<Utc> {
+    let stated = std::env::var(steps::DATE).ok().and_then(|text| text.parse().ok());
+    let stated = stated.and_then(|seconds| DateTime::from_timestamp(seconds, 0));
+    stated.unwrap_or_else(|| wall_now().into())
 }

@@ -30,6 +30,7 @@ mod import;
 mod info;
 mod library;
 mod log;
+mod make_crate;
 mod man;
 mod mask;
 mod material;
@@ -47,6 +48,7 @@ mod recalibrate;
 mod recover;
 mod replay;
 mod report;
+mod reproduce;
 mod review;
 mod rig;
 mod run;
@@ -55,6 +57,7 @@ mod scene;
 mod select;
 #[cfg(feature = "haptics")]
 mod slave;
+mod steps;
 mod study;
 mod support_bundle;
 mod tag;
@@ -142,7 +145,12 @@ commands! { windows;
     Study(study::StudyArgs) => study::run;
     Population(population::PopulationArgs) => population::run;
     Agreement(agreement::AgreementArgs) => agreement::run;
+<<<<<<< HEAD
     #[command(subcommand)] Library(library::LibraryCommand) => library::run;
+=======
+    Crate(make_crate::CrateArgs) => make_crate::run;
+    Reproduce(reproduce::ReproduceArgs) => reproduce::run;
+>>>>>>> 52d314c8bd3b44299989ca16ad89077cef26744a
     #[command(subcommand)] Catalog(catalog::CatalogCommand) => catalog::run;
     Info(info::InfoArgs) => info::run;
     Report(report::ReportArgs) => report::run;

@@ -58,6 +58,17 @@ impl HtmlBody {
         }
     }
 
+    /// Links, each with an address and its words.
+    pub fn links<'a>(&mut self, items: impl IntoIterator<Item = (&'a str, &'a str)>) {
+        let items = items.into_iter().map(|(to, words)| {
+            format!("<li><a href=\"{}\">{}</a></li>\n", escape(to), escape(words))
+        });
+        let items: String = items.collect();
+        if !items.is_empty() {
+            self.0 += &format!("<ul>\n{items}</ul>\n");
+        }
+    }
+
     /// Lines in columns, as they are.
     pub fn pre(&mut self, text: &str) {
         let lines: Vec<String> = text.lines().map(escape).collect();
@@ -194,6 +205,7 @@ mod tests {
         body.paragraph(hostile);
         body.strong(hostile);
         body.list([hostile]);
+        body.links([(hostile, hostile)]);
         body.pre(hostile);
         body.facts(hostile, &[(hostile, hostile.to_owned())]);
         let rows = [vec![hostile.to_owned(), hostile.to_owned()]];
@@ -202,7 +214,7 @@ mod tests {
         let page = document(hostile, body);
         assert!(!page.contains("<script") && !page.contains("onload='"), "{page}");
         assert!(!page.contains('\u{202e}'));
-        assert_eq!(page.matches("&lt;script&gt;").count(), 14);
+        assert_eq!(page.matches("&lt;script&gt;").count(), 16);
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod analyse;
 mod calibration;
 mod catalog;
 mod compliance;
+mod crates;
 mod demo;
 mod disk;
 mod doctor;

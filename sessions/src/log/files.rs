@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 /// Limit of missing segments, so that the name of one file cannot cause endless work.
 const MISSING_MAX: usize = 1000;
 
-pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+/// The files of a session's log in order, those in its spare folder among them. One that is missing is listed too.
+pub fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.exists() {
         return Err(ReadError::Missing { path: path.into() });
     }

@@ -18,6 +18,7 @@ pub mod writer;
 
 pub use content::LogPart;
 pub use error::LogError;
+pub use files::find_files;
 pub use notices::{LogNotice, LogNotices};
 pub use reader::{AuxiliaryData, ReadError, Session, SessionOutline};
 pub use sink::{Alteration, FileSink, FolderSegments, SegmentSource, Sink};

@@ -4,7 +4,7 @@ mod check;
 mod figure;
 
 use super::Failure;
-use super::arguments::{Choice, choice, parse_number};
+use super::arguments::{Choice, choice, date_of_pages, parse_number};
 use super::new_file;
 use super::output::{Output, merged};
 use clap::Args;
@@ -15,7 +15,6 @@ use palpate_analysis::report::figures::TimeAlignment;
 use palpate_analysis::report::session::fidelity_text;
 use palpate_analysis::report::text::counted;
 use palpate_runner::base::FoundBase;
-use palpate_runner::wall_now;
 use std::path::{Path, PathBuf};
 
 /// Report on a run: targets and achieved values, missing samples, use of time
@@ -122,7 +121,7 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
         .iter()
         .map(|session| SessionReading { session: session.clone(), analysis: args.analysis.clone() })
         .collect();
-    let made_at = dossier::creation_line(wall_now().into());
+    let made_at = dossier::creation_line(date_of_pages());
     let page = dossier::write(&wanted, args.align, &made_at, &output.count_bar(0));
     let page = page.map_err(|err| match err {
         ReportError::Source(path, err) => {

@@ -11,7 +11,7 @@ const ROW: &str = "<tr data-session=\"";
 /// Start of the line with the date, the only one that depends on when the page is made.
 pub(super) const MADE: &str = "<p class=\"made\">";
 /// Start and end of the line with the page's own hash.
-const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
+pub const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
 const SEAL_END: &str = " -->\n";
 
 /// A file that a page lists.

@@ -6,7 +6,7 @@ mod files;
 mod history;
 mod html;
 
-pub use files::{FileClaim, FileComparison, claims, compare};
+pub use files::{FileClaim, FileComparison, SEAL, claims, compare};
 
 use super::calibration::CalibrationDetails;
 use super::calibration_plot;
