@@ -145,12 +145,9 @@ commands! { windows;
     Study(study::StudyArgs) => study::run;
     Population(population::PopulationArgs) => population::run;
     Agreement(agreement::AgreementArgs) => agreement::run;
-<<<<<<< HEAD
     #[command(subcommand)] Library(library::LibraryCommand) => library::run;
-=======
     Crate(make_crate::CrateArgs) => make_crate::run;
     Reproduce(reproduce::ReproduceArgs) => reproduce::run;
->>>>>>> 52d314c8bd3b44299989ca16ad89077cef26744a
     #[command(subcommand)] Catalog(catalog::CatalogCommand) => catalog::run;
     Info(info::InfoArgs) => info::run;
     Report(report::ReportArgs) => report::run;
