@@ -3,6 +3,7 @@
 use crate::progress::Progress;
 use crate::report::text::{counted, megabytes};
 use chrono::{DateTime, Utc};
+use palpate_runner::wall_now;
 use palpate_sessions::Catalog;
 use palpate_sessions::catalog::{CatalogError, LocalSession};
 use palpate_sessions::{FolderError, library_folder};
@@ -52,7 +53,7 @@ pub struct SharedLibrary {
 }
 
 fn now() -> DateTime<Utc> {
-    Utc::now()
+    DateTime::from(wall_now())
 }
 
 impl SharedLibrary {

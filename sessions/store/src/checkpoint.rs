@@ -359,7 +359,7 @@ mod tests {
     fn a_checkpoint_is_the_state() {
         let now = chrono::DateTime::from_timestamp(1_700_000_000, 0).unwrap();
         let mut snapshot = Snapshot::default();
-        snapshot.apply(&Commit { version: 0, actions: first_actions("{}", now) });
+        snapshot.apply(&Commit { version: 0, actions: first_actions("s3://lab", "{}", now) });
         for parts in 0..3 {
             let found = decode(7, &encode(&snapshot).unwrap().into()).unwrap();
             assert_eq!(found.version, 7);

@@ -31,7 +31,7 @@ impl Store {
     /// Joins small files of rows and writes a checkpoint.
     pub fn compact(&self, now: fn() -> DateTime<Utc>) -> Result<Compaction, StoreError> {
         self.wait(async {
-            self.probe().await?;
+            self.probe(now()).await?;
             for _ in 0..TRIES_MAX {
                 let missing =
                     || StoreError::bad(&log_folder(), "there is no table; push a session first");

@@ -175,10 +175,10 @@ pub(crate) fn check_actions(actions: &[Action]) -> Result<(), StoreError> {
 const VERSION_KEY: &str = "palpate.storeVersion";
 
 /// The first change of a new table.
-pub(crate) fn first_actions(schema: &str, now: DateTime<Utc>) -> Vec<Action> {
+pub(crate) fn first_actions(url: &str, schema: &str, now: DateTime<Utc>) -> Vec<Action> {
     let created = now.timestamp_millis();
     // A name that no other table has, in the form of a UUID of version 8 (RFC 9562, section 5.8).
-    let seed = format!("{created} {:?} {}", std::time::Instant::now(), std::process::id());
+    let seed = format!("{url} {:?} {}", now.timestamp_nanos_opt(), std::process::id());
     let hash = sha256(seed.as_bytes());
     let part = |range: std::ops::Range<usize>| hash.get(range).unwrap_or_default();
     let id = format!(

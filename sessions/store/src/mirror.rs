@@ -46,7 +46,7 @@ impl Mirror {
             let mut rows = Vec::new();
             store.wait(read_parts(store, &parts, hear, |read| rows.extend(read)))?;
             let count = rows.len();
-            let mut sessions = rows.into_iter().map(|row| mirrored(row));
+            let mut sessions = rows.into_iter().map(mirrored);
             if self.catalog.take_mirrored(change.was.as_ref(), &change.now, &mut sessions)? {
                 return Ok(count);
             }

@@ -4,21 +4,26 @@
 use crate::error::StoreError;
 use crate::location::Store;
 use bytes::Bytes;
+use chrono::{DateTime, Utc};
 use futures_util::future::join_all;
 use object_store::ObjectStoreExt;
 use object_store::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Writers of one name at a time.
 const WRITERS: u8 = 8;
 /// Bytes of each: enough that a server is still receiving one while it looks at another's name.
 const BYTES: usize = 1 << 16;
 
+/// Probes of this process, so that no two share a name.
+static COUNT: AtomicU64 = AtomicU64::new(0);
+
 impl Store {
     /// Puts one name several times at once and once more: one of them may succeed, and its bytes must stay.
-    pub(crate) async fn probe(&self) -> Result<(), StoreError> {
-        let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-        let path = Path::from(format!("probe/{now}-{}", std::process::id()));
+    pub(crate) async fn probe(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
+        let now = now.timestamp_nanos_opt().unwrap_or_default();
+        let place = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let path = Path::from(format!("probe/{now}-{}-{}", place.0, place.1));
         let body = |writer: u8| Bytes::from(vec![writer; BYTES]);
         let racing = (0..WRITERS).map(|writer| self.create(&path, body(writer)));
         let mut written = join_all(racing).await.into_iter().collect::<Result<Vec<bool>, _>>()?;

@@ -62,7 +62,7 @@ impl Store {
         now: fn() -> DateTime<Utc>,
         hear: Hear<'_>,
     ) -> Result<PushOutcome, StoreError> {
-        self.wait(self.probe())?;
+        self.wait(self.probe(now()))?;
         self.wait(self.ensure_table(now()))?;
         mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
         let mut outcome = PushOutcome::default();
@@ -86,7 +86,7 @@ impl Store {
     /// Makes the table, unless there is one.
     async fn ensure_table(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
         if self.read_commit(0).await?.is_none() {
-            self.commit(0, &first_actions(&schema_with(None).0, now)).await?;
+            self.commit(0, &first_actions(self.url.as_str(), &schema_with(None).0, now)).await?;
         }
         Ok(())
     }

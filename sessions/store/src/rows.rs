@@ -257,13 +257,11 @@ pub(crate) fn rows_of(path: &Path, bytes: &Bytes) -> Result<Vec<SessionRow>, Sto
             return Some(Err(failed(format!("the checksum of row {at} is wrong"))));
         }
         let entry = serde_json::from_str(text).map_err(|err| failed(err.to_string()));
-        Some(entry.and_then(|entry| {
-            Ok(SessionRow {
-                version: versions.get(at).and_then(|one| u64::try_from(one).ok()).unwrap_or(0),
-                content: contents.get(at).unwrap_or_default().to_owned(),
-                pushed_at: pushed.get(at).unwrap_or_default().to_owned(),
-                entry,
-            })
+        Some(entry.map(|entry| SessionRow {
+            version: versions.get(at).and_then(|one| u64::try_from(one).ok()).unwrap_or(0),
+            content: contents.get(at).unwrap_or_default().to_owned(),
+            pushed_at: pushed.get(at).unwrap_or_default().to_owned(),
+            entry,
         }))
     };
     let missing = |at: usize| failed(format!("row {at} has no entry"));

@@ -53,7 +53,7 @@ impl Faulty {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^= z >> 31;
-        (self.one_of > 0 && z % self.one_of == 0, z & (1 << 40) == 0)
+        (z.is_multiple_of(self.one_of), z & (1 << 40) == 0)
     }
 
     async fn with_faults<T>(&self, work: impl Future<Output = Result<T>>) -> Result<T> {
@@ -203,6 +203,7 @@ impl Rig {
     }
 }
 
+#[expect(clippy::disallowed_methods, reason = "names of files of rows have the time")]
 fn now() -> DateTime<Utc> {
     Utc::now()
 }
