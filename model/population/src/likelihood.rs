@@ -124,6 +124,10 @@ pub(crate) struct ShiftEstimate {
 struct Sums {
     /// Of each level but the sessions' own.
     groups: Vec<Vec<Form>>,
+    /// How the shift of each of these groups was integrated out.
+    steps: Vec<Vec<Integration>>,
+    /// How that of each session was; none where its values are exact.
+    session_steps: Vec<Option<Integration>>,
     root: Form,
     log_determinant: f64,
 }
@@ -191,17 +195,21 @@ impl NestedStudy {
         let mut logarithm = 0.0;
         let innermost = &factors[self.parents.len()];
         let exact = innermost.covariance();
+        let mut session_steps = Vec::with_capacity(self.sessions.len());
         for (index, session) in self.sessions.iter().enumerate() {
             let weight = match &session.evidence {
                 Evidence::Exact => {
                     let factor = Cholesky::new(exact.clone())?;
                     logarithm += log_determinant(&factor);
+                    session_steps.push(None);
                     factor.inverse()
                 }
                 Evidence::Information(information) => {
                     let step = Integration::of(information, innermost)?;
                     logarithm += step.log_determinant;
-                    step.form(information)
+                    let weight = step.form(information);
+                    session_steps.push(Some(step));
+                    weight
                 }
             };
             let sum = match groups.last_mut() {
@@ -210,6 +218,7 @@ impl NestedStudy {
             };
             self.add_session(sum, index, &weight);
         }
+        let mut steps: Vec<Vec<Integration>> = groups.iter().map(|_| Vec::new()).collect();
         for level in (0..groups.len()).rev() {
             let (outer, own) = groups.split_at_mut(level);
             for (form, parent) in own[0].iter().zip(&self.parents[level]) {
@@ -220,9 +229,10 @@ impl NestedStudy {
                     None => &mut root,
                 };
                 *sum += step.form(form);
+                steps[level].push(step);
             }
         }
-        Some(Sums { groups, root, log_determinant: logarithm })
+        Some(Sums { groups, steps, session_steps, root, log_determinant: logarithm })
     }
 
     /// One and the effects of a session that are not zero, each with its place in a form.
@@ -275,29 +285,28 @@ impl NestedStudy {
         let mut gradient = vec![DMatrix::zeros(count, count); self.levels()];
         let mut above: Vec<Form> = vec![root.clone()];
         for (level, forms) in sums.groups.iter().enumerate() {
-            let own = forms.iter().zip(&self.parents[level]).map(|(form, parent)| {
-                let step = Integration::of(form, &factors[level])?;
+            let own = forms.iter().zip(&sums.steps[level]).zip(&self.parents[level]);
+            let own = own.map(|((form, step), parent)| {
                 let sum = &mut gradient[level];
-                Some(step.adjoint(form, &factors[level].root, &above[*parent], sum))
+                step.adjoint(form, &factors[level].root, &above[*parent], sum)
             });
-            above = own.collect::<Option<_>>()?;
+            above = own.collect();
         }
         let innermost = &factors[self.parents.len()];
         let sum = &mut gradient[self.parents.len()];
         for (index, session) in self.sessions.iter().enumerate() {
             let adjoint = self.weight_adjoint(&above[self.owner[index]], index);
-            match &session.evidence {
-                Evidence::Exact => {
+            match (&session.evidence, &sums.session_steps[index]) {
+                (Evidence::Information(information), Some(step)) => {
+                    step.adjoint(information, &innermost.root, &adjoint, sum);
+                }
+                _ => {
                     let inverse = innermost.covariance().try_inverse()?;
                     let covariance = &inverse - &inverse * adjoint * &inverse;
                     *sum += covariance
                         * &innermost.root
                         * DMatrix::from_diagonal(&innermost.signs)
                         * 2.0;
-                }
-                Evidence::Information(information) => {
-                    let step = Integration::of(information, innermost)?;
-                    step.adjoint(information, &innermost.root, &adjoint, sum);
                 }
             }
         }

@@ -130,8 +130,13 @@ impl Criterion<'_> {
     }
 
     fn gradient(&self, at: &[f64]) -> Option<Vec<f64>> {
-        let (_, gradient) = self.study.evaluate_with_gradient(&self.coordinates.factors(at))?;
-        Some(self.coordinates.gradient(at, &gradient))
+        Some(self.with_gradient(at)?.1)
+    }
+
+    fn with_gradient(&self, at: &[f64]) -> Option<(f64, Vec<f64>)> {
+        let factors = self.coordinates.factors(at);
+        let (evaluation, gradient) = self.study.evaluate_with_gradient(&factors)?;
+        Some((evaluation.criterion, self.coordinates.gradient(at, &gradient)))
     }
 
     /// The lowest point; `None` where the search ends elsewhere.
@@ -175,7 +180,7 @@ impl Criterion<'_> {
         inverse_curvature: &DMatrix<f64>,
     ) -> Option<(f64, Vec<f64>)> {
         let best = RefCell::new((f64::INFINITY, start.to_vec()));
-        let search = Search { criterion: self, free, start, best };
+        let search = Search { criterion: self, free, start, best, slope: RefCell::default() };
         let rows = inverse_curvature.row_iter().map(|row| row.iter().copied().collect());
         let solver = BFGS::new(MoreThuenteLineSearch::new());
         let tolerance = GRADIENT * (self.study.sessions.len() as f64).sqrt();
@@ -244,6 +249,8 @@ struct Search<'a, 'b> {
     free: &'a [usize],
     start: &'a [f64],
     best: RefCell<(f64, Vec<f64>)>,
+    /// The last place and the gradient there: the line search wants both at every place.
+    slope: RefCell<Option<(Vec<f64>, Vec<f64>)>>,
 }
 
 impl Search<'_, '_> {
@@ -260,7 +267,9 @@ impl CostFunction for &Search<'_, '_> {
 
     fn cost(&self, inside: &Self::Param) -> Result<f64, Error> {
         let at = self.whole(inside);
-        let criterion = self.criterion.evaluate(&at).map_or(f64::INFINITY, |one| one.criterion);
+        let (criterion, slope) = self.criterion.with_gradient(&at).unzip();
+        let criterion = criterion.filter(|one| one.is_finite()).unwrap_or(f64::INFINITY);
+        *self.slope.borrow_mut() = slope.map(|slope| (at.clone(), slope));
         let mut best = self.best.borrow_mut();
         if criterion < best.0 {
             *best = (criterion, at);
@@ -274,7 +283,9 @@ impl Gradient for &Search<'_, '_> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, inside: &Self::Param) -> Result<Vec<f64>, Error> {
-        let gradient = self.criterion.gradient(&self.whole(inside));
+        let at = self.whole(inside);
+        let known = self.slope.borrow().clone().filter(|(place, _)| *place == at);
+        let gradient = known.map(|(_, slope)| slope).or_else(|| self.criterion.gradient(&at));
         let gradient = gradient.ok_or_else(|| Error::msg("no likelihood here"))?;
         Ok(self.free.iter().map(|&k| gradient[k]).collect())
     }
