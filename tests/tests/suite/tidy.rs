@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 16] = [
+const PACKAGES: [&str; 17] = [
     "model",
     "model/rheology",
     "model/haptics",
@@ -16,6 +16,7 @@ const PACKAGES: [&str; 16] = [
     "drivers",
     "drivers/emulators",
     "sessions",
+    "sessions/store",
     "sessions/tables",
     "protocols",
     "protocols/runner",

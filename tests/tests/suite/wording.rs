@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 29] = [
+const PROPER_NAMES: [&str; 30] = [
     // Programs, libraries, repositories and formats.
     "AppImage",
     "CarbonFiberData",
@@ -30,6 +30,7 @@ const PROPER_NAMES: [&str; 29] = [
     "SarahIaquinta",
     "SplitMix64",
     "StephenQiu628",
+    "WorkflowHub",
     // Authors.
     "McCulloch",
     // Makers of rheometers and haptic devices.
