@@ -54,7 +54,8 @@ fn text(made: &MadeCrate) -> String {
     )];
     if !made.findings.is_empty() {
         lines.push("a reader will miss:".to_owned());
-        lines.extend(made.findings.iter().map(|one| format!("  {}", one.text())));
+        let of = made.sessions.len();
+        lines.extend(made.findings.iter().map(|one| format!("  {}", one.text(of))));
         lines.extend(remedy(&made.findings));
     }
     lines.push(format!("'palpate reproduce {to}' computes the numbers again"));

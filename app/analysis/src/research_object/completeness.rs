@@ -272,13 +272,14 @@ fn missing_repeats(sessions: &[CrateSession]) -> Vec<Finding> {
 const NAMES_MAX: usize = 5;
 
 impl Finding {
-    /// The sentence with its sessions and who recommends to report it.
+    /// The sentence with its sessions, of so many in the crate, and who recommends to report it.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub fn text(&self, of: usize) -> String {
         let shown = &self.sessions[..self.sessions.len().min(NAMES_MAX)];
         let more = self.sessions.len() - shown.len();
         let sessions = match (shown.is_empty(), more) {
             (true, _) => String::new(),
+            _ if of > 1 && self.sessions.len() == of => format!(": all {of} sessions"),
             (false, 0) => format!(": {}", shown.join(", ")),
             (false, more) => format!(": {} and {more} more", shown.join(", ")),
         };

@@ -30,7 +30,7 @@ pub(super) fn page(about: &CrateDescription<'_>) -> String {
     body.heading(2, "Sessions");
     sessions(&mut body, about.sessions);
     body.heading(2, "What a reader will miss");
-    missing(&mut body, about.findings);
+    missing(&mut body, about.findings, about.sessions.len());
     body.heading(2, "Files");
     body.paragraph(&format!(
         "{} describes every file with its size and SHA-256 for programs.",
@@ -118,11 +118,11 @@ fn sessions(body: &mut HtmlBody, sessions: &[CrateSession]) {
     body.table(&caption, &heads, &rows);
 }
 
-fn missing(body: &mut HtmlBody, findings: &[Finding]) {
+fn missing(body: &mut HtmlBody, findings: &[Finding], of: usize) {
     if findings.is_empty() {
         return body.paragraph("Nothing that the recommendations below name is missing.");
     }
-    let sentences: Vec<String> = findings.iter().map(Finding::text).collect();
+    let sentences: Vec<String> = findings.iter().map(|one| one.text(of)).collect();
     body.list(sentences.iter().map(String::as_str));
     body.heading(3, "Recommendations");
     let mut sources: Vec<_> = findings.iter().map(|one| one.recommendation).collect();
