@@ -1,6 +1,6 @@
 //! Sessions as tables: import of foreign files, export to CSV, Parquet and Arrow, and lakes.
 //!
-//! polars is used only here, so that recording, reading and recovering a session compile without it. This crate decides
+//! polars is used only here and in palpate-store, so that recording, reading and recovering a session compile without it. This crate decides
 //! nothing about a run and draws nothing.
 //!
 //! Start reading at [`export::Selection`] for exports and at [`import`] for imports.
