@@ -11,7 +11,10 @@ use std::cell::RefCell;
 const STEPS_MAX: u64 = 200;
 /// Of a search that Newton's steps follow, or that looks for a place in an interval, for each root of a session: curvatures
 /// grow with the number of sessions, so that the criterion is then within a millionth of the lowest.
-const GRADIENT: f64 = 1e-4;
+const GRADIENT: f64 = 1e-3;
+/// A step that lets the criterion fall by less than this is the last of such a search: near the rounding of a criterion of many
+/// sessions a line search would try a hundred places to no end. Intervals end where it has risen by 3.84.
+const FALL: f64 = 1e-6;
 /// Steps of Newton after the search. One that is expected to let the criterion fall by less than this share of it, near its
 /// rounding, is the last and is taken whole: what it leaves is its square.
 const NEWTON_STEPS_MAX: usize = 12;
@@ -185,6 +188,7 @@ impl Criterion<'_> {
         let solver = BFGS::new(MoreThuenteLineSearch::new());
         let tolerance = GRADIENT * (self.study.sessions.len() as f64).sqrt();
         let solver = solver.with_tolerance_grad(tolerance).ok()?;
+        let solver = solver.with_tolerance_cost(FALL).ok()?;
         let inside: Vec<f64> = free.iter().map(|&k| start[k]).collect();
         let executor = Executor::new(&search, solver).configure(|state| {
             state.param(inside).inv_hessian(rows.collect::<Vec<Vec<f64>>>()).max_iters(STEPS_MAX)
