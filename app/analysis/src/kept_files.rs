@@ -3,6 +3,7 @@
 //! `docs/guide/settings.md` has the same table.
 
 use crate::fit::last;
+use crate::shared_library::STORES_FOLDER;
 use crate::window_requests::{SETTINGS_FILE, SETTINGS_VERSION};
 use palpate_model::calibration::CALIBRATION_FORMAT;
 use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
@@ -125,6 +126,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             format!("SQLite, version {CATALOG_VERSION}"),
             "every search",
             "delete the file; the next search makes it again",
+        ),
+        (
+            "catalogs of stores",
+            STORES_FOLDER,
+            format!("SQLite, version {CATALOG_VERSION}"),
+            "'palpate library' and 'palpate find --store'",
+            "delete the folder; the next search reads the store's table again",
         ),
         (
             "rig files and locks",

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Folder of the library with a catalog of each store that was used.
-const STORES_FOLDER: &str = "stores";
+pub(crate) const STORES_FOLDER: &str = "stores";
 
 #[derive(Debug, Error)]
 pub enum SharedLibraryError {
