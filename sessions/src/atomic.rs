@@ -112,6 +112,12 @@ pub fn find_leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
     found.into_iter().map(|(path, _lock)| path).collect()
 }
 
+/// Whether a file of this name is a draft.
+#[must_use]
+pub fn is_draft_name(name: &str) -> bool {
+    name.starts_with('.') && name.ends_with(ENDING)
+}
+
 /// Deletes abandoned drafts as far as permissions allow; returns the deleted paths.
 pub fn remove_leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
     let mut found = unowned(folder, depth);
@@ -124,9 +130,8 @@ fn unowned(folder: &Path, depth: usize) -> Vec<(PathBuf, File)> {
     let here = Path::new(".");
     let folder = if folder == Path::new("") { here } else { folder };
     let entries = WalkDir::new(folder).max_depth(depth).sort_by_file_name();
-    let is_draft = |name: &str| name.starts_with('.') && name.ends_with(ENDING);
     let files = entries.into_iter().flatten().filter(|entry| {
-        entry.file_type().is_file() && entry.file_name().to_str().is_some_and(is_draft)
+        entry.file_type().is_file() && entry.file_name().to_str().is_some_and(is_draft_name)
     });
     let locked = files.filter_map(|entry| {
         let file = File::open(entry.path()).ok()?;

@@ -39,6 +39,8 @@ impl SharedLibraryError {
                 | Self::Store(
                     StoreError::Address { .. }
                         | StoreError::NoSession { .. }
+                        | StoreError::NoTable { .. }
+                        | StoreError::Different { .. }
                         | StoreError::Unconditional { .. }
                 )
         )
@@ -57,12 +59,24 @@ fn now() -> DateTime<Utc> {
 }
 
 impl SharedLibrary {
-    /// Opens the store of an address.
+    /// Opens the store of an address, which is there.
     pub fn open(address: &str) -> Result<Self, SharedLibraryError> {
+        Self::with(address, Store::open)
+    }
+
+    /// Opens the store of an address, and makes its folder if there is none.
+    pub fn create(address: &str) -> Result<Self, SharedLibraryError> {
+        Self::with(address, Store::create)
+    }
+
+    fn with(
+        address: &str,
+        open: impl Fn(&StoreUrl) -> Result<Store, StoreError>,
+    ) -> Result<Self, SharedLibraryError> {
         let url = StoreUrl::parse(address)?;
+        let store = open(&url)?;
         let folder = library_folder()?.join(STORES_FOLDER).join(url.folder_name());
-        let mirror = Mirror::open(&folder)?;
-        Ok(Self { store: Store::open(&url)?, mirror })
+        Ok(Self { store, mirror: Mirror::open(&folder)? })
     }
 
     #[must_use]
@@ -80,6 +94,21 @@ impl SharedLibrary {
     pub fn update(&mut self, progress: &dyn Progress) -> Result<usize, SharedLibraryError> {
         let mut hear = |done, of| progress.report(done, of, "reading the table");
         Ok(self.mirror.update(&self.store, &mut hear)?)
+    }
+
+    /// Reads what is new, unless the store does not answer; then the catalog stays as it was last time, and the answer is why.
+    pub fn update_if_reachable(
+        &mut self,
+        progress: &dyn Progress,
+    ) -> Result<Option<String>, SharedLibraryError> {
+        match self.update(progress) {
+            Err(SharedLibraryError::Store(err @ StoreError::Object { .. }))
+                if self.mirror.is_known()? =>
+            {
+                Ok(Some(err.to_string()))
+            }
+            updated => updated.map(|_| None),
+        }
     }
 
     /// Pushes sessions, or all of this computer's library where none is named.

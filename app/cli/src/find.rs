@@ -150,10 +150,10 @@ fn find_in_store(
 ) -> Result<(String, (CatalogPage, Vec<String>)), Failure> {
     let mut library = SharedLibrary::open(store).map_err(library::failure)?;
     let bar = output.count_bar(0);
-    let updated = library.update(&bar);
+    let unreachable = library.update_if_reachable(&bar).map_err(library::failure)?;
     drop(bar);
-    if let Err(err) = updated {
-        output.note(&format!("{err}; the search is of what was last seen of the store"));
+    if let Some(reason) = unreachable {
+        output.note(&format!("the search is of what was last seen of the store: {reason}"));
     }
     let found = find(library.catalog(), query).map_err(Failure::failed)?;
     Ok((library.address().to_owned(), found))

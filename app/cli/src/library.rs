@@ -68,7 +68,7 @@ pub(super) fn run(command: &LibraryCommand, output: &Output) -> Result<(), Failu
 }
 
 fn push(args: &PushArgs, output: &Output) -> Result<(), Failure> {
-    let mut library = SharedLibrary::open(&args.store).map_err(failure)?;
+    let mut library = SharedLibrary::create(&args.store).map_err(failure)?;
     let bar = output.count_bar(0);
     let outcome = library.push(&args.sessions, &bar).map_err(failure)?;
     drop(bar);

@@ -32,6 +32,7 @@ mod records;
 mod report;
 mod scene;
 mod select;
+mod shared_library;
 mod stored_population;
 mod study;
 mod support;

@@ -55,7 +55,7 @@ impl Store {
         let path = checkpoint_path(snapshot.version);
         let bytes = encode(snapshot).map_err(|err| StoreError::bad(&path, err))?;
         // All writers of a version's checkpoint write the same state.
-        self.create(&path, bytes.into()).await?;
+        self.put_new(&path, bytes.into()).await?;
         let last =
             LastCheckpoint { version: snapshot.version, size: snapshot.parts.len() as u64 + 2 };
         let last = PutPayload::from(serde_json::to_vec(&last).unwrap_or_default());
@@ -86,7 +86,8 @@ impl Store {
     }
 }
 
-/// The columns of a checkpoint: the protocol and the table in rows of their own, then a row a file.
+/// The columns of a checkpoint: the protocol and the table in rows of their own, then a row a file. Files that left the table
+/// are not in it: only programs that delete them look for them, and they are in the changes all the same.
 fn encode(snapshot: &Snapshot) -> PolarsResult<Vec<u8>> {
     let parts: Vec<&Add> = snapshot.parts.values().collect();
     let columns = [

@@ -1,6 +1,6 @@
 //! Compaction: many small files of rows become one, so that a reader opens few. No row changes and no object is deleted.
 
-use crate::delta::{Action, Add, Remove, Snapshot, commit_info, log_folder, table_path};
+use crate::delta::{Action, Add, Remove, Snapshot, commit_info, table_path};
 use crate::error::StoreError;
 use crate::location::{REQUESTS, Store};
 use crate::rows::{merged, row_count};
@@ -33,9 +33,8 @@ impl Store {
         self.wait(async {
             self.probe(now()).await?;
             for _ in 0..TRIES_MAX {
-                let missing =
-                    || StoreError::bad(&log_folder(), "there is no table; push a session first");
-                let mut snapshot = self.snapshot().await?.ok_or_else(missing)?;
+                let snapshot = self.snapshot().await?;
+                let mut snapshot = snapshot.ok_or_else(|| self.no_table())?;
                 let before = snapshot.parts.len();
                 let rows = snapshot.parts.values().map(row_count).sum();
                 let is_done = self.join_small(&mut snapshot, now()).await?;
@@ -63,7 +62,7 @@ impl Store {
         for group in &groups {
             let part = merged(&self.read_group(group).await?, now)?;
             let path = part.path();
-            self.create(&path, part.bytes).await?;
+            self.put_new(&path, part.bytes).await?;
             actions.extend(group.iter().map(|add| Action::from(removal(add, now))));
             written.push((path, part.add.path.clone()));
             actions.push(part.add.into());

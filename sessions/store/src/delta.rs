@@ -224,7 +224,7 @@ impl Store {
         actions: &[Action],
     ) -> Result<bool, StoreError> {
         let lines = actions.iter().map(|action| json!(action).to_string() + "\n");
-        self.create(&commit_path(version), Bytes::from(lines.collect::<String>())).await
+        self.put_new(&commit_path(version), Bytes::from(lines.collect::<String>())).await
     }
 
     /// The change of a version; none where there is none yet.

@@ -11,7 +11,11 @@ pub enum StoreError {
     Address { url: String },
     #[error("{url} cannot be opened: {source}")]
     Open { url: String, source: object_store::Error },
-    #[error("the store cannot be read or written at {path}: {source}")]
+    #[error("{url} has no sessions yet; push one, or check the address")]
+    NoTable { url: String },
+    #[error(
+        "the store cannot be read or written at {path} ({source}); check the address, the network and the credentials"
+    )]
     Object { path: String, source: object_store::Error },
     #[error(
         "the store {url} lets two writers have one name, so that rigs would overwrite each other; use a store that keeps to If-None-Match"

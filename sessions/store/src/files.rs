@@ -8,6 +8,7 @@ use crate::location::{REQUESTS, Store};
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use object_store::path::Path as ObjectPath;
+use palpate_sessions::atomic::is_draft_name;
 use palpate_sessions::text::sha256;
 use palpate_sessions::{LOCK_FILE, SPARE_FILE};
 use serde::{Deserialize, Serialize};
@@ -58,18 +59,19 @@ pub(crate) enum FolderFault {
 /// The files of a session's folder, by name, without its lock and without drafts.
 pub(crate) fn local_files(session: &Path) -> Result<Vec<LocalFile>, FolderFault> {
     let mut files = Vec::new();
-    let is_kept = |name: &str| name != LOCK_FILE && !name.starts_with('.');
-    let entries = WalkDir::new(session).min_depth(1).sort_by_file_name();
+    // What a link leads to is a part of the session.
+    let entries = WalkDir::new(session).follow_links(true).min_depth(1).sort_by_file_name();
     for entry in entries {
         let entry = entry.map_err(|err| {
             let path = err.path().unwrap_or(session).to_owned();
             FolderFault::Unreadable(StoreError::File { path, source: err.into() })
         })?;
         let name = entry.file_name().to_string_lossy();
-        if name == SPARE_FILE {
+        if entry.depth() == 1 && name == SPARE_FILE {
             return Err(FolderFault::Spare);
         }
-        if entry.file_type().is_file() && is_kept(&name) {
+        let is_lock = entry.depth() == 1 && name == LOCK_FILE;
+        if entry.file_type().is_file() && !is_lock && !is_draft_name(&name) {
             let below = entry.path().strip_prefix(session).unwrap_or(entry.path());
             let parts = below.iter().map(|part| part.to_string_lossy());
             let name = parts.collect::<Vec<_>>().join("/");
@@ -120,6 +122,7 @@ impl FileList {
     }
 
     pub fn encode(&self) -> Bytes {
+        // Texts and numbers always have a JSON.
         serde_json::to_vec(self).unwrap_or_default().into()
     }
 
@@ -174,7 +177,7 @@ impl StoredFile {
 }
 
 /// Whether a name stays below its folder on every system.
-fn is_below(name: &str) -> bool {
+pub(crate) fn is_below(name: &str) -> bool {
     let is_plain =
         |part: &str| !matches!(part, "" | "." | "..") && !part.contains(['\\', ':', '\0']);
     name.split('/').all(is_plain)
@@ -202,7 +205,7 @@ impl Store {
         let sent: Vec<u64> = sent.buffer_unordered(REQUESTS).try_collect().await?;
         let listed = list.encode();
         let sum = sha256(&listed);
-        self.create(&object_path(&sum), listed).await?;
+        self.put_new(&object_path(&sum), listed).await?;
         Ok((sum, sent.iter().sum()))
     }
 
@@ -220,7 +223,7 @@ impl Store {
         if bytes >= LOOK_BYTES && self.size(&object).await? == Some(bytes as u64) {
             return Ok(0);
         }
-        let is_new = self.create(&object, piece.into()).await?;
+        let is_new = self.put_new(&object, piece.into()).await?;
         Ok(if is_new { bytes as u64 } else { 0 })
     }
 

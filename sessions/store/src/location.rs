@@ -57,14 +57,28 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens a store. Credentials, region and endpoint of S3 come from the environment variables of AWS's own clients.
+    /// Opens a store that is there.
     pub fn open(url: &StoreUrl) -> Result<Self, StoreError> {
+        Self::open_or_create(url, false)
+    }
+
+    /// Opens a store, whose folder is made if there is none.
+    pub fn create(url: &StoreUrl) -> Result<Self, StoreError> {
+        Self::open_or_create(url, true)
+    }
+
+    /// Credentials, region and endpoint of S3 come from the environment variables of AWS's own clients.
+    fn open_or_create(url: &StoreUrl, is_made: bool) -> Result<Self, StoreError> {
+        let refused = || StoreError::Address { url: url.as_str().to_owned() };
         let failed = |source| StoreError::Open { url: url.as_str().to_owned(), source };
         let objects: Arc<dyn ObjectStore> = match url.0.scheme() {
             "file" => {
-                let refused = |()| StoreError::Address { url: url.as_str().to_owned() };
-                let folder = url.0.to_file_path().map_err(refused)?;
-                std::fs::create_dir_all(&folder).map_err(StoreError::file(&folder))?;
+                let folder = url.0.to_file_path().map_err(|()| refused())?;
+                if is_made {
+                    std::fs::create_dir_all(&folder).map_err(StoreError::file(&folder))?;
+                } else if !folder.is_dir() {
+                    return Err(StoreError::NoTable { url: url.as_str().to_owned() });
+                }
                 let local = LocalFileSystem::new_with_prefix(&folder).map_err(failed)?;
                 Arc::new(local.with_fsync(true))
             }
@@ -76,7 +90,7 @@ impl Store {
                     .with_conditional_put(S3ConditionalPut::ETagMatch)
                     .build()
                     .map_err(failed)?;
-                let folder = Path::from_url_path(url.0.path()).unwrap_or_default();
+                let folder = Path::from_url_path(url.0.path()).map_err(|_| refused())?;
                 Arc::new(PrefixStore::new(bucket, folder))
             }
         };
@@ -89,6 +103,10 @@ impl Store {
         Ok(Self { url, objects, runtime: runtime.map_err(StoreError::Runtime)? })
     }
 
+    pub(crate) fn no_table(&self) -> StoreError {
+        StoreError::NoTable { url: self.url.as_str().to_owned() }
+    }
+
     #[must_use]
     pub fn url(&self) -> &StoreUrl {
         &self.url
@@ -99,7 +117,7 @@ impl Store {
     }
 
     /// Writes an object that must not exist yet; `false` where it does.
-    pub(crate) async fn create(
+    pub(crate) async fn put_new(
         &self,
         path: &Path,
         bytes: bytes::Bytes,

@@ -35,13 +35,21 @@ impl Mirror {
         Ok(self.catalog.mirrored_table()?)
     }
 
+    /// Whether the store was ever read.
+    pub fn is_known(&self) -> Result<bool, StoreError> {
+        Ok(self.table()?.is_some())
+    }
+
     /// Reads what changed in the store's table. Returns the number of versions of sessions that were read; `hear` is called
     /// with the files of rows that were read and all.
     pub fn update(&mut self, store: &Store, hear: Hear<'_>) -> Result<usize, StoreError> {
         loop {
             let known = self.table()?;
             let change = store.wait(Change::since(store, known.as_ref()))?;
-            let Some(change) = change else { return Ok(0) };
+            let Some(change) = change else {
+                // Nothing is new, or there is no table.
+                return if known.is_some() { Ok(0) } else { Err(store.no_table()) };
+            };
             let parts: Vec<Add> = change.parts;
             let mut rows = Vec::new();
             store.wait(read_parts(store, &parts, hear, |read| rows.extend(read)))?;

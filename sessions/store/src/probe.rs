@@ -25,9 +25,9 @@ impl Store {
         let place = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let path = Path::from(format!("probe/{now}-{}-{}", place.0, place.1));
         let body = |writer: u8| Bytes::from(vec![writer; BYTES]);
-        let racing = (0..WRITERS).map(|writer| self.create(&path, body(writer)));
+        let racing = (0..WRITERS).map(|writer| self.put_new(&path, body(writer)));
         let mut written = join_all(racing).await.into_iter().collect::<Result<Vec<bool>, _>>()?;
-        written.push(self.create(&path, body(WRITERS)).await?);
+        written.push(self.put_new(&path, body(WRITERS)).await?);
         let kept = self.read(&path).await?;
         self.objects.delete(&path).await.map_err(StoreError::object(&path))?;
         let winners: Vec<usize> = (0..written.len()).filter(|writer| written[*writer]).collect();

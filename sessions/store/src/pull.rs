@@ -1,7 +1,7 @@
 //! Pulling sessions: each appears whole under its name, or not at all.
 
 use crate::error::StoreError;
-use crate::files::FileList;
+use crate::files::{FileList, is_below, object_path};
 use crate::location::Store;
 use crate::mirror::{Hear, Mirror};
 use serde::Serialize;
@@ -20,8 +20,8 @@ pub struct Pulled {
 }
 
 impl Store {
-    /// Writes sessions into folders named by them below `out`. A folder that is there stays as it is: it must have the
-    /// content of the store or be continued by it, and then gets the lines that it lacks.
+    /// Writes sessions into folders named by them below `out`. A folder that is there stays as it is: it must have all that
+    /// the store has, and may have more lines.
     pub fn pull(
         &self,
         mirror: &Mirror,
@@ -37,6 +37,11 @@ impl Store {
             let found = mirror.catalog.mirrored_content(id)?;
             let (_, content) = found.ok_or_else(|| StoreError::NoSession { id: id.clone() })?;
             let list = self.wait(self.file_list(&content))?;
+            // The identifier names a folder, and anybody may have written the table.
+            if list.session_id != *id || !is_below(id) || id.contains('/') {
+                let reason = format!("it is of session {:?}, not of {id:?}", list.session_id);
+                return Err(StoreError::bad(&object_path(&content), reason));
+            }
             pulled.push(self.pull_one(id, &list, out)?);
         }
         let _ = hear(ids.len(), ids.len());

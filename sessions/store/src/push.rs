@@ -228,7 +228,7 @@ impl Store {
     ) -> Result<bool, StoreError> {
         let part = part(rows, now)?;
         let path = part.path();
-        self.create(&path, part.bytes).await?;
+        self.put_new(&path, part.bytes).await?;
         let mut actions = vec![commit_info("WRITE", now)];
         let (schema, has_more) = schema_with(Some(schema));
         if has_more {

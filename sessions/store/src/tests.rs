@@ -214,7 +214,8 @@ fn go_on(_: usize, _: usize) -> ControlFlow<()> {
 
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let entries = walkdir::WalkDir::new(folder).into_iter().map(Result::unwrap);
-    let files = entries.filter(|one| one.file_type().is_file() && one.file_name() != "lock");
+    let is_lock = |one: &walkdir::DirEntry| one.depth() == 1 && one.file_name() == "lock";
+    let files = entries.filter(|one| one.file_type().is_file() && !is_lock(one));
     files
         .map(|one| {
             let name = one.path().strip_prefix(folder).unwrap().to_owned();
@@ -228,6 +229,8 @@ fn a_pulled_session_is_the_pushed_one_and_nothing_is_sent_twice() {
     let mut rig = Rig::with(&Arc::default());
     rig.record("a");
     rig.write("a", "empty", "");
+    rig.write("a", "original/.hidden", "of another tester");
+    rig.write("a", "original/lock", "not ours");
     // More than two pieces.
     let large: String = (0..1_300_000).map(|k| format!("{k:014}")).collect();
     rig.write("a", "001.mcap", &large);
@@ -248,6 +251,22 @@ fn a_pulled_session_is_the_pushed_one_and_nothing_is_sent_twice() {
         .catalog()
         .find(&CatalogQuery { words: "specimen".into(), ..CatalogQuery::default() });
     assert_eq!(found.unwrap().count, 1);
+}
+
+#[test]
+fn a_table_that_names_a_folder_elsewhere_pulls_nothing() {
+    for name in ["../outside", "a/../../outside", "/outside", "..", "C:outside"] {
+        let mut rig = Rig::with(&Arc::default());
+        rig.record("a");
+        let mut local = rig.local("a");
+        local.entry.session_id = name.into();
+        let library = rig.library();
+        rig.store.push(&mut rig.mirror, (&library, &[local]), now, &mut go_on).unwrap();
+        let before = files(rig.folder.path()).len();
+        let refused = rig.pull(name).unwrap_err();
+        assert!(matches!(refused, StoreError::Bad { .. }), "{name}: {refused}");
+        assert_eq!(files(rig.folder.path()).len(), before, "{name}");
+    }
 }
 
 #[test]

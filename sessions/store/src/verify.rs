@@ -27,7 +27,7 @@ impl Store {
         hear: Hear<'_>,
     ) -> Result<(usize, Vec<StoreFault>), StoreError> {
         self.wait(async {
-            let Some(snapshot) = self.snapshot().await? else { return Ok((0, Vec::new())) };
+            let snapshot = self.snapshot().await?.ok_or_else(|| self.no_table())?;
             let mut faults = Vec::new();
             let mut rows = Vec::new();
             for add in snapshot.parts.values() {

@@ -1,0 +1,77 @@
+//! `palpate library` and `palpate find --store`: sessions of one computer in a store, on another computer.
+
+use crate::support::{answer, assert_refused, assert_says, palpate, short_run, succeeded};
+use std::fs;
+use std::path::Path;
+
+/// The address of a store in a folder.
+fn store(at: &Path) -> String {
+    format!("file://{}", at.join("store").display())
+}
+
+#[cfg(unix)]
+#[test]
+fn what_one_computer_pushes_another_finds_and_pulls() {
+    let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (here, there) = (here.path(), there.path());
+    let store = store(here);
+    succeeded(&short_run(here, "library/sessions/a", &["--specimen", "liver 1"]));
+    succeeded(&short_run(here, "elsewhere", &["--specimen", "liver 2"]));
+
+    // Nothing is there yet, and looking makes nothing.
+    for looks in [["library", "pull"], ["library", "verify"], ["library", "compact"]] {
+        let words = match looks[1] {
+            "pull" => vec![looks[0], looks[1], &store, "--out", "x"],
+            _ => vec![looks[0], looks[1], &store],
+        };
+        assert_refused(&palpate(there, &words), 2, "has no sessions yet");
+    }
+    assert_refused(&palpate(there, &["find", "--store", &store]), 2, "has no sessions yet");
+    assert!(!here.join("store").exists());
+
+    let pushed = answer(&palpate(here, &["library", "push", &store, "--json"]));
+    assert_eq!(pushed["pushed"].as_array().unwrap().len(), 1, "{pushed}");
+    let again = answer(&palpate(here, &["library", "push", &store, "--json"]));
+    assert_eq!((&again["known"], &again["bytes"]), (&1.into(), &0.into()));
+    let other = answer(&palpate(here, &["library", "push", &store, "elsewhere", "--json"]));
+    assert_eq!(other["pushed"].as_array().unwrap().len(), 1, "{other}");
+
+    let found = answer(&palpate(there, &["find", "--store", &store, "specimen:liver", "--json"]));
+    assert_eq!((&found["count"], &found["library"]), (&2.into(), &store.as_str().into()));
+    let id = found["sessions"].as_array().unwrap().iter().find(|one| one["specimen"] == "liver 1");
+    let id = id.unwrap()["session_id"].as_str().unwrap();
+    succeeded(&palpate(there, &["library", "pull", &store, id, "--out", "pulled"]));
+    let log = "000.mcap";
+    let own = fs::read(here.join("library/sessions/a").join(log)).unwrap();
+    assert_eq!(fs::read(there.join("pulled").join(id).join(log)).unwrap(), own);
+    succeeded(&palpate(there, &["library", "verify", &store, "--deep"]));
+
+    // A store out of reach is searched as it was last seen, once it was seen.
+    fs::rename(here.join("store"), here.join("away")).unwrap();
+    assert_refused(&palpate(there, &["find", "--store", &store]), 2, "has no sessions yet");
+    fs::rename(here.join("away"), here.join("store")).unwrap();
+
+    let compact = answer(&palpate(there, &["library", "compact", &store, "--json"]));
+    assert_eq!((&compact["before"], &compact["after"]), (&2.into(), &1.into()));
+    let object = fs::read_dir(here.join("store/objects")).unwrap().next().unwrap().unwrap().path();
+    fs::remove_dir_all(object).unwrap();
+    let failed = palpate(there, &["library", "verify", &store]);
+    assert_refused(&failed, 1, "push these sessions from a computer that has them");
+    assert_says(&failed, "it is missing");
+}
+
+#[test]
+fn wrong_addresses_names_and_folders_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let store = store(at);
+    for address in ["/srv/store", "http://lab", "s3:/lab", "file:///"] {
+        let refused = palpate(at, &["library", "push", address]);
+        assert_refused(&refused, 2, "give s3://BUCKET/FOLDER or file:///FOLDER");
+    }
+    assert_refused(&palpate(at, &["library", "push", &store, "."]), 2, "is not a session");
+    succeeded(&palpate(at, &["library", "push", &store]));
+    let unknown = palpate(at, &["library", "pull", &store, "nothing", "--out", "x"]);
+    assert_refused(&unknown, 2, "no session nothing is in the store");
+    assert!(!at.join("x").exists());
+}
