@@ -75,8 +75,33 @@ impl SharedLibrary {
     ) -> Result<Self, SharedLibraryError> {
         let url = StoreUrl::parse(address)?;
         let store = open(&url)?;
-        let folder = library_folder()?.join(STORES_FOLDER).join(url.folder_name());
-        Ok(Self { store, mirror: Mirror::open(&folder)? })
+        Ok(Self { store, mirror: Mirror::open(&mirror_folder(&url)?)? })
+    }
+
+    /// The catalog of a store for a search; where the store is out of reach but was read before, as it was then, and why.
+    pub fn last_seen(
+        address: &str,
+        progress: &dyn Progress,
+    ) -> Result<(Mirror, Option<String>), SharedLibraryError> {
+        let updated = Self::open(address).and_then(|mut library| {
+            library.update(progress)?;
+            Ok(library.mirror)
+        });
+        let reason = match updated {
+            Ok(mirror) => return Ok((mirror, None)),
+            Err(SharedLibraryError::Store(
+                reason @ (StoreError::Object { .. } | StoreError::NoTable { .. }),
+            )) => reason,
+            Err(err) => return Err(err),
+        };
+        let folder = mirror_folder(&StoreUrl::parse(address)?)?;
+        if folder.is_dir() {
+            let mirror = Mirror::open(&folder)?;
+            if mirror.is_known()? {
+                return Ok((mirror, Some(reason.to_string())));
+            }
+        }
+        Err(reason.into())
     }
 
     #[must_use]
@@ -94,21 +119,6 @@ impl SharedLibrary {
     pub fn update(&mut self, progress: &dyn Progress) -> Result<usize, SharedLibraryError> {
         let mut hear = |done, of| progress.report(done, of, "reading the table");
         Ok(self.mirror.update(&self.store, &mut hear)?)
-    }
-
-    /// Reads what is new, unless the store does not answer; then the catalog stays as it was last time, and the answer is why.
-    pub fn update_if_reachable(
-        &mut self,
-        progress: &dyn Progress,
-    ) -> Result<Option<String>, SharedLibraryError> {
-        match self.update(progress) {
-            Err(SharedLibraryError::Store(err @ StoreError::Object { .. }))
-                if self.mirror.is_known()? =>
-            {
-                Ok(Some(err.to_string()))
-            }
-            updated => updated.map(|_| None),
-        }
     }
 
     /// Pushes sessions, or all of this computer's library where none is named.
@@ -155,6 +165,10 @@ impl SharedLibrary {
     pub fn compact(&self) -> Result<Compaction, SharedLibraryError> {
         Ok(self.store.compact(now)?)
     }
+}
+
+fn mirror_folder(url: &StoreUrl) -> Result<PathBuf, FolderError> {
+    Ok(library_folder()?.join(STORES_FOLDER).join(url.folder_name()))
 }
 
 fn sessions_of(library: &Path) -> Result<Vec<LocalSession>, CatalogError> {

@@ -148,13 +148,12 @@ fn find_in_store(
     query: &CatalogQuery,
     output: &Output,
 ) -> Result<(String, (CatalogPage, Vec<String>)), Failure> {
-    let mut library = SharedLibrary::open(store).map_err(library::failure)?;
     let bar = output.count_bar(0);
-    let unreachable = library.update_if_reachable(&bar).map_err(library::failure)?;
+    let (mirror, unreachable) = SharedLibrary::last_seen(store, &bar).map_err(library::failure)?;
     drop(bar);
     if let Some(reason) = unreachable {
         output.note(&format!("the search is of what was last seen of the store: {reason}"));
     }
-    let found = find(library.catalog(), query).map_err(Failure::failed)?;
-    Ok((library.address().to_owned(), found))
+    let found = find(mirror.catalog(), query).map_err(Failure::failed)?;
+    Ok((store.to_owned(), found))
 }

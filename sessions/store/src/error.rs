@@ -11,7 +11,7 @@ pub enum StoreError {
     Address { url: String },
     #[error("{url} cannot be opened: {source}")]
     Open { url: String, source: object_store::Error },
-    #[error("{url} has no sessions yet; push one, or check the address")]
+    #[error("there is no table of sessions at {url}; check the address, or push a session")]
     NoTable { url: String },
     #[error(
         "the store cannot be read or written at {path} ({source}); check the address, the network and the credentials"

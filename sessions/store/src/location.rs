@@ -57,7 +57,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens a store that is there.
+    /// Opens a store. A folder that is not there has no table.
     pub fn open(url: &StoreUrl) -> Result<Self, StoreError> {
         Self::open_or_create(url, false)
     }

@@ -46,10 +46,7 @@ impl Mirror {
         loop {
             let known = self.table()?;
             let change = store.wait(Change::since(store, known.as_ref()))?;
-            let Some(change) = change else {
-                // Nothing is new, or there is no table.
-                return if known.is_some() { Ok(0) } else { Err(store.no_table()) };
-            };
+            let Some(change) = change else { return Ok(0) };
             let parts: Vec<Add> = change.parts;
             let mut rows = Vec::new();
             store.wait(read_parts(store, &parts, hear, |read| rows.extend(read)))?;
@@ -82,12 +79,12 @@ impl Change {
         store: &Store,
         known: Option<&MirroredTable>,
     ) -> Result<Option<Self>, StoreError> {
-        let Some(known) = known else { return Self::whole(store).await };
+        let Some(known) = known else { return Self::whole(store).await.map(Some) };
         // Another table may have been made at the same place.
         let first = store.read_commit(0).await?;
         let is_same = first.is_some_and(|first| id_of(&first) == Some(&known.id));
         if !is_same {
-            return Self::whole(store).await;
+            return Self::whole(store).await.map(Some);
         }
         let commits = store.commits_from(known.version + 1).await?;
         let Some(last) = commits.last() else { return Ok(None) };
@@ -95,7 +92,7 @@ impl Change {
         let removes = actions().any(|one| one.remove.as_ref().is_some_and(|one| one.data_change));
         if removes {
             // Another program took rows away.
-            return Self::whole(store).await;
+            return Self::whole(store).await.map(Some);
         }
         let schema = actions().filter_map(|one| one.meta_data.as_ref()).next_back();
         let now = MirroredTable {
@@ -107,13 +104,13 @@ impl Change {
         Ok(Some(Self { was: Some(known.clone()), now, parts: parts.collect() }))
     }
 
-    async fn whole(store: &Store) -> Result<Option<Self>, StoreError> {
-        let Some(snapshot) = store.snapshot().await? else { return Ok(None) };
+    async fn whole(store: &Store) -> Result<Self, StoreError> {
+        let snapshot = store.snapshot().await?.ok_or_else(|| store.no_table())?;
         let metadata = snapshot.metadata()?;
         let (id, schema) = (metadata.id.clone(), metadata.schema_string.clone());
         let now = MirroredTable { id, version: snapshot.version, schema };
         let Snapshot { parts, .. } = snapshot;
-        Ok(Some(Self { was: None, now, parts: parts.into_values().collect() }))
+        Ok(Self { was: None, now, parts: parts.into_values().collect() })
     }
 }
 
