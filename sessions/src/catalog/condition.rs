@@ -164,9 +164,9 @@ impl Condition {
         })
     }
 
-    /// The condition as SQL on the table of sessions; appends its values.
-    pub(super) fn sql(&self, values: &mut Vec<Sql>) -> String {
-        let mut alternatives = Vec::new();
+    /// The condition as SQL on the table of named values, and its values.
+    pub(super) fn sql(&self) -> (String, Vec<Sql>) {
+        let (mut alternatives, mut values) = (Vec::new(), Vec::new());
         for comparison in &self.alternatives {
             values.push(comparison.name.clone().into());
             let mut text = "name = ?".to_owned();
@@ -183,7 +183,7 @@ impl Condition {
             values.push(source.name().to_owned().into());
             sql += " AND source = ?";
         }
-        format!("id IN (SELECT session FROM named WHERE {sql})")
+        (sql, values)
     }
 
     /// SQL on the table of named values that selects the names of this condition, whatever their values and units.

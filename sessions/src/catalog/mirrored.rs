@@ -4,10 +4,10 @@
 use super::entry::CatalogEntry;
 use super::heads::KnownHeads;
 use super::schema::{bad_text, collect_rows};
-use super::update::{entry_of, put};
+use super::update::{FORGET_ALL, entry_of, put};
 use super::walk::{LibrarySession, fingerprint_of};
 use super::{Catalog, CatalogError};
-use rusqlite::{OptionalExtension, TransactionBehavior, params};
+use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::path::Path;
 
 /// Up to where a store's table was read.
@@ -67,10 +67,22 @@ fn parsed(fingerprint: &str) -> Option<(u64, String)> {
     Some((version.parse().ok()?, content.to_owned()))
 }
 
+/// Takes a session, unless a later version of it is known.
+fn take(db: &Connection, one: &MirroredSession) -> rusqlite::Result<()> {
+    let known: Option<String> = db
+        .prepare_cached("SELECT fingerprint FROM session WHERE folder = ?")?
+        .query_row([&one.entry.folder], |row| row.get(0))
+        .optional()?;
+    match known.as_deref().and_then(parsed) {
+        Some((version, _)) if version >= one.version => Ok(()),
+        _ => put(db, &fingerprint(one), &one.entry),
+    }
+}
+
 impl Catalog {
     /// All sessions as of the last update, each with its folder below the library in its entry.
     pub fn local_sessions(&self) -> Result<Vec<LocalSession>, CatalogError> {
-        let sql = "SELECT entry, checksum, fingerprint FROM session ORDER BY folder";
+        let sql = "SELECT entry, checksum, fingerprint FROM session JOIN entry USING (id) ORDER BY folder";
         let read = |row: &rusqlite::Row<'_>| {
             Ok(LocalSession { entry: entry_of(row)?, fingerprint: row.get(2)? })
         };
@@ -93,41 +105,33 @@ impl Catalog {
 
     /// Takes the sessions that the table had from one of its versions to another, all or none. Where `was` is none, all that
     /// was known before is forgotten. Returns whether it was still read up to there: another process may have been faster.
-    pub fn take_mirrored(
+    pub fn take_mirrored<E: From<CatalogError>>(
         &mut self,
         was: Option<&MirroredTable>,
         now: &MirroredTable,
-        sessions: &mut dyn Iterator<Item = MirroredSession>,
-    ) -> Result<bool, CatalogError> {
+        sessions: impl Iterator<Item = Result<MirroredSession, E>>,
+    ) -> Result<bool, E> {
         let known = self.mirrored_table()?;
         if was.is_some() && known.as_ref() != was {
             return Ok(false);
         }
         let failed = self.failed();
-        let write = || -> rusqlite::Result<()> {
-            let db = self.db.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            if was.is_none() {
-                db.execute_batch(
-                    "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;",
-                )?;
-            }
-            for one in sessions {
-                let known: Option<String> = db
-                    .prepare_cached("SELECT fingerprint FROM session WHERE folder = ?")?
-                    .query_row([&one.entry.folder], |row| row.get(0))
-                    .optional()?;
-                let known = known.as_deref().and_then(parsed);
-                if known.is_none_or(|(version, _)| version < one.version) {
-                    put(&db, &fingerprint(&one), &one.entry)?;
-                }
-            }
+        let db = self.db.transaction_with_behavior(TransactionBehavior::Immediate);
+        let db = db.map_err(&failed)?;
+        if was.is_none() {
+            db.execute_batch(FORGET_ALL).map_err(&failed)?;
+        }
+        for one in sessions {
+            take(&db, &one?).map_err(&failed)?;
+        }
+        let end = || {
             db.execute("DELETE FROM mirrored", [])?;
             let version = i64::try_from(now.version).map_err(bad_text)?;
             let values = params![now.id, version, now.schema];
-            db.execute("INSERT INTO mirrored (id, version, schema) VALUES (?, ?, ?)", values)?;
-            db.commit()
+            db.execute("INSERT INTO mirrored (id, version, schema) VALUES (?, ?, ?)", values)
         };
-        write().map_err(failed)?;
+        end().map_err(&failed)?;
+        db.commit().map_err(&failed)?;
         Ok(true)
     }
 

@@ -7,12 +7,18 @@ use std::error::Error;
 /// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and their content. An older catalog is replaced; only the table `head` is kept.
-pub const VERSION: i64 = 11;
+pub const VERSION: i64 = 12;
 
-/// `entry` is the whole entry as JSON, with a checksum because SQLite has none; the other columns are for search. `head`
-/// has the recorded heads of JSON-lines files, each row with its checksum. `words` has all text of an entry in `text`, and
-/// again the text of each [`SearchField`](super::SearchField) in a column of its name. `mirrored` says up to where the table of a
-/// store was read, and `pushed` which of this computer's folders it has as they are; both are empty in a library's catalog.
+/// Identifiers of a millisecond: a session's identifier is its start in ms times this, plus a number from 1, so that sessions in
+/// the order of their identifiers are in that of their starts, and the latest of many are found without sorting them.
+pub(super) const IDS: i64 = 4096;
+
+/// `entry` has whole entries as JSON, with a checksum because SQLite has none; the other tables are for search. `named` has the
+/// named values of a session, whose identifier is their owner; those of a plan, which many sessions have alike, are there once
+/// under the negative of the plan's identifier. `head` has the recorded heads of JSON-lines files, each row with its checksum.
+/// `words` has all text of an entry in `text`, and again the text of each [`SearchField`](super::SearchField) in a column of its
+/// name. `mirrored` says up to where the table of a store was read, and `pushed` which of this computer's folders it has as they
+/// are; both are empty in a library's catalog.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -27,23 +33,31 @@ CREATE TABLE session (
     verdict TEXT NOT NULL,
     review TEXT NOT NULL,
     duration_s REAL NOT NULL,
-    entry TEXT NOT NULL,
-    checksum TEXT NOT NULL
+    plan INTEGER NOT NULL
 ) STRICT;
-CREATE INDEX session_started ON session (started_ms DESC, folder);
 CREATE INDEX session_specimen ON session (specimen);
 CREATE INDEX session_operator ON session (operator);
 CREATE INDEX session_protocol ON session (protocol);
+CREATE INDEX session_plan ON session (plan);
+CREATE TABLE entry (
+    id INTEGER PRIMARY KEY,
+    entry TEXT NOT NULL,
+    checksum TEXT NOT NULL
+) STRICT;
+CREATE TABLE plan (
+    id INTEGER PRIMARY KEY,
+    checksum TEXT NOT NULL UNIQUE
+) STRICT;
 CREATE TABLE named (
-    session INTEGER NOT NULL,
+    owner INTEGER NOT NULL,
     source TEXT NOT NULL,
     name TEXT NOT NULL,
     unit TEXT NOT NULL,
     number REAL,
     text TEXT NOT NULL
 ) STRICT;
-CREATE INDEX named_name ON named (name, number);
-CREATE INDEX named_session ON named (session);
+CREATE INDEX named_name ON named (name, number, owner, unit);
+CREATE INDEX named_owner ON named (owner, name);
 CREATE TABLE tag (
     session INTEGER NOT NULL,
     tag TEXT NOT NULL,
@@ -68,8 +82,11 @@ CREATE TABLE pushed (
     folder TEXT PRIMARY KEY,
     fingerprint TEXT NOT NULL
 ) STRICT, WITHOUT ROWID;
-CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3');
+CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3', content = '', contentless_delete = 1);
 ";
+
+/// Pages that SQLite keeps, in KiB by its sign. With its own 2 MB the indices of many sessions are written again and again.
+const CACHE_KIB: i64 = -64 * 1024;
 
 /// Creates the tables of a new file, all or none.
 pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
@@ -84,7 +101,8 @@ pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
 
 pub(super) fn prepare(db: &Connection) -> rusqlite::Result<()> {
     // With a write-ahead log a power cut can lose the last changes but not the file.
-    db.pragma_update(None, "synchronous", "normal")
+    db.pragma_update(None, "synchronous", "normal")?;
+    db.pragma_update(None, "cache_size", CACHE_KIB)
 }
 
 /// All rows of a statement.

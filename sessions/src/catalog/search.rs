@@ -3,13 +3,13 @@
 use super::condition::Condition;
 use super::entry::CatalogEntry;
 use super::field::FieldWords;
-use super::schema::collect_rows;
+use super::schema::{IDS, collect_rows};
 use super::update::entry_of;
 use super::{Catalog, CatalogError};
 use crate::edits::{DataQuality, Review, ReviewDecision};
 use chrono::{DateTime, Utc};
-use rusqlite::types::Value as Sql;
-use rusqlite::{OptionalExtension, params_from_iter};
+use rusqlite::types::{FromSql, Value as Sql};
+use rusqlite::{Connection, OptionalExtension, params_from_iter};
 use std::str::FromStr;
 
 /// Sessions that meet every given criterion.
@@ -116,7 +116,7 @@ impl FromStr for ReviewFilter {
     }
 }
 
-/// Sort key; sessions with the same key are sorted by folder.
+/// Sort key; sessions with the same key are sorted by folder, and those of one start as they became known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CatalogOrder {
     /// Latest first.
@@ -135,8 +135,9 @@ pub enum CatalogOrder {
 
 impl CatalogOrder {
     fn sql(self, is_reversed: bool) -> String {
+        let word = |is_descending| if is_descending { "DESC" } else { "ASC" };
         let (column, is_descending) = match self {
-            Self::Started => ("started_ms", true),
+            Self::Started => return format!("session.id {}", word(!is_reversed)),
             Self::Specimen => ("specimen", false),
             Self::Operator => ("operator", false),
             Self::Protocol => ("protocol", false),
@@ -144,7 +145,6 @@ impl CatalogOrder {
             Self::Verdict => ("verdict", false),
             Self::Review => ("review", false),
         };
-        let word = |is_descending| if is_descending { "DESC" } else { "ASC" };
         format!("{column} {}, folder {}", word(is_descending != is_reversed), word(is_reversed))
     }
 }
@@ -154,6 +154,8 @@ impl CatalogOrder {
 pub struct CatalogPage {
     /// Sessions on all pages.
     pub count: usize,
+    /// Whether there are more than `count`, which were not counted because there are too many.
+    pub has_more: bool,
     pub entries: Vec<CatalogEntry>,
 }
 
@@ -177,84 +179,230 @@ fn fts(column: &str, text: &str) -> Option<String> {
     (!quoted.is_empty()).then(|| format!("{column} : ({})", quoted.join(" ")))
 }
 
+/// A criterion of a query in SQL.
+struct Criterion {
+    /// Selects the identifiers of all sessions that meet it; none where that would read every session.
+    set: Option<(String, Vec<Sql>)>,
+    /// Is true for a row of `session` that meets it.
+    test: (String, Vec<Sql>),
+    /// Whether it is one on words, whose index yields the latest sessions first.
+    is_words: bool,
+}
+
+impl Criterion {
+    /// A criterion on a column, which has an index or none.
+    fn column(name: &str, value: &str, has_index: bool) -> Self {
+        let values = || vec![Sql::from(value.to_owned())];
+        Self {
+            set: has_index.then(|| (format!("SELECT id FROM session WHERE {name} = ?"), values())),
+            // The sign keeps SQLite from the index.
+            test: (format!("+session.{name} = ?"), values()),
+            is_words: false,
+        }
+    }
+
+    /// A bound of the start, inclusive from below and exclusive from above.
+    fn start(sign: &str, at: DateTime<Utc>) -> Self {
+        let id = at.timestamp_millis().saturating_mul(IDS);
+        // A session that cannot be read has start 0.
+        let test = format!("session.id {sign} ? AND session.started_ms <> 0");
+        Self { set: None, test: (test, vec![id.into()]), is_words: false }
+    }
+
+    fn tag(tag: &str) -> Self {
+        let values = || vec![Sql::from(tag.to_owned())];
+        let test = "EXISTS (SELECT 1 FROM tag WHERE tag.session = session.id AND tag.tag = ?)";
+        Self {
+            set: Some(("SELECT session AS id FROM tag WHERE tag = ?".into(), values())),
+            test: (test.into(), values()),
+            is_words: false,
+        }
+    }
+
+    fn words(matches: &str) -> Self {
+        let values = || vec![Sql::from(matches.to_owned())];
+        let test = "EXISTS (SELECT 1 FROM words WHERE words MATCH ? AND words.rowid = session.id)";
+        Self {
+            set: Some(("SELECT rowid AS id FROM words WHERE words MATCH ?".into(), values())),
+            test: (test.into(), values()),
+            is_words: true,
+        }
+    }
+
+    fn condition(condition: &Condition) -> Self {
+        let (sql, values) = condition.sql();
+        let set = format!(
+            "SELECT owner AS id FROM named WHERE {sql} AND owner > 0 UNION ALL
+             SELECT id FROM session WHERE plan IN (SELECT -owner FROM named WHERE {sql} AND owner < 0)"
+        );
+        let test = format!(
+            "EXISTS (SELECT 1 FROM named WHERE owner IN (session.id, -session.plan) AND {sql})"
+        );
+        let both = [values.clone(), values.clone()].concat();
+        Self { set: Some((set, both)), test: (test, values), is_words: false }
+    }
+}
+
+/// A statement and its values.
+#[derive(Default)]
+struct Statement {
+    sql: String,
+    values: Vec<Sql>,
+}
+
+impl Statement {
+    fn new(sql: impl Into<String>) -> Self {
+        Self { sql: sql.into(), values: Vec::new() }
+    }
+
+    fn add(&mut self, (sql, values): &(String, Vec<Sql>)) {
+        self.sql += sql;
+        self.values.extend_from_slice(values);
+    }
+
+    /// Criteria that a row of `session` must meet.
+    fn add_tests<'a>(&mut self, criteria: impl IntoIterator<Item = &'a Criterion>) {
+        for criterion in criteria {
+            self.sql += " AND ";
+            self.add(&criterion.test);
+        }
+    }
+
+    fn read<T: FromSql>(&self, db: &Connection) -> rusqlite::Result<Vec<T>> {
+        collect_rows(db, &self.sql, params_from_iter(&self.values), |row| row.get(0))
+    }
+}
+
 impl CatalogQuery {
-    /// Selects `column` of the sessions that meet the query, in its order; and the values of the statement.
-    fn sql(&self, column: &str) -> (String, Vec<Sql>) {
-        let (mut parts, mut values) = (vec!["TRUE".to_owned()], Vec::new());
-        let mut add = |part: String, value: Sql| {
-            parts.push(part);
-            values.push(value);
-        };
-        for (column, value) in [
-            ("specimen", &self.specimen),
-            ("operator", &self.operator),
-            ("protocol", &self.protocol),
-            ("rig", &self.rig),
-            ("cell", &self.cell),
+    fn criteria(&self) -> Vec<Criterion> {
+        let mut criteria = Vec::new();
+        for (name, value, has_index) in [
+            ("specimen", &self.specimen, true),
+            ("operator", &self.operator, true),
+            ("protocol", &self.protocol, true),
+            ("rig", &self.rig, false),
+            ("cell", &self.cell, false),
         ] {
-            if let Some(value) = value {
-                add(format!("{column} = ?"), value.clone().into());
-            }
+            criteria.extend(value.as_ref().map(|value| Criterion::column(name, value, has_index)));
         }
-        for (sign, value) in [(">=", self.since), ("<", self.before)] {
-            if let Some(value) = value {
-                // A session that cannot be read has start 0.
-                let part = format!("started_ms {sign} ? AND started_ms <> 0");
-                add(part, value.timestamp_millis().into());
-            }
-        }
-        if let Some(verdict) = self.verdict {
-            let word = match verdict {
-                QualityFilter::Given(verdict) => verdict.name(),
-                QualityFilter::None => "",
-            };
-            add("verdict = ?".to_owned(), word.to_owned().into());
-        }
-        if let Some(review) = self.review {
-            add("review = ?".to_owned(), review.word().to_owned().into());
-        }
-        for tag in &self.tags {
-            let part = "id IN (SELECT session FROM tag WHERE tag = ?)";
-            add(part.to_owned(), tag.clone().into());
-        }
+        criteria.extend(self.since.map(|at| Criterion::start(">=", at)));
+        criteria.extend(self.before.map(|at| Criterion::start("<", at)));
+        let verdict = self.verdict.map(|verdict| match verdict {
+            QualityFilter::Given(verdict) => verdict.name(),
+            QualityFilter::None => "",
+        });
+        criteria.extend(verdict.map(|word| Criterion::column("verdict", word, false)));
+        let review = self.review.map(ReviewFilter::word);
+        criteria.extend(review.map(|word| Criterion::column("review", word, false)));
+        criteria.extend(self.tags.iter().map(|tag| Criterion::tag(tag)));
         let of_field = self.fields.iter().map(|one| (one.field.name(), &one.words));
         let matches = [("text", &self.words)].into_iter().chain(of_field);
         let matches: Vec<String> = matches.filter_map(|(column, text)| fts(column, text)).collect();
         if !matches.is_empty() {
-            let part = "id IN (SELECT rowid FROM words WHERE words MATCH ?)";
-            add(part.to_owned(), matches.join(" AND ").into());
+            criteria.push(Criterion::words(&matches.join(" AND ")));
         }
-        for condition in &self.conditions {
-            parts.push(condition.sql(&mut values));
+        criteria.extend(self.conditions.iter().map(Criterion::condition));
+        criteria
+    }
+
+    /// Selects `column` of all sessions that meet the query, in its order.
+    fn all(&self, column: &str) -> Statement {
+        let mut statement = Statement::new(format!("SELECT {column} FROM session WHERE TRUE"));
+        for criterion in &self.criteria() {
+            match &criterion.set {
+                Some(set) => {
+                    statement.sql += " AND session.id IN (";
+                    statement.add(set);
+                    statement.sql += ")";
+                }
+                None => statement.add_tests([criterion]),
+            }
         }
-        let order = self.order.sql(self.is_reversed);
-        let criteria = parts.join(" AND ");
-        (format!("SELECT {column} FROM session WHERE {criteria} ORDER BY {order}"), values)
+        statement.sql += &format!(" ORDER BY {}", self.order.sql(self.is_reversed));
+        statement
+    }
+
+    /// Identifiers of the first sessions in the order of their start: all that meet the query where they are at most `most`,
+    /// else one more. The cost grows with `most` and not with the number of sessions, unless criteria that many sessions
+    /// meet are met by few at once.
+    fn first(&self, db: &Connection, most: usize) -> rusqlite::Result<Vec<i64>> {
+        let criteria = self.criteria();
+        let mut fewest = (most + 1, None);
+        for (at, criterion) in criteria.iter().enumerate() {
+            let Some(set) = &criterion.set else { continue };
+            let mut counted = Statement::new("SELECT count(*) FROM (SELECT 1 FROM (");
+            counted.add(set);
+            counted.sql += &format!(") LIMIT {})", fewest.0);
+            let count = counted.read::<i64>(db)?.first().map_or(0, |count| count.unsigned_abs());
+            let count = usize::try_from(count).unwrap_or(usize::MAX);
+            if count < fewest.0 {
+                fewest = (count, Some(at));
+            }
+        }
+        let from_words = || criteria.iter().position(|one| one.is_words);
+        let first = fewest.1.or_else(from_words);
+        let mut statement = Statement::default();
+        let mut order = self.order.sql(self.is_reversed);
+        match (fewest.1, first.and_then(|at| criteria[at].set.as_ref())) {
+            (Some(_), Some(set)) => {
+                statement.sql += "SELECT session.id FROM (SELECT DISTINCT id FROM (";
+                statement.add(set);
+                statement.sql += ")) AS few CROSS JOIN session ON session.id = few.id WHERE TRUE";
+            }
+            (None, Some((_, values))) => {
+                statement.sql += "SELECT session.id FROM words CROSS JOIN session ON session.id = words.rowid WHERE words MATCH ?";
+                statement.values.extend_from_slice(values);
+                order = order.replace("session.id", "words.rowid");
+            }
+            _ => statement.sql += "SELECT session.id FROM session WHERE TRUE",
+        }
+        let rest = criteria.iter().enumerate().filter(|(at, _)| Some(*at) != first);
+        statement.add_tests(rest.map(|(_, criterion)| criterion));
+        statement.sql += &format!(" ORDER BY {order} LIMIT {}", most + 1);
+        statement.read(db)
     }
 }
+
+/// Sessions that a search counts; where more meet the query, the page says so.
+const COUNTED: usize = 10_000;
 
 impl Catalog {
     /// Finds sessions as of the last [`Catalog::update`].
     pub fn find(&self, query: &CatalogQuery) -> Result<CatalogPage, CatalogError> {
+        self.find_counting(query, COUNTED)
+    }
+
+    /// As [`find`](Self::find), but of a page in the order of the starts, whose sessions are counted up to so many.
+    pub fn find_counting(
+        &self,
+        query: &CatalogQuery,
+        counted: usize,
+    ) -> Result<CatalogPage, CatalogError> {
         let find = || -> rusqlite::Result<CatalogPage> {
             // One transaction, so that no other process changes the catalog between the two statements.
             let state = self.db.unchecked_transaction()?;
-            let (sql, values) = query.sql("id");
-            let ids: Vec<i64> =
-                collect_rows(&state, &sql, params_from_iter(&values), |row| row.get(0))?;
-            let sql = "SELECT entry, checksum FROM session WHERE id = ?";
+            let (mut ids, most) = match query.limit {
+                Some(limit) if query.order == CatalogOrder::Started => {
+                    let most = counted.max(query.skip.saturating_add(limit));
+                    (query.first(&state, most)?, most)
+                }
+                _ => (query.all("session.id").read(&state)?, usize::MAX),
+            };
+            let has_more = ids.len() > most;
+            ids.truncate(most);
+            let sql = "SELECT entry, checksum FROM entry WHERE id = ?";
             let mut statement = state.prepare_cached(sql)?;
             let page = ids.iter().skip(query.skip).take(query.limit.unwrap_or(usize::MAX));
             let entries = page.map(|id| statement.query_row([id], entry_of));
-            Ok(CatalogPage { count: ids.len(), entries: entries.collect::<rusqlite::Result<_>>()? })
+            let entries = entries.collect::<rusqlite::Result<_>>()?;
+            Ok(CatalogPage { count: ids.len(), has_more, entries })
         };
         find().map_err(self.failed())
     }
 
     /// The folders of all sessions that meet the query, in its order, whatever its page: a list needs them to scroll.
     pub fn folders(&self, query: &CatalogQuery) -> Result<Vec<String>, CatalogError> {
-        let (sql, values) = query.sql("folder");
-        self.names(&sql, &values)
+        query.all("folder").read(&self.db).map_err(self.failed())
     }
 
     fn names(&self, sql: &str, values: &[Sql]) -> Result<Vec<String>, CatalogError> {
@@ -266,7 +414,7 @@ impl Catalog {
     pub fn entries(&self, folders: &[String]) -> Result<Vec<CatalogEntry>, CatalogError> {
         let read = || -> rusqlite::Result<Vec<CatalogEntry>> {
             let state = self.db.unchecked_transaction()?;
-            let sql = "SELECT entry, checksum FROM session WHERE folder = ?";
+            let sql = "SELECT entry, checksum FROM session JOIN entry USING (id) WHERE folder = ?";
             let mut statement = state.prepare_cached(sql)?;
             let mut entries = Vec::with_capacity(folders.len());
             for folder in folders {

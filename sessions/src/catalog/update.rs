@@ -1,13 +1,13 @@
 //! Update of the catalog: changed sessions are read again, deleted ones are removed.
 
-use super::entry::CatalogEntry;
+use super::entry::{CatalogEntry, NamedValue, NamedValueSource};
 use super::field::SearchField;
 use super::heads::{record_head, record_session_heads};
-use super::schema::{bad_text, collect_rows};
+use super::schema::{IDS, bad_text, collect_rows};
 use super::search::ReviewFilter;
 use super::walk::{LibrarySession, walk};
 use super::{Catalog, CatalogError};
-use crate::text::checksum;
+use crate::text::{checksum, sha256};
 use rusqlite::types::Value as Sql;
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params, params_from_iter};
 use serde::Serialize;
@@ -16,6 +16,11 @@ use std::ops::ControlFlow;
 
 /// Sessions per transaction, which makes another process wait a fraction of a second at most.
 const BATCH: usize = 100;
+
+/// SQL that removes all sessions.
+pub(super) const FORGET_ALL: &str =
+    "DELETE FROM session; DELETE FROM entry; DELETE FROM plan; DELETE FROM named;
+    DELETE FROM tag; INSERT INTO words (words) VALUES ('delete-all');";
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CatalogChanges {
@@ -105,12 +110,7 @@ impl Catalog {
         &mut self,
         progress: CatalogProgress<'_>,
     ) -> Result<CatalogChanges, CatalogError> {
-        self.write(|db| {
-            db.execute_batch(
-                "DELETE FROM session; DELETE FROM named; DELETE FROM tag; DELETE FROM words;
-                 UPDATE head SET stamp = '';",
-            )
-        })?;
+        self.write(|db| db.execute_batch(&format!("{FORGET_ALL} UPDATE head SET stamp = '';")))?;
         self.update(progress)
     }
 
@@ -150,7 +150,7 @@ impl Catalog {
     }
 
     pub fn all(&self) -> Result<Vec<CatalogEntry>, CatalogError> {
-        let sql = "SELECT entry, checksum FROM session ORDER BY folder";
+        let sql = "SELECT entry, checksum FROM session JOIN entry USING (id) ORDER BY folder";
         collect_rows(&self.db, sql, [], entry_of).map_err(self.failed())
     }
 
@@ -203,14 +203,19 @@ pub(super) fn put(
         None if is_unread => "?",
         review => ReviewFilter::of(review).word(),
     };
+    let started_ms = started.map_or(0, |at| at.timestamp_millis());
+    let id = free_id(db, started_ms)?;
+    let (of_plan, own): (Vec<&NamedValue>, Vec<&NamedValue>) =
+        entry.named.iter().partition(|one| one.source == NamedValueSource::Plan);
     db.prepare_cached(
-        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry, checksum)
+        "INSERT INTO session (id, folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, plan)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )?
     .execute(params![
+        id,
         entry.folder,
         fingerprint,
-        started.map_or(0, |at| at.timestamp_millis()),
+        started_ms,
         entry.operator,
         entry.specimen,
         entry.protocol,
@@ -219,17 +224,12 @@ pub(super) fn put(
         verdict,
         review,
         entry.duration_s,
-        text,
-        checksum(&text),
+        plan_of(db, &of_plan)?,
     ])?;
-    let id = db.last_insert_rowid();
-    let mut named = db.prepare_cached(
-        "INSERT INTO named (session, source, name, unit, number, text) VALUES (?, ?, ?, ?, ?, ?)",
-    )?;
-    for one in &entry.named {
-        let source = one.source.name();
-        named.execute(params![id, source, one.name, one.unit, one.number, one.text])?;
-    }
+    let sum = checksum(&text);
+    db.prepare_cached("INSERT INTO entry (id, entry, checksum) VALUES (?, ?, ?)")?
+        .execute(params![id, text, sum])?;
+    put_named(db, id, &own)?;
     let mut tags = db.prepare_cached("INSERT INTO tag (session, tag) VALUES (?, ?)")?;
     for tag in &entry.tags {
         tags.execute(params![id, tag])?;
@@ -244,6 +244,51 @@ pub(super) fn put(
     Ok(())
 }
 
+/// An identifier for a session of this start.
+fn free_id(db: &Connection, started_ms: i64) -> rusqlite::Result<i64> {
+    let mut first = started_ms.max(0) * IDS + 1;
+    loop {
+        let sql = "SELECT max(id) FROM session WHERE id BETWEEN ? AND ?";
+        let last = first + IDS - 2;
+        let known: Option<i64> =
+            db.prepare_cached(sql)?.query_row([first, last], |row| row.get(0))?;
+        match known {
+            None => return Ok(first),
+            Some(known) if known < last => return Ok(known + 1),
+            // As many sessions of one millisecond have no start at all: they cannot be read.
+            Some(_) => first += IDS,
+        }
+    }
+}
+
+/// The identifier of a plan with these values, which are stored where they are new.
+fn plan_of(db: &Connection, values: &[&NamedValue]) -> rusqlite::Result<i64> {
+    let text = serde_json::to_string(values)
+        .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
+    let sum = sha256(text.as_bytes());
+    let known = db
+        .prepare_cached("SELECT id FROM plan WHERE checksum = ?")?
+        .query_row([&sum], |row| row.get(0))
+        .optional()?;
+    if let Some(id) = known {
+        return Ok(id);
+    }
+    db.execute("INSERT INTO plan (checksum) VALUES (?)", [&sum])?;
+    let id = db.last_insert_rowid();
+    put_named(db, -id, values)?;
+    Ok(id)
+}
+
+fn put_named(db: &Connection, owner: i64, values: &[&NamedValue]) -> rusqlite::Result<()> {
+    let mut named = db.prepare_cached(
+        "INSERT INTO named (owner, source, name, unit, number, text) VALUES (?, ?, ?, ?, ?, ?)",
+    )?;
+    values.iter().try_for_each(|one| {
+        let values = params![owner, one.source.name(), one.name, one.unit, one.number, one.text];
+        named.execute(values).map(drop)
+    })
+}
+
 fn forget(db: &Connection, folder: &str) -> rusqlite::Result<()> {
     let id: Option<i64> = db
         .prepare_cached("SELECT id FROM session WHERE folder = ?")?
@@ -251,7 +296,8 @@ fn forget(db: &Connection, folder: &str) -> rusqlite::Result<()> {
         .optional()?;
     if let Some(id) = id {
         for sql in [
-            "DELETE FROM named WHERE session = ?",
+            "DELETE FROM named WHERE owner = ?",
+            "DELETE FROM entry WHERE id = ?",
             "DELETE FROM tag WHERE session = ?",
             "DELETE FROM words WHERE rowid = ?",
             "DELETE FROM session WHERE id = ?",

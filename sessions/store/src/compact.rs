@@ -12,8 +12,8 @@ use object_store::path::Path;
 use serde::Serialize;
 
 /// Rows of a file that compaction writes, and above half of which it leaves a file alone. An entry has about 3 kB, so that
-/// such a file has some 10 MB.
-const ROWS: usize = 50_000;
+/// such a file has some 4 MB.
+const ROWS: usize = 20_000;
 /// How often another writer may be faster.
 const TRIES_MAX: usize = 50;
 

@@ -14,6 +14,7 @@ use palpate_sessions::{LOCK_FILE, SPARE_FILE};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use walkdir::WalkDir;
 
@@ -22,7 +23,7 @@ const LIST_VERSION: u32 = 1;
 /// Most bytes of a piece. Sixteen of them under way need 128 MiB.
 pub(crate) const PIECE_BYTES: u64 = 8 << 20;
 /// A piece of at least so many bytes is looked up before it is sent: looking takes as long as sending this much.
-const LOOK_BYTES: usize = 1 << 20;
+const LOOK_BYTES: u64 = 1 << 20;
 
 /// One file of a session.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +48,7 @@ pub(crate) struct FileList {
 pub(crate) struct LocalFile {
     pub name: String,
     pub path: PathBuf,
+    pub bytes: u64,
 }
 
 /// Why a folder is not pushed whole.
@@ -61,11 +63,12 @@ pub(crate) fn local_files(session: &Path) -> Result<Vec<LocalFile>, FolderFault>
     let mut files = Vec::new();
     // What a link leads to is a part of the session.
     let entries = WalkDir::new(session).follow_links(true).min_depth(1).sort_by_file_name();
+    let failed = |err: walkdir::Error| {
+        let path = err.path().unwrap_or(session).to_owned();
+        FolderFault::Unreadable(StoreError::File { path, source: err.into() })
+    };
     for entry in entries {
-        let entry = entry.map_err(|err| {
-            let path = err.path().unwrap_or(session).to_owned();
-            FolderFault::Unreadable(StoreError::File { path, source: err.into() })
-        })?;
+        let entry = entry.map_err(failed)?;
         let name = entry.file_name().to_string_lossy();
         if entry.depth() == 1 && name == SPARE_FILE {
             return Err(FolderFault::Spare);
@@ -75,52 +78,15 @@ pub(crate) fn local_files(session: &Path) -> Result<Vec<LocalFile>, FolderFault>
             let below = entry.path().strip_prefix(session).unwrap_or(entry.path());
             let parts = below.iter().map(|part| part.to_string_lossy());
             let name = parts.collect::<Vec<_>>().join("/");
-            files.push(LocalFile { name, path: entry.into_path() });
+            let bytes = entry.metadata().map_err(failed)?.len();
+            files.push(LocalFile { name, path: entry.into_path(), bytes });
         }
     }
     files.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(files)
 }
 
-/// Calls `take` with every piece of the first bytes of a file; no bytes for all.
-fn read_pieces(
-    path: &Path,
-    bytes: Option<u64>,
-    mut take: impl FnMut(u64, &[u8]),
-) -> Result<(), StoreError> {
-    let failed = StoreError::file(path);
-    let mut file = File::open(path).map_err(&failed)?.take(bytes.unwrap_or(u64::MAX));
-    let mut at = 0;
-    loop {
-        let mut piece = Vec::new();
-        let read = (&mut file).take(PIECE_BYTES).read_to_end(&mut piece).map_err(&failed)?;
-        // An empty file has one empty piece, so that it is stored too.
-        if read == 0 && at > 0 {
-            return Ok(());
-        }
-        take(at, &piece);
-        at += read as u64;
-        if (read as u64) < PIECE_BYTES {
-            return Ok(());
-        }
-    }
-}
-
 impl FileList {
-    /// The list of a session's files, each read once.
-    pub fn of(session_id: &str, files: &[LocalFile]) -> Result<Self, StoreError> {
-        let one = |file: &LocalFile| {
-            let (mut bytes, mut pieces) = (0, Vec::new());
-            read_pieces(&file.path, None, |_, piece| {
-                bytes += piece.len() as u64;
-                pieces.push(sha256(piece));
-            })?;
-            Ok(StoredFile { name: file.name.clone(), bytes, pieces })
-        };
-        let files = files.iter().map(one).collect::<Result<_, StoreError>>()?;
-        Ok(Self { list_version: LIST_VERSION, session_id: session_id.to_owned(), files })
-    }
-
     pub fn encode(&self) -> Bytes {
         // Texts and numbers always have a JSON.
         serde_json::to_vec(self).unwrap_or_default().into()
@@ -170,9 +136,16 @@ const HEAD_ENDING: &str = ".head";
 impl StoredFile {
     /// Whether a file begins with the bytes of this one.
     fn begins(&self, path: &Path) -> Result<bool, StoreError> {
-        let mut pieces = Vec::new();
-        read_pieces(path, Some(self.bytes), |_, piece| pieces.push(sha256(piece)))?;
-        Ok(pieces == self.pieces)
+        let failed = StoreError::file(path);
+        let mut file = File::open(path).map_err(&failed)?.take(self.bytes);
+        for sum in &self.pieces {
+            let mut piece = Vec::new();
+            (&mut file).take(PIECE_BYTES).read_to_end(&mut piece).map_err(&failed)?;
+            if sha256(&piece) != *sum {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 }
 
@@ -189,42 +162,106 @@ pub(crate) fn object_path(sha256: &str) -> ObjectPath {
     ObjectPath::from(format!("objects/{first}/{rest}"))
 }
 
-impl Store {
-    /// Stores all pieces of the files and then their list; the SHA-256 of the list and the bytes that were sent.
-    pub(crate) async fn put_files(
-        &self,
-        folder: &Path,
-        list: &FileList,
-    ) -> Result<(String, u64), StoreError> {
-        let pieces = list.files.iter().flat_map(|file| {
-            let offsets = (0..).map(|k| k * PIECE_BYTES);
-            let path = folder.join(&file.name);
-            file.pieces.iter().zip(offsets).map(move |(sum, at)| (path.clone(), sum, at))
-        });
-        let sent = stream::iter(pieces).map(|(path, sum, at)| self.put_piece(path, sum, at));
-        let sent: Vec<u64> = sent.buffer_unordered(REQUESTS).try_collect().await?;
-        let listed = list.encode();
-        let sum = sha256(&listed);
-        self.put_new(&object_path(&sum), listed).await?;
-        Ok((sum, sent.iter().sum()))
+/// A piece of a local file, read.
+struct Piece {
+    bytes: Bytes,
+    sum: String,
+}
+
+impl LocalFile {
+    /// Where the file's pieces begin, by its length when it was found. An empty file has one piece, so that it is stored too.
+    fn offsets(&self) -> impl Iterator<Item = u64> + use<> {
+        (0..self.bytes.max(1)).step_by(PIECE_BYTES as usize)
     }
 
-    async fn put_piece(&self, path: PathBuf, sum: &str, at: u64) -> Result<u64, StoreError> {
-        let failed = StoreError::file(&path);
-        let mut file = File::open(&path).map_err(&failed)?;
-        file.seek(SeekFrom::Start(at)).map_err(&failed)?;
-        let mut piece = Vec::new();
-        file.take(PIECE_BYTES).read_to_end(&mut piece).map_err(&failed)?;
-        if sha256(&piece) != sum {
-            let changed = io::Error::other("it changed while it was read");
-            return Err(failed(changed));
+    fn read_piece(&self, at: u64) -> Result<Piece, StoreError> {
+        let read = || -> io::Result<Vec<u8>> {
+            let mut file = File::open(&self.path)?;
+            file.seek(SeekFrom::Start(at))?;
+            let mut bytes = Vec::new();
+            file.take(PIECE_BYTES).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        };
+        let bytes = read().map_err(StoreError::file(&self.path))?;
+        Ok(Piece { sum: sha256(&bytes), bytes: bytes.into() })
+    }
+}
+
+struct StoredPiece {
+    sum: String,
+    bytes: u64,
+    sent: u64,
+}
+
+/// A session whose files are to be stored.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalFiles {
+    pub session_id: String,
+    pub files: Vec<LocalFile>,
+}
+
+/// A session whose files are stored.
+pub(crate) struct StoredFiles {
+    pub list: FileList,
+    /// SHA-256 of the list.
+    pub content: String,
+    /// Bytes that were sent.
+    pub sent: u64,
+}
+
+impl Store {
+    /// Stores the pieces of sessions' files and then the lists of them. Every piece is read once, so that its object has its
+    /// SHA-256 whatever happens to the file. `hear` is called with the number of finished sessions; after a break only these
+    /// are in the answer.
+    pub(crate) async fn put_sessions(
+        &self,
+        sessions: &[LocalFiles],
+        hear: &mut dyn FnMut(usize) -> ControlFlow<()>,
+    ) -> Result<Vec<StoredFiles>, StoreError> {
+        // Pieces of one session and of several are under way at a time.
+        let pieces = sessions.iter().flat_map(|session| {
+            session.files.iter().flat_map(|file| file.offsets().map(move |at| (file, at)))
+        });
+        let mut sent = stream::iter(pieces)
+            .map(|(file, at)| self.put_piece(file.clone(), at))
+            .buffered(REQUESTS);
+        let mut lists = Vec::new();
+        for (done, session) in sessions.iter().enumerate() {
+            let (mut files, mut bytes_sent) = (Vec::new(), 0);
+            for file in &session.files {
+                let (mut bytes, mut pieces) = (0, Vec::new());
+                for _ in file.offsets() {
+                    let Some(piece) = sent.try_next().await? else { break };
+                    bytes += piece.bytes;
+                    bytes_sent += piece.sent;
+                    pieces.push(piece.sum);
+                }
+                files.push(StoredFile { name: file.name.clone(), bytes, pieces });
+            }
+            let session_id = session.session_id.clone();
+            lists.push((FileList { list_version: LIST_VERSION, session_id, files }, bytes_sent));
+            if hear(done + 1).is_break() {
+                break;
+            }
         }
-        let (object, bytes) = (object_path(sum), piece.len());
-        if bytes >= LOOK_BYTES && self.size(&object).await? == Some(bytes as u64) {
-            return Ok(0);
-        }
-        let is_new = self.put_new(&object, piece.into()).await?;
-        Ok(if is_new { bytes as u64 } else { 0 })
+        let stored = stream::iter(lists).map(|(list, sent)| async move {
+            let encoded = list.encode();
+            let content = sha256(&encoded);
+            self.put_new(&object_path(&content), encoded).await?;
+            Ok(StoredFiles { list, content, sent })
+        });
+        stored.buffered(REQUESTS).try_collect().await
+    }
+
+    async fn put_piece(&self, file: LocalFile, at: u64) -> Result<StoredPiece, StoreError> {
+        // Reading and hashing on other threads leaves this one to the requests.
+        let read = tokio::task::spawn_blocking(move || file.read_piece(at)).await;
+        let Piece { bytes, sum } =
+            read.map_err(|err| StoreError::Runtime(io::Error::other(err)))??;
+        let (object, count) = (object_path(&sum), bytes.len() as u64);
+        let is_known = count >= LOOK_BYTES && self.size(&object).await? == Some(count);
+        let is_sent = !is_known && self.put_new(&object, bytes).await?;
+        Ok(StoredPiece { sum, bytes: count, sent: if is_sent { count } else { 0 } })
     }
 
     /// The list of files of a version, whose bytes must have its SHA-256.
@@ -299,6 +336,9 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::StoreUrl;
+    use object_store::memory::InMemory;
+    use std::sync::Arc;
 
     #[test]
     fn names_never_lead_out_of_the_folder() {
@@ -317,7 +357,11 @@ mod tests {
         write("edits.jsonl", "{}\n");
         write("edits.jsonl.head", "1");
         let Ok(files) = local_files(folder.path()) else { panic!("files") };
-        let list = FileList::of("s", &files).unwrap();
+        let session = LocalFiles { session_id: "s".into(), files };
+        let store = Store::of(StoreUrl::parse("s3://lab").unwrap(), Arc::new(InMemory::new()));
+        let store = store.unwrap();
+        let stored = store.wait(store.put_sessions(&[session], &mut |_| ControlFlow::Continue(())));
+        let list = stored.unwrap().remove(0).list;
         assert_eq!(list.first_not_continued(folder.path()).unwrap(), None);
         write("edits.jsonl", "{}\n{}\n");
         write("edits.jsonl.head", "2");

@@ -47,12 +47,10 @@ impl Mirror {
             let known = self.table()?;
             let change = store.wait(Change::since(store, known.as_ref()))?;
             let Some(change) = change else { return Ok(0) };
-            let parts: Vec<Add> = change.parts;
-            let mut rows = Vec::new();
-            store.wait(read_parts(store, &parts, hear, |read| rows.extend(read)))?;
-            let count = rows.len();
-            let mut sessions = rows.into_iter().map(mirrored);
-            if self.catalog.take_mirrored(change.was.as_ref(), &change.now, &mut sessions)? {
+            let mut count = 0;
+            let rows = rows_of_parts(store, &change.parts, hear);
+            let sessions = rows.map(|row| row.map(mirrored)).inspect(|_| count += 1);
+            if self.catalog.take_mirrored(change.was.as_ref(), &change.now, sessions)? {
                 return Ok(count);
             }
         }
@@ -118,27 +116,35 @@ fn id_of(commit: &Commit) -> Option<&String> {
     commit.actions.iter().find_map(|one| one.meta_data.as_ref()).map(|one| &one.id)
 }
 
-/// The rows of files, in their order.
-async fn read_parts(
-    store: &Store,
-    parts: &[Add],
-    hear: Hear<'_>,
-    mut take: impl FnMut(Vec<SessionRow>),
-) -> Result<(), StoreError> {
-    let read = stream::iter(parts).map(|part| async {
+/// The rows of files, in their order. Files are fetched several at a time, and one is read at a time.
+fn rows_of_parts<'a>(
+    store: &'a Store,
+    parts: &'a [Add],
+    hear: Hear<'a>,
+) -> impl Iterator<Item = Result<SessionRow, StoreError>> + use<'a> {
+    let fetched = stream::iter(parts).map(|part| async {
         let path = table_path(&part.path);
         let missing = || StoreError::bad(&path, "it is missing");
         let bytes = store.read(&path).await?.ok_or_else(missing)?;
-        rows_of(&path, &bytes)
+        Ok((path, bytes))
     });
-    let mut read = read.buffered(REQUESTS);
+    let mut fetched = Box::pin(fetched.buffered(REQUESTS));
     let mut done = 0;
-    while let Some(rows) = read.try_next().await? {
-        take(rows);
-        done += 1;
-        if hear(done, parts.len()).is_break() {
-            return Err(StoreError::Ended);
-        }
-    }
-    Ok(())
+    let files = std::iter::from_fn(move || {
+        let next = store.wait(fetched.try_next()).transpose()?;
+        Some(next.and_then(|(path, bytes)| {
+            done += 1;
+            match hear(done, parts.len()).is_break() {
+                true => Err(StoreError::Ended),
+                false => rows_of(&path, &bytes),
+            }
+        }))
+    });
+    files.flat_map(|file| {
+        let (rows, err) = match file {
+            Ok(rows) => (Some(rows), None),
+            Err(err) => (None, Some(Err(err))),
+        };
+        rows.into_iter().flatten().chain(err)
+    })
 }

@@ -2,7 +2,7 @@
 
 use crate::delta::{Action, Metadata, commit_info, first_actions};
 use crate::error::StoreError;
-use crate::files::{FileList, FolderFault, local_files};
+use crate::files::{FileList, FolderFault, LocalFile, LocalFiles, StoredFiles, local_files};
 use crate::location::Store;
 use crate::mirror::{Hear, Mirror};
 use crate::rows::{SessionRow, part, schema_with};
@@ -41,8 +41,9 @@ pub struct PushOutcome {
 struct Stored<'a> {
     folder: PathBuf,
     local: &'a LocalSession,
-    row: SessionRow,
     list: FileList,
+    /// SHA-256 of the list.
+    content: String,
 }
 
 /// What becomes of a session.
@@ -50,6 +51,41 @@ enum Verdict {
     Push { version: u64 },
     Known,
     Refused(String),
+}
+
+/// The files of a session, if it is one to push.
+fn choose(
+    mirror: &Mirror,
+    folder: &Path,
+    local: &LocalSession,
+    outcome: &mut PushOutcome,
+) -> Result<Option<Vec<LocalFile>>, StoreError> {
+    let entry = &local.entry;
+    let mut refuse = |reason: String| {
+        outcome.refused.push(PushRefusal { session: entry.folder.clone(), reason });
+    };
+    if let Some(trouble) = &entry.trouble {
+        refuse(trouble.clone());
+        return Ok(None);
+    }
+    if entry.ending.is_none() {
+        outcome.unfinished.push(entry.folder.clone());
+        return Ok(None);
+    }
+    if mirror.catalog.is_pushed(folder, &local.fingerprint)?
+        && mirror.catalog.mirrored_content(&entry.session_id)?.is_some()
+    {
+        outcome.known += 1;
+        return Ok(None);
+    }
+    match local_files(folder) {
+        Ok(files) => Ok(Some(files)),
+        Err(FolderFault::Unreadable(err)) => Err(err),
+        Err(FolderFault::Spare) => {
+            refuse("a part of it is in a spare folder; recover it to one folder first".into());
+            Ok(None)
+        }
+    }
 }
 
 impl Store {
@@ -66,76 +102,51 @@ impl Store {
         self.wait(self.ensure_table(now()))?;
         mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
         let mut outcome = PushOutcome::default();
-        let mut done = 0;
-        for batch in sessions.chunks(BATCH) {
-            let mut stored = Vec::new();
+        for (batch, sessions_before) in sessions.chunks(BATCH).zip((0..).step_by(BATCH)) {
+            let mut chosen = Vec::new();
             for local in batch {
                 let folder = library.join(&local.entry.folder);
-                stored.extend(self.store_files(mirror, folder, local, &mut outcome)?);
-                done += 1;
-                if hear(done, sessions.len()).is_break() {
-                    self.list(mirror, stored, now, &mut outcome)?;
-                    return Err(StoreError::Ended);
+                if let Some(files) = choose(mirror, &folder, local, &mut outcome)? {
+                    let session_id = local.entry.session_id.clone();
+                    chosen.push((folder, local, LocalFiles { session_id, files }));
+                }
+            }
+            let before = sessions_before + batch.len() - chosen.len();
+            let mut is_ended = hear(before, sessions.len()).is_break();
+            let files: Vec<LocalFiles> = chosen.iter().map(|(_, _, files)| files.clone()).collect();
+            let mut hear_of_batch = |done| {
+                let flow = hear(before + done, sessions.len());
+                is_ended |= flow.is_break();
+                flow
+            };
+            let put = self.wait(self.put_sessions(&files, &mut hear_of_batch))?;
+            let mut stored = Vec::new();
+            for ((folder, local, _), StoredFiles { list, content, sent }) in
+                chosen.into_iter().zip(put)
+            {
+                outcome.bytes += sent;
+                if local.is_unchanged(&folder) {
+                    stored.push(Stored { folder, local, list, content });
+                } else {
+                    let reason = "it changed while it was read; push it once more".into();
+                    let session = local.entry.folder.clone();
+                    outcome.refused.push(PushRefusal { session, reason });
                 }
             }
             self.list(mirror, stored, now, &mut outcome)?;
+            if is_ended {
+                return Err(StoreError::Ended);
+            }
         }
         Ok(outcome)
     }
 
     /// Makes the table, unless there is one.
-    async fn ensure_table(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
+    pub(crate) async fn ensure_table(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
         if self.read_commit(0).await?.is_none() {
             self.commit(0, &first_actions(self.url.as_str(), &schema_with(None).0, now)).await?;
         }
         Ok(())
-    }
-
-    /// Stores the files of a session, if it is one to push.
-    fn store_files<'a>(
-        &self,
-        mirror: &Mirror,
-        folder: PathBuf,
-        local: &'a LocalSession,
-        outcome: &mut PushOutcome,
-    ) -> Result<Option<Stored<'a>>, StoreError> {
-        let entry = &local.entry;
-        let mut refuse = |reason: String| {
-            outcome.refused.push(PushRefusal { session: entry.folder.clone(), reason });
-        };
-        if let Some(trouble) = &entry.trouble {
-            refuse(trouble.clone());
-            return Ok(None);
-        }
-        if entry.ending.is_none() {
-            outcome.unfinished.push(entry.folder.clone());
-            return Ok(None);
-        }
-        if mirror.catalog.is_pushed(&folder, &local.fingerprint)?
-            && mirror.catalog.mirrored_content(&entry.session_id)?.is_some()
-        {
-            outcome.known += 1;
-            return Ok(None);
-        }
-        let files = match local_files(&folder) {
-            Ok(files) => files,
-            Err(FolderFault::Unreadable(err)) => return Err(err),
-            Err(FolderFault::Spare) => {
-                refuse("a part of it is in a spare folder; recover it to one folder first".into());
-                return Ok(None);
-            }
-        };
-        let list = FileList::of(&entry.session_id, &files)?;
-        let (content, bytes) = self.wait(self.put_files(&folder, &list))?;
-        outcome.bytes += bytes;
-        if !local.is_unchanged(&folder) {
-            refuse("it changed while it was read; push it once more".into());
-            return Ok(None);
-        }
-        // The version is known when the table is written.
-        let row =
-            SessionRow { version: 0, content, pushed_at: String::new(), entry: entry.clone() };
-        Ok(Some(Stored { folder, local, row, list }))
     }
 
     /// Writes the rows of sessions whose files are stored. Of several writers one is first; the others read what it wrote.
@@ -162,7 +173,8 @@ impl Store {
                     }
                     Verdict::Push { version } => {
                         let pushed_at = at.to_rfc3339_opts(SecondsFormat::Millis, true);
-                        rows.push(SessionRow { version, pushed_at, ..one.row.clone() });
+                        let (content, entry) = (one.content.clone(), one.local.entry.clone());
+                        rows.push(SessionRow { version, content, pushed_at, entry });
                     }
                 }
             }
@@ -196,14 +208,14 @@ impl Store {
         one: &Stored<'_>,
         rows: &[SessionRow],
     ) -> Result<Verdict, StoreError> {
-        let id = &one.row.entry.session_id;
+        let id = &one.local.entry.session_id;
         if rows.iter().any(|row| row.entry.session_id == *id) {
             return Ok(Verdict::Refused(format!("another folder has session {id} too")));
         }
         let Some((version, content)) = mirror.catalog.mirrored_content(id)? else {
             return Ok(Verdict::Push { version: 1 });
         };
-        if content == one.row.content {
+        if content == one.content {
             return Ok(Verdict::Known);
         }
         let theirs = self.wait(self.file_list(&content))?;

@@ -235,11 +235,16 @@ fn is_named(path: &Path, bytes: &Bytes) -> bool {
     sum.is_none_or(|sum| sha256(bytes).starts_with(sum))
 }
 
-/// The rows of a file.
-pub(crate) fn rows_of(path: &Path, bytes: &Bytes) -> Result<Vec<SessionRow>, StoreError> {
+/// The rows of a file, each read when its turn comes.
+pub(crate) fn rows_of(
+    path: &Path,
+    bytes: &Bytes,
+) -> Result<impl Iterator<Item = Result<SessionRow, StoreError>> + use<>, StoreError> {
     let needed = ["version", "content_sha256", "pushed_at", "entry", "entry_checksum"];
-    let failed = |reason: String| StoreError::bad(path, reason);
-    if !is_named(path, bytes) {
+    let path = path.clone();
+    let is_named = is_named(&path, bytes);
+    let failed = move |reason: String| StoreError::bad(&path, reason);
+    if !is_named {
         return Err(failed("its bytes have another SHA-256 than its name".into()));
     }
     let needed = Some(needed.map(str::to_owned).to_vec());
@@ -251,19 +256,18 @@ pub(crate) fn rows_of(path: &Path, bytes: &Bytes) -> Result<Vec<SessionRow>, Sto
     let versions = column("version")?.i64().map_err(|err| failed(err.to_string()))?.clone();
     let (contents, pushed) = (words("content_sha256")?, words("pushed_at")?);
     let (entries, sums) = (words("entry")?, words("entry_checksum")?);
-    let each = |at: usize| -> Option<Result<SessionRow, StoreError>> {
-        let (text, sum) = (entries.get(at)?, sums.get(at)?);
+    Ok((0..frame.height()).map(move |at| {
+        let (Some(text), Some(sum)) = (entries.get(at), sums.get(at)) else {
+            return Err(failed(format!("row {at} has no entry")));
+        };
         if checksum(text) != sum {
-            return Some(Err(failed(format!("the checksum of row {at} is wrong"))));
+            return Err(failed(format!("the checksum of row {at} is wrong")));
         }
-        let entry = serde_json::from_str(text).map_err(|err| failed(err.to_string()));
-        Some(entry.map(|entry| SessionRow {
+        Ok(SessionRow {
             version: versions.get(at).and_then(|one| u64::try_from(one).ok()).unwrap_or(0),
             content: contents.get(at).unwrap_or_default().to_owned(),
             pushed_at: pushed.get(at).unwrap_or_default().to_owned(),
-            entry,
-        }))
-    };
-    let missing = |at: usize| failed(format!("row {at} has no entry"));
-    (0..frame.height()).map(|at| each(at).unwrap_or_else(|| Err(missing(at)))).collect()
+            entry: serde_json::from_str(text).map_err(|err| failed(err.to_string()))?,
+        })
+    }))
 }

@@ -1,5 +1,7 @@
 //! A store under writers that race, connections that break and bytes that flip.
 
+mod many;
+
 use crate::delta::{commit_path, table_path};
 use crate::files::object_path;
 use crate::rows::row_count;

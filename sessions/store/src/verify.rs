@@ -34,7 +34,9 @@ impl Store {
                 let path = table_path(&add.path);
                 let read = match self.read(&path).await? {
                     None => Err(StoreError::bad(&path, "it is missing")),
-                    Some(bytes) => rows_of(&path, &bytes),
+                    Some(bytes) => {
+                        rows_of(&path, &bytes).and_then(Iterator::collect::<Result<Vec<_>, _>>)
+                    }
                 };
                 match read {
                     Ok(read) => rows.extend(read),

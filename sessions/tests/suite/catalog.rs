@@ -340,7 +340,17 @@ fn every_search_finds_what_a_plain_scan_finds() {
         let meant = entries.iter().filter(|entry| is_meant(&query, entry));
         let meant: Vec<&str> = meant.map(|entry| entry.folder.as_str()).collect();
         assert_eq!(got, meant, "{query:?}");
-        assert_eq!(found.count, meant.len());
+        assert_eq!((found.count, found.has_more), (meant.len(), false));
+        // A page counts a few and then stops, whichever criterion leads to them.
+        for (counted, skip) in [(0, 0), (6, 2), (1000, 40)] {
+            let page = CatalogQuery { limit: Some(3), skip, ..query.clone() };
+            let page = catalog.find_counting(&page, counted).unwrap();
+            let most = counted.max(skip + 3);
+            let is_by_start = query.order == CatalogOrder::Started;
+            let count = if is_by_start { meant.len().min(most) } else { meant.len() };
+            assert_eq!((page.count, page.has_more), (count, count < meant.len()), "{query:?}");
+            assert!(page.entries.iter().eq(found.entries.iter().skip(skip).take(3)), "{query:?}");
+        }
         hits += usize::from(!got.is_empty() && got.len() < entries.len());
     }
     // A search that finds nothing or everything would prove little.
