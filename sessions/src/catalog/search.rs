@@ -154,7 +154,7 @@ impl CatalogOrder {
 pub struct CatalogPage {
     /// Sessions on all pages.
     pub count: usize,
-    /// Whether there are more than `count`, which were not counted because there are too many.
+    /// Whether there are more than `count`: too many to count them all.
     pub has_more: bool,
     pub entries: Vec<CatalogEntry>,
 }
@@ -236,7 +236,7 @@ impl Criterion {
              SELECT id FROM session WHERE plan IN (SELECT -owner FROM named WHERE {sql} AND owner < 0)"
         );
         let test = format!(
-            "EXISTS (SELECT 1 FROM named WHERE owner IN (session.id, -session.plan) AND {sql})"
+            "EXISTS (SELECT 1 FROM named INDEXED BY named_owner WHERE owner IN (session.id, -session.plan) AND {sql})"
         );
         let both = [values.clone(), values.clone()].concat();
         Self { set: Some((set, both)), test: (test, values), is_words: false }
@@ -388,14 +388,20 @@ impl Catalog {
                 }
                 _ => (query.all("session.id").read(&state)?, usize::MAX),
             };
-            let has_more = ids.len() > most;
+            let mut has_more = ids.len() > most;
             ids.truncate(most);
+            let mut count = ids.len();
+            if has_more && query.criteria().is_empty() {
+                let all = Statement::new("SELECT count(*) FROM session").read::<i64>(&state)?;
+                count = all.first().and_then(|&all| usize::try_from(all).ok()).unwrap_or(count);
+                has_more = false;
+            }
             let sql = "SELECT entry, checksum FROM entry WHERE id = ?";
             let mut statement = state.prepare_cached(sql)?;
             let page = ids.iter().skip(query.skip).take(query.limit.unwrap_or(usize::MAX));
             let entries = page.map(|id| statement.query_row([id], entry_of));
             let entries = entries.collect::<rusqlite::Result<_>>()?;
-            Ok(CatalogPage { count: ids.len(), has_more, entries })
+            Ok(CatalogPage { count, has_more, entries })
         };
         find().map_err(self.failed())
     }

@@ -160,7 +160,13 @@ fn many_sessions_are_found_in_the_catalog_of_a_store() {
                 let page: Vec<String> = met.iter().take(PAGE).map(|&number| id(number)).collect();
                 let ids: Vec<String> =
                     found.entries.into_iter().map(|one| one.session_id).collect();
-                assert_eq!((found.count, ids), (met.len(), page), "{line}");
+                let count = if found.has_more {
+                    found.count + 1..=count
+                } else {
+                    found.count..=found.count
+                };
+                assert!(count.contains(&met.len()), "{line}: {count:?} of {}", met.len());
+                assert_eq!(ids, page, "{line}");
             }
         }
     }

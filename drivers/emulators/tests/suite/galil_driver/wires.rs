@@ -126,14 +126,27 @@ impl Runner {
             .collect()
     }
 
+    /// Sends a command until it is acknowledged: on a computer with much else to do an answer may come so late that the rig
+    /// refuses the command.
     pub fn tell(&mut self, command: RigCommand) {
-        self.events.clear();
-        self.rig.send(command);
-        self.until("acknowledged", |runner| {
+        let is_done = |runner: &Self| {
             runner.events.iter().any(
                 |event| matches!(&event.body, RigEventBody::Ack(ack) if command.is_answered_by(&ack.command)),
             )
-        });
+        };
+        let is_refused = |runner: &Self| {
+            runner.faults().iter().any(|fault| matches!(fault, Fault::CommandRefused { .. }))
+        };
+        let end = Instant::now() + PATIENCE;
+        loop {
+            self.events.clear();
+            self.rig.send(command);
+            self.until("acknowledged", |runner| is_done(runner) || is_refused(runner));
+            if is_done(self) {
+                return;
+            }
+            assert!(Instant::now() < end, "acknowledged never: {:?}", self.faults());
+        }
     }
 
     pub fn is_at_rest(&self) -> bool {
