@@ -1,6 +1,6 @@
 //! Export of a session as the documents of one Bluesky run, for programs such as Databroker and Tiled: a JSON Lines file
 //! with a name and a document in each line, as the package suitcase-jsonl writes it. The documents are those of the
-//! package event-model (<https://blueskyproject.io/event-model/>).
+//! package event-model (<https://github.com/bluesky/event-model>).
 //!
 //! Start at [`TableExport::write_documents`]. The file is not a session.
 
@@ -35,9 +35,9 @@ pub struct LogFacts<'a> {
 }
 
 impl TableExport<'_> {
-    /// Writes the selected samples as events into a new file; returns their number. `feed` is called twice: the documents
-    /// before the events state which values are known. At most one page of events is in memory. The selection of columns
-    /// and the extra columns are ignored.
+    /// Writes the selected samples as events into a new file; returns their number. `feed` is called twice, for the same
+    /// samples: the documents before the events state which values are known. At most one page of events is in memory. The
+    /// selection of columns and the extra columns are ignored.
     pub fn write_documents(
         &self,
         path: &Path,
@@ -80,9 +80,7 @@ fn write_samples(
     let mut written = Ok(());
     feed(&mut |rows: &[SampleRow]| {
         for row in rows {
-            // Those that were there when the session was first read: one that is being recorded may have grown.
-            let is_surveyed = picker.seen() < survey.seen;
-            let picked = picker.pick(row).filter(|_| is_surveyed && written.is_ok());
+            let picked = picker.pick(row).filter(|_| written.is_ok());
             if let Some((number, t_s)) = picked {
                 for (cell, (key, _)) in events.cells().zip(&keys) {
                     key.write(cell, number, t_s, row);
