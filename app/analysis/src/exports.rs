@@ -7,7 +7,8 @@ use crate::source::SourceError;
 use palpate_sessions::recover::is_in_use;
 use palpate_sessions::{Manifest, SessionSummary, atomic};
 use palpate_tables::export::{
-    ExportError, ExtraColumns, RowFeed, SampleSelection, SampleTable, TableExport, TableFormat,
+    ExportError, ExtraColumns, LogFacts, RowFeed, SampleSelection, SampleTable, TableExport,
+    TableFormat,
 };
 use palpate_tables::lake::{self, LakeAddition, LakeQuality};
 use std::collections::BTreeSet;
@@ -32,12 +33,14 @@ pub enum ExportTarget {
     Table(TableFormat, PathBuf),
     /// One message per sample in this new file.
     Messages(PathBuf),
+    /// One run of Bluesky documents with an event per sample in this new file.
+    Documents(PathBuf),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExportedFile {
     pub path: PathBuf,
-    /// Rows or messages in it.
+    /// Rows, messages or events of samples in it.
     pub rows: u64,
     pub notes: Vec<String>,
 }
@@ -47,20 +50,22 @@ impl ExportTarget {
     pub fn sweep(&self) {
         let folder = match self {
             Self::Table(_, folder) => Some(folder.as_path()),
-            Self::Messages(path) => path.parent(),
+            Self::Messages(path) | Self::Documents(path) => path.parent(),
         };
         folder.map(|folder| atomic::remove_leftovers(folder, 1));
     }
 
-    /// Writes a table whose rows `feed` hands out.
+    /// Writes a table whose rows `feed` hands out, each time that it is called.
     pub fn write(
         &self,
         session: &Path,
         table: &TableExport,
+        log: LogFacts,
         feed: RowFeed,
     ) -> Result<ExportedFile, ExportError> {
         let (path, rows) = match self {
             Self::Messages(path) => (path.clone(), table.write_messages(path, feed)?),
+            Self::Documents(path) => (path.clone(), table.write_documents(path, log, feed)?),
             Self::Table(format, folder) => {
                 let stem = stem(session, table.manifest);
                 let name = table.selection.file_name(&stem, format.ending());
@@ -88,15 +93,18 @@ pub fn export(
         extra: &ExtraColumns::default(),
         selection,
     };
-    let (mut done, of) = (0, passing.outline.samples);
+    let of = passing.outline.samples;
     let mut feed = |visit: &mut dyn FnMut(&[_])| {
+        // From the start each time that the samples are read.
+        let mut done = 0;
         passing.rows(session, &mut |rows| {
             done += rows.len() as u64;
             tell(done, of);
             visit(rows);
         })
     };
-    Ok(target.write(session, &table, &mut feed)?)
+    let log = LogFacts { entries: &passing.outline.entries, end: passing.outline.end.as_ref() };
+    Ok(target.write(session, &table, log, &mut feed)?)
 }
 
 /// What is chosen of a session in memory, as one of its analyses has it: the table that [`export`] writes.

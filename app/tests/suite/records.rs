@@ -338,6 +338,56 @@ fn samples_are_exported_as_messages() {
     assert!(!at.join("b.mcap").exists());
 }
 
+/// One run of Bluesky documents, selected as tables are, in a new file that is no session.
+#[test]
+fn samples_are_exported_as_bluesky_documents() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "run", &[]));
+    let session = palpate_sessions::Session::open(&at.join("run")).unwrap();
+    let documents = |name: &str| -> Vec<(String, serde_json::Value)> {
+        let text = std::fs::read_to_string(at.join(name)).unwrap();
+        // What is not known is NaN, as in Python's JSON.
+        let line = |line: &str| serde_json::from_str(&line.replace("NaN", "null")).unwrap();
+        text.lines().map(line).collect()
+    };
+    let all = json(&typed(at, "export run --bluesky all.jsonl --json"));
+    let count = session.rows.len() as u64;
+    assert_eq!(all["rows"].as_u64(), Some(count));
+    assert_eq!((&all["format"], &all["dictionary"]), (&"bluesky".into(), &serde_json::Value::Null));
+    let run = documents("all.jsonl");
+    let (start, stop) = (&run[0].1, &run.last().unwrap().1);
+    assert_eq!(start["palpate"]["session_id"], session.manifest.session_id.as_str());
+    assert_eq!(start["plan_name"], session.manifest.plan["name"]);
+    assert_eq!((&stop["exit_status"], &stop["outcome"]), (&"success".into(), &"finish".into()));
+    assert_eq!(stop["num_events"]["primary"].as_u64(), Some(count));
+    assert_eq!(stop["num_events"]["entries"].as_u64(), Some(session.entries.len() as u64));
+    // Another analysis of the session is another run.
+    succeeded(&palpate(at, &["mask", "run", "--name", "none", "--leave-out", "0..1000"]));
+    succeeded(&typed(at, "export run --bluesky masked.jsonl --analysis none"));
+    let masked = documents("masked.jsonl");
+    assert_ne!(masked[0].1["uid"], start["uid"]);
+    assert_eq!(masked[1].1["data_keys"].get("force_N"), None);
+    let hold = ["--phase", "hold", "--decimate", "10", "--json"];
+    let part = [&["export", "run", "--bluesky", "hold.jsonl"][..], &hold].concat();
+    let part = json(&palpate(at, &part));
+    let held = session.rows.iter();
+    let held = held.filter(|row| row.phase == palpate_model::rig::Phase::Hold).count();
+    assert_eq!(part["rows"].as_u64(), Some(held.div_ceil(10) as u64));
+    for (args, code, word) in [
+        (&["export", "run", "--bluesky", "all.jsonl"][..], 2, "exists already"),
+        (&["export", "run", "--bluesky", "b.jsonl", "--columns", "t_s"], 2, "used with"),
+        (&["export", "run", "--bluesky", "b.jsonl", "--mcap-full", "b.mcap"], 2, "used with"),
+        (&["export", "run", "run", "--bluesky", "b.jsonl"], 2, "one session"),
+        (&["export", "run", "--bluesky", "none/b.jsonl"], 1, "none"),
+    ] {
+        let refused = palpate(at, args);
+        assert_eq!(refused.status.code(), Some(code), "{args:?}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(word), "{args:?}: {}", stderr(&refused));
+    }
+    assert!(!at.join("b.jsonl").exists());
+}
+
 #[test]
 fn words_of_a_session_give_the_terminal_no_orders() {
     let folder = tempfile::tempdir().unwrap();

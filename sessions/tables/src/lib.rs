@@ -1,4 +1,4 @@
-//! Sessions as tables: import of foreign files, export to CSV, Parquet and Arrow, and lakes.
+//! Sessions as tables: import of foreign files, export to CSV, Parquet, Arrow, MCAP and Bluesky documents, and lakes.
 //!
 //! polars is used only here and in palpate-store, so that recording, reading and recovering a session compile without it. This crate decides
 //! nothing about a run and draws nothing.

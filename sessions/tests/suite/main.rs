@@ -7,6 +7,7 @@ mod chains;
 mod companions;
 mod damage;
 mod disk;
+mod documents;
 mod exports;
 mod faults;
 mod foreign;

@@ -12,7 +12,7 @@ use palpate_analysis::exports::{self, ExportFailure, ExportTarget};
 use palpate_model::rig::Phase;
 use palpate_sessions::log::Session;
 use palpate_tables::export::{
-    ExportError, ExtraColumns, SampleSelection, TableExport, TableFormat, dictionary_path,
+    ExportError, ExtraColumns, LogFacts, SampleSelection, TableExport, TableFormat, dictionary_path,
 };
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub struct ExportArgs {
     #[arg(required = true, value_name = "SESSION")]
     sessions: Vec<PathBuf>,
     /// Kind of table
-    #[arg(long, value_enum, required_unless_present_any = ["lake", "mcap_full"])]
+    #[arg(long, value_enum, required_unless_present_any = ["lake", "mcap_full", "bluesky"])]
     format: Option<Kind>,
     /// Add the sessions to this lake, a folder of Parquet files that DuckDB, polars and 'palpate fit' read;
     /// it is made if there is none
@@ -32,6 +32,10 @@ pub struct ExportArgs {
     /// Write one message per sample to this new MCAP file instead, for Foxglove and PlotJuggler
     #[arg(long, value_name = "OUT.mcap", conflicts_with_all = ["format", "lake", "to", "delimiter", "columns", "compliance"])]
     mcap_full: Option<PathBuf>,
+    /// Write the documents of one Bluesky run, with one event per sample, to this new file of JSON lines
+    /// instead, for Databroker and Tiled
+    #[arg(long, value_name = "OUT.jsonl", conflicts_with_all = ["format", "lake", "mcap_full", "to", "delimiter", "columns", "compliance"])]
+    bluesky: Option<PathBuf>,
     /// Folder to write to; the file takes the session folder's name
     #[arg(long, value_name = "DIR", default_value = ".")]
     to: PathBuf,
@@ -108,9 +112,10 @@ impl ExportArgs {
     }
 
     fn target(&self) -> ExportTarget {
-        match &self.mcap_full {
-            Some(path) => ExportTarget::Messages(path.clone()),
-            None => ExportTarget::Table(self.format(), self.to.clone()),
+        match (&self.mcap_full, &self.bluesky) {
+            (Some(path), _) => ExportTarget::Messages(path.clone()),
+            (None, Some(path)) => ExportTarget::Documents(path.clone()),
+            (None, None) => ExportTarget::Table(self.format(), self.to.clone()),
         }
     }
 
@@ -163,7 +168,8 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
             visit(&read.rows);
             Ok(())
         };
-        let written = target.write(session, &table, &mut feed);
+        let log = LogFacts { entries: &read.entries, end: read.end.as_ref() };
+        let written = target.write(session, &table, log, &mut feed);
         written.map_err(failure)?
     } else {
         // An export that needs one sample at a time keeps none.
@@ -176,9 +182,12 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         written.map_err(export_failure)?
     };
     written.notes.iter().for_each(|note| output.note(note));
-    let (format, dictionary) = match args.mcap_full {
-        Some(_) => ("mcap", None),
-        None => (args.format().ending(), Some(dictionary_path(&written.path))),
+    let (format, what, dictionary) = match &target {
+        ExportTarget::Messages(_) => ("mcap", "messages", None),
+        ExportTarget::Documents(_) => ("bluesky", "events", None),
+        ExportTarget::Table(format, _) => {
+            (format.ending(), "rows", Some(dictionary_path(&written.path)))
+        }
     };
     let object = serde_json::json!({ "file": written.path, "rows": written.rows, "format": format,
         "dictionary": dictionary, "is_part": selection.is_partial(),
@@ -191,7 +200,6 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let every = selection
             .every
             .map_or(String::new(), |every| format!(", one of every {every} selected samples"));
-        let what = args.mcap_full.as_ref().map_or("rows", |_| "messages");
         format!("{} {what} written to {}{every}{corrected}", written.rows, written.path.display())
     });
     Ok(())

@@ -1,6 +1,7 @@
 //! Export of a session's samples as an MCAP file with one message each, for programs such as Foxglove and PlotJuggler. The
 //! file is not a session, because it has no entries.
 
+use super::select::Picker;
 use super::{ExportError, RowFeed, TableExport, atomic};
 use mcap::records::{MessageHeader, Metadata};
 use palpate_sessions::record::SampleRow;
@@ -58,14 +59,10 @@ fn failed(path: &Path) -> impl Fn(mcap::McapError) -> ExportError {
 }
 
 struct MessageWriter<'a, W: Write + Seek> {
-    table: &'a TableExport<'a>,
     container: mcap::Writer<W>,
     channel_id: u16,
     started_ns: u64,
-    first_tick: Option<u64>,
-    /// Samples seen so far, those selected of them, and those written.
-    seen: u64,
-    selected: u64,
+    picker: Picker<'a>,
     written: u64,
     /// The first failure; nothing is written after it.
     failure: Option<mcap::McapError>,
@@ -98,31 +95,20 @@ impl<'a, W: Write + Seek> MessageWriter<'a, W> {
         })?;
         let started_ns = manifest.started_at.timestamp_nanos_opt().unwrap_or(0);
         Ok(Self {
-            table,
             container,
             channel_id,
             started_ns: u64::try_from(started_ns).unwrap_or(0),
-            first_tick: None,
-            seen: 0,
-            selected: 0,
+            picker: Picker::new(manifest, table.selection),
             written: 0,
             failure: None,
         })
     }
 
     fn take(&mut self, row: &SampleRow) {
-        let first_tick = *self.first_tick.get_or_insert(row.tick);
-        // As in a table: a controller that restarted counts from zero again.
-        let ticks = row.tick.wrapping_sub(first_tick) as i64;
-        let (number, t_s) = (self.seen, self.table.manifest.time_of(ticks).0);
-        self.seen += 1;
-        if self.failure.is_some() || !self.table.selection.takes(t_s, row) {
-            return;
-        }
-        if self.selected.is_multiple_of(self.table.selection.step()) {
+        let picked = self.picker.pick(row).filter(|_| self.failure.is_none());
+        if let Some((number, t_s)) = picked {
             self.failure = self.put(number, t_s, row).err();
         }
-        self.selected += 1;
     }
 
     fn put(&mut self, sample: u64, t_s: f64, row: &SampleRow) -> mcap::McapResult<()> {

@@ -3,6 +3,7 @@
 pub(crate) mod atomic;
 mod columns;
 mod dictionary;
+mod documents;
 mod encode;
 mod formula;
 mod memory;
@@ -14,6 +15,7 @@ mod select;
 pub use atomic::WriteOutcome;
 pub use columns::ExtraColumns;
 pub use dictionary::dictionary_path;
+pub use documents::LogFacts;
 pub(crate) use encode::Encoder;
 pub use encode::TableFormat;
 pub use formula::escape_formula;

@@ -1,6 +1,8 @@
 //! Selection of samples and columns.
 
+use super::columns::time_of;
 use palpate_model::rig::Phase;
+use palpate_sessions::manifest::Manifest;
 use palpate_sessions::record::SampleRow;
 use serde::Serialize;
 
@@ -89,5 +91,38 @@ impl SampleSelection {
             true => "All samples of the session.".into(),
             false => format!("A part of the session: {}.", parts.join("; ")),
         }
+    }
+}
+
+/// Selects samples that pass by one at a time.
+pub(super) struct Picker<'a> {
+    manifest: &'a Manifest,
+    selection: &'a SampleSelection,
+    first_tick: Option<u64>,
+    /// Samples seen so far, and those selected of them before [`SampleSelection::every`].
+    seen: u64,
+    selected: u64,
+}
+
+impl<'a> Picker<'a> {
+    pub const fn new(manifest: &'a Manifest, selection: &'a SampleSelection) -> Self {
+        Self { manifest, selection, first_tick: None, seen: 0, selected: 0 }
+    }
+
+    pub const fn seen(&self) -> u64 {
+        self.seen
+    }
+
+    /// The number of the next sample and its time in s, if it is selected.
+    pub fn pick(&mut self, row: &SampleRow) -> Option<(u64, f64)> {
+        let first_tick = *self.first_tick.get_or_insert(row.tick);
+        let (number, t_s) = (self.seen, time_of(self.manifest, row, first_tick));
+        self.seen += 1;
+        if !self.selection.takes(t_s, row) {
+            return None;
+        }
+        let is_picked = self.selected.is_multiple_of(self.selection.step());
+        self.selected += 1;
+        is_picked.then_some((number, t_s))
     }
 }

@@ -26,4 +26,5 @@ pub use fits::{
 };
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
 pub use read::{LakeError, LakeSession, list_sessions, read_manifest, read_session};
+pub(crate) use write::kind_name;
 pub use write::{LakeAddition, LakeQuality, add_session};

@@ -98,7 +98,7 @@ fn write_bytes(path: &Path, bytes: &[u8]) -> Result<WriteOutcome, ExportError> {
 }
 
 /// The name of a kind of entry.
-pub(super) const fn kind_name(kind: EntryKind) -> &'static str {
+pub(crate) const fn kind_name(kind: EntryKind) -> &'static str {
     match kind {
         EntryKind::Input => "input",
         EntryKind::Decision => "decision",
