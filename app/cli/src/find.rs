@@ -135,7 +135,7 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     doubts.iter().for_each(|doubt| output.note(doubt));
     let pages = found.count.div_ceil(limit);
     let object = serde_json::json!({
-        "library": library, "count": found.count, "page": page, "pages": pages,
+        "library": library, "count": found.count, "has_more": found.has_more, "page": page, "pages": pages,
         "sessions": found.entries,
     });
     output.answer("find", &object, || report::list(&found, page, pages));

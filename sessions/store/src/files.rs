@@ -194,7 +194,7 @@ struct StoredPiece {
 }
 
 /// A session whose files are to be stored.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct LocalFiles {
     pub session_id: String,
     pub files: Vec<LocalFile>,

@@ -10,6 +10,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use object_store::ObjectStoreExt;
 use palpate_sessions::catalog::LocalSession;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Sessions in one change of the table. More at once are fewer files of rows; fewer are sooner in the table.
@@ -100,9 +101,9 @@ impl Store {
     ) -> Result<PushOutcome, StoreError> {
         self.wait(self.probe(now()))?;
         self.wait(self.ensure_table(now()))?;
-        mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
+        mirror.update(self, &mut |_, _| ControlFlow::Continue(()))?;
         let mut outcome = PushOutcome::default();
-        for (batch, sessions_before) in sessions.chunks(BATCH).zip((0..).step_by(BATCH)) {
+        for (batch, first) in sessions.chunks(BATCH).zip((0..).step_by(BATCH)) {
             let mut chosen = Vec::new();
             for local in batch {
                 let folder = library.join(&local.entry.folder);
@@ -111,34 +112,43 @@ impl Store {
                     chosen.push((folder, local, LocalFiles { session_id, files }));
                 }
             }
-            let before = sessions_before + batch.len() - chosen.len();
-            let mut is_ended = hear(before, sessions.len()).is_break();
-            let files: Vec<LocalFiles> = chosen.iter().map(|(_, _, files)| files.clone()).collect();
-            let mut hear_of_batch = |done| {
-                let flow = hear(before + done, sessions.len());
+            let known = first + batch.len() - chosen.len();
+            let mut is_ended = hear(known, sessions.len()).is_break();
+            let mut hear_batch = |done| {
+                let flow = hear(known + done, sessions.len());
                 is_ended |= flow.is_break();
                 flow
             };
-            let put = self.wait(self.put_sessions(&files, &mut hear_of_batch))?;
-            let mut stored = Vec::new();
-            for ((folder, local, _), StoredFiles { list, content, sent }) in
-                chosen.into_iter().zip(put)
-            {
-                outcome.bytes += sent;
-                if local.is_unchanged(&folder) {
-                    stored.push(Stored { folder, local, list, content });
-                } else {
-                    let reason = "it changed while it was read; push it once more".into();
-                    let session = local.entry.folder.clone();
-                    outcome.refused.push(PushRefusal { session, reason });
-                }
-            }
+            let stored = self.put_chosen(chosen, &mut hear_batch, &mut outcome)?;
             self.list(mirror, stored, now, &mut outcome)?;
             if is_ended {
                 return Err(StoreError::Ended);
             }
         }
         Ok(outcome)
+    }
+
+    /// Stores the files of sessions, all or until `hear` breaks.
+    fn put_chosen<'a>(
+        &self,
+        chosen: Vec<(PathBuf, &'a LocalSession, LocalFiles)>,
+        hear: &mut dyn FnMut(usize) -> ControlFlow<()>,
+        outcome: &mut PushOutcome,
+    ) -> Result<Vec<Stored<'a>>, StoreError> {
+        let (places, files): (Vec<_>, Vec<_>) =
+            chosen.into_iter().map(|(folder, local, files)| ((folder, local), files)).unzip();
+        let put = self.wait(self.put_sessions(&files, hear))?;
+        let mut stored = Vec::new();
+        for ((folder, local), StoredFiles { list, content, sent }) in places.into_iter().zip(put) {
+            outcome.bytes += sent;
+            if local.is_unchanged(&folder) {
+                stored.push(Stored { folder, local, list, content });
+            } else {
+                let reason = "it changed while it was read; push it once more".into();
+                outcome.refused.push(PushRefusal { session: local.entry.folder.clone(), reason });
+            }
+        }
+        Ok(stored)
     }
 
     /// Makes the table, unless there is one.
@@ -182,7 +192,7 @@ impl Store {
                 let version = table.version + 1;
                 self.wait(self.add_rows(version, &table.schema, &rows, at))?
             };
-            mirror.update(self, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
+            mirror.update(self, &mut |_, _| ControlFlow::Continue(()))?;
             if is_there {
                 let is_refused = |one: &&Stored<'_>| {
                     refused.iter().any(|refusal| refusal.session == one.local.entry.folder)

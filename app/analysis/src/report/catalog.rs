@@ -11,10 +11,13 @@ pub fn list(found: &CatalogPage, page: usize, pages: usize) -> String {
     }
     let head = "started | specimen | operator | protocol | length | verdict | review | folder";
     let sessions = if found.count == 1 { "session" } else { "sessions" };
-    let mut text =
-        format!("{}\n{} {sessions}", table(head, found.entries.iter().map(line)), found.count);
-    if pages > 1 {
-        text += &format!(", page {page} of {pages}");
+    let more = if found.has_more { "more than " } else { "" };
+    let listed = table(head, found.entries.iter().map(line));
+    let mut text = format!("{listed}\n{more}{} {sessions}", found.count);
+    match (found.has_more, pages > 1) {
+        (true, _) => text += &format!(", page {page}"),
+        (false, true) => text += &format!(", page {page} of {pages}"),
+        (false, false) => {}
     }
     text
 }
