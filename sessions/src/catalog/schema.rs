@@ -85,8 +85,8 @@ CREATE TABLE pushed (
 CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3', content = '', contentless_delete = 1);
 ";
 
-/// Pages that SQLite keeps, in KiB by its sign. With its own 2 MB the indices of many sessions are written again and again.
-const CACHE_KIB: i64 = -64 * 1024;
+/// Storage for pages that SQLite keeps, 64 MB; negative, because it is not a number of pages. With SQLite's own 2 MB the indices of many sessions are written again and again.
+const CACHE: i64 = -64 * 1024;
 
 /// Creates the tables of a new file, all or none.
 pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
@@ -102,7 +102,7 @@ pub(super) fn create(db: &mut Connection) -> rusqlite::Result<()> {
 pub(super) fn prepare(db: &Connection) -> rusqlite::Result<()> {
     // With a write-ahead log a power cut can lose the last changes but not the file.
     db.pragma_update(None, "synchronous", "normal")?;
-    db.pragma_update(None, "cache_size", CACHE_KIB)
+    db.pragma_update(None, "cache_size", CACHE)
 }
 
 /// All rows of a statement.

@@ -236,12 +236,15 @@ impl Criterion {
              SELECT id FROM session WHERE plan IN (SELECT -owner FROM named WHERE {sql} AND owner < 0)"
         );
         let test = format!(
-            "EXISTS (SELECT 1 FROM named INDEXED BY named_owner WHERE owner IN (session.id, -session.plan) AND {sql})"
+            "EXISTS (SELECT 1 FROM named INDEXED BY {OWNER_INDEX} WHERE owner IN (session.id, -session.plan) AND {sql})"
         );
         let both = [values.clone(), values.clone()].concat();
         Self { set: Some((set, both)), test: (test, values), is_words: false }
     }
 }
+
+/// The index by which a session's own values are looked up; SQLite would take the one by names, in which those of all sessions are.
+const OWNER_INDEX: &str = "named_owner";
 
 /// A statement and its values.
 #[derive(Default)]
