@@ -14,6 +14,16 @@ SERVERS = ["moto[s3,server]==5.2.5", "ministack==1.5.33", "boto3"]
 KEYS = {"AWS_ACCESS_KEY_ID": "lab", "AWS_SECRET_ACCESS_KEY": "laboratory", "AWS_REGION": "us-east-1", "AWS_ALLOW_HTTP": "true"}
 
 
+# With the threads of its own command, moto's look at a name and its writing are two steps: now and then two writers at once both
+# succeed. With one thread they are one.
+MOTO = """
+import sys
+from moto.server import DomainDispatcherApplication, create_backend_app
+from werkzeug.serving import run_simple
+run_simple("127.0.0.1", int(sys.argv[1]), DomainDispatcherApplication(create_backend_app), threaded=False)
+"""
+
+
 def python(*more):
     """An interpreter that has them."""
     found = program.CACHE / "store" / "bin" / "python3"
@@ -43,7 +53,7 @@ class Server:
         self.environment = {**KEYS, "AWS_ENDPOINT": endpoint, "AWS_ENDPOINT_URL": endpoint}
         surroundings = dict(os.environ)
         if kind == "moto":
-            command = [python.parent / "moto_server", "-H", "127.0.0.1", "-p", str(port)]
+            command = [python, "-c", MOTO, str(port)]
         elif kind == "ministack":
             command = [python, "-m", "ministack"]
             surroundings.update(GATEWAY_PORT=str(port), SERVICES="s3")

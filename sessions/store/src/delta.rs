@@ -224,7 +224,13 @@ impl Store {
         actions: &[Action],
     ) -> Result<bool, StoreError> {
         let lines = actions.iter().map(|action| json!(action).to_string() + "\n");
-        self.put_new(&commit_path(version), Bytes::from(lines.collect::<String>())).await
+        let (path, bytes) = (commit_path(version), Bytes::from(lines.collect::<String>()));
+        let is_first = self.put_new(&path, bytes.clone()).await?;
+        // A store whose look at a name and whose writing are two steps may pass the probe and overwrite a change all the same.
+        if is_first && self.read(&path).await?.is_none_or(|kept| kept != bytes) {
+            return Err(self.unconditional());
+        }
+        Ok(is_first)
     }
 
     /// The change of a version; none where there is none yet.

@@ -107,6 +107,10 @@ impl Store {
         StoreError::NoTable { url: self.url.as_str().to_owned() }
     }
 
+    pub(crate) fn unconditional(&self) -> StoreError {
+        StoreError::Unconditional { url: self.url.as_str().to_owned() }
+    }
+
     #[must_use]
     pub fn url(&self) -> &StoreUrl {
         &self.url

@@ -39,7 +39,7 @@ impl Store {
         };
         match is_kept {
             true => Ok(()),
-            false => Err(StoreError::Unconditional { url: self.url.as_str().to_owned() }),
+            false => Err(self.unconditional()),
         }
     }
 }
