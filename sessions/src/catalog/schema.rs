@@ -85,7 +85,8 @@ CREATE TABLE pushed (
 CREATE VIRTUAL TABLE words USING fts5 (text, specimen, operator, protocol, rig, cell, tag, tokenize = 'unicode61', prefix = '2 3', content = '', contentless_delete = 1);
 ";
 
-/// Storage for pages that SQLite keeps, 64 MB; negative, because it is not a number of pages. With SQLite's own 2 MB the indices of many sessions are written again and again.
+/// Storage for pages that SQLite keeps, 64 MB; negative, because it is not a number of pages. With SQLite's own 2 MB the indices
+/// of many sessions are written again and again.
 const CACHE: i64 = -64 * 1024;
 
 /// Creates the tables of a new file, all or none.

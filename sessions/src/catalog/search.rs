@@ -190,43 +190,40 @@ struct Criterion {
 }
 
 impl Criterion {
+    /// A criterion of one value.
+    fn of_value(set: Option<&str>, test: &str, value: &str) -> Self {
+        let with_value = |sql: &str| (sql.to_owned(), vec![Sql::from(value.to_owned())]);
+        Self { set: set.map(with_value), test: with_value(test), is_words: false }
+    }
+
     /// A criterion on a column, which has an index or none.
     fn column(name: &str, value: &str, has_index: bool) -> Self {
-        let values = || vec![Sql::from(value.to_owned())];
-        Self {
-            set: has_index.then(|| (format!("SELECT id FROM session WHERE {name} = ?"), values())),
-            // The sign keeps SQLite from the index.
-            test: (format!("+session.{name} = ?"), values()),
-            is_words: false,
-        }
+        let set = format!("SELECT id FROM session WHERE {name} = ?");
+        // The sign keeps SQLite from the index.
+        Self::of_value(has_index.then_some(&set), &format!("+session.{name} = ?"), value)
     }
 
     /// A bound of the start, inclusive from below and exclusive from above.
     fn start(sign: &str, at: DateTime<Utc>) -> Self {
-        let id = at.timestamp_millis().saturating_mul(IDS);
+        let ms = at.timestamp_millis();
+        // The identifier bounds the search alone: it is not that of the start for sessions before 1970.
+        let id = (ms.max(0) + i64::from(sign == "<")).saturating_mul(IDS);
         // A session that cannot be read has start 0.
-        let test = format!("session.id {sign} ? AND session.started_ms <> 0");
-        Self { set: None, test: (test, vec![id.into()]), is_words: false }
+        let test = format!(
+            "session.id {sign} ? AND session.started_ms {sign} ? AND session.started_ms <> 0"
+        );
+        Self { set: None, test: (test, vec![id.into(), ms.into()]), is_words: false }
     }
 
     fn tag(tag: &str) -> Self {
-        let values = || vec![Sql::from(tag.to_owned())];
         let test = "EXISTS (SELECT 1 FROM tag WHERE tag.session = session.id AND tag.tag = ?)";
-        Self {
-            set: Some(("SELECT session AS id FROM tag WHERE tag = ?".into(), values())),
-            test: (test.into(), values()),
-            is_words: false,
-        }
+        Self::of_value(Some("SELECT session AS id FROM tag WHERE tag = ?"), test, tag)
     }
 
     fn words(matches: &str) -> Self {
-        let values = || vec![Sql::from(matches.to_owned())];
+        let set = "SELECT rowid AS id FROM words WHERE words MATCH ?";
         let test = "EXISTS (SELECT 1 FROM words WHERE words MATCH ? AND words.rowid = session.id)";
-        Self {
-            set: Some(("SELECT rowid AS id FROM words WHERE words MATCH ?".into(), values())),
-            test: (test.into(), values()),
-            is_words: true,
-        }
+        Self { is_words: true, ..Self::of_value(Some(set), test, matches) }
     }
 
     fn condition(condition: &Condition) -> Self {
@@ -366,6 +363,9 @@ impl CatalogQuery {
     }
 }
 
+/// Sessions that the pages of a search reach: more than any catalog has, and a number that SQLite can count to.
+const PAGED: usize = u32::MAX as usize;
+
 /// Sessions that a search counts; where more meet the query, the page says so.
 const COUNTED: usize = 10_000;
 
@@ -386,7 +386,8 @@ impl Catalog {
             let state = self.db.unchecked_transaction()?;
             let (mut ids, most) = match query.limit {
                 Some(limit) if query.order == CatalogOrder::Started => {
-                    let most = counted.max(query.skip.saturating_add(limit));
+                    let page_end = query.skip.saturating_add(limit);
+                    let most = counted.max(page_end).min(PAGED);
                     (query.first(&state, most)?, most)
                 }
                 _ => (query.all("session.id").read(&state)?, usize::MAX),
@@ -460,7 +461,11 @@ impl Catalog {
             let name = condition.name();
             let mut values = Vec::new();
             let sql = condition.sql_of_names(&mut values);
-            let sql = format!("SELECT DISTINCT unit FROM named WHERE {sql} ORDER BY unit");
+            // Plans whose sessions were all deleted are still there.
+            let sql = format!(
+                "SELECT DISTINCT unit FROM named WHERE {sql}
+                 AND (owner > 0 OR -owner IN (SELECT plan FROM session)) ORDER BY unit"
+            );
             let present = self.names(&sql, &values)?;
             let units = condition.units();
             let is_fit = |unit: &String| {

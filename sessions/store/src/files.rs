@@ -145,7 +145,8 @@ impl StoredFile {
                 return Ok(false);
             }
         }
-        Ok(true)
+        // A list whose pieces are fewer than its bytes says nothing of the rest.
+        Ok(file.limit() == 0)
     }
 }
 
@@ -367,6 +368,11 @@ mod tests {
         write("edits.jsonl.head", "2");
         write("analyses.jsonl", "{}\n");
         assert_eq!(list.first_not_continued(folder.path()).unwrap(), None);
+        let mut short = list.clone();
+        for file in &mut short.files {
+            file.pieces.clear();
+        }
+        assert_eq!(short.first_not_continued(folder.path()).unwrap().unwrap(), "000.mcap");
         write("edits.jsonl", "[]\n{}\n");
         assert_eq!(list.first_not_continued(folder.path()).unwrap().unwrap(), "edits.jsonl");
         write("000.mcap", "log and more");

@@ -359,6 +359,31 @@ fn every_search_finds_what_a_plain_scan_finds() {
 }
 
 #[test]
+fn sessions_before_1970_and_pages_after_the_last_are_found_as_any() {
+    let library = tempfile::tempdir().unwrap();
+    let mut random = Random(3);
+    let new_year = |year| Utc.with_ymd_and_hms(year, 1, 1, 0, 0, 0).unwrap();
+    for year in [1965, 1969, 1970, 2026] {
+        let started_at = new_year(year) + Duration::hours(1);
+        let manifest = Manifest { started_at, ..random_manifest(&mut random) };
+        write_session(&library.path().join(format!("sessions/{year}")), &manifest, 150, true);
+    }
+    let catalog = updated(library.path());
+    let found = |since, before, skip| {
+        let (since, before) = (Some(new_year(since)), Some(new_year(before)));
+        let query =
+            CatalogQuery { since, before, skip, limit: Some(20), ..CatalogQuery::default() };
+        let page = catalog.find(&query).unwrap();
+        (page.count, page.entries.len())
+    };
+    assert_eq!(found(1960, 1966, 0), (1, 1));
+    assert_eq!(found(1966, 1970, 0), (1, 1));
+    assert_eq!(found(1966, 2026, 0), (2, 2));
+    assert_eq!(found(1960, 2027, 0), (4, 4));
+    assert_eq!(found(1970, 2027, usize::MAX), (2, 0));
+}
+
+#[test]
 fn pages_and_orders_make_up_the_whole() {
     let library = library(30, 9);
     let catalog = updated(library.path());

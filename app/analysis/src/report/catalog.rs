@@ -86,3 +86,19 @@ pub fn history(events: &[HistoryEvent]) -> String {
 pub fn one_line(text: &str) -> String {
     text.trim().chars().map(|letter| if letter.is_control() { ' ' } else { letter }).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_that_were_not_counted_are_said_to_be_there() {
+        let found = |count, has_more| {
+            let entries = vec![CatalogEntry::default()];
+            let text = list(&CatalogPage { count, has_more, entries }, 2, 500);
+            text.lines().last().unwrap_or_default().to_owned()
+        };
+        assert_eq!(found(10_000, true), "more than 10000 sessions, page 2");
+        assert_eq!(found(10_000, false), "10000 sessions, page 2 of 500");
+    }
+}
