@@ -1,9 +1,8 @@
 //! Checkpoints: the whole state of the table in one Parquet file, so that a reader needs only the changes after it.
 
-use crate::delta::{Action, table_path};
-use crate::delta::{Add, Metadata, Protocol, Snapshot, check_actions, log_folder};
+use crate::delta::{Action, Add, Metadata, Protocol, Snapshot, check_actions};
 use crate::error::StoreError;
-use crate::location::Store;
+use crate::table::Table;
 use bytes::Bytes;
 use object_store::path::Path;
 use object_store::{ObjectStoreExt, PutPayload};
@@ -41,47 +40,45 @@ struct LastCheckpoint {
     size: u64,
 }
 
-fn last_path() -> Path {
-    table_path("_delta_log/_last_checkpoint")
-}
+impl Table<'_> {
+    fn last_path(self) -> Path {
+        self.path("_delta_log/_last_checkpoint")
+    }
 
-fn checkpoint_path(version: u64) -> Path {
-    table_path(&format!("_delta_log/{version:020}.checkpoint.parquet"))
-}
+    fn checkpoint_path(self, version: u64) -> Path {
+        self.path(&format!("_delta_log/{version:020}.checkpoint.parquet"))
+    }
 
-impl Store {
     /// Writes the state of the table as a checkpoint, and then its number where readers look for it.
-    pub(crate) async fn write_checkpoint(&self, snapshot: &Snapshot) -> Result<(), StoreError> {
-        let path = checkpoint_path(snapshot.version);
+    pub(crate) async fn write_checkpoint(self, snapshot: &Snapshot) -> Result<(), StoreError> {
+        let path = self.checkpoint_path(snapshot.version);
         let bytes = encode(snapshot).map_err(|err| StoreError::bad(&path, err))?;
         // All writers of a version's checkpoint write the same state.
-        self.put_new(&path, bytes.into()).await?;
+        self.store.put_new(&path, bytes.into()).await?;
         let last =
             LastCheckpoint { version: snapshot.version, size: snapshot.parts.len() as u64 + 2 };
         let last = PutPayload::from(serde_json::to_vec(&last).unwrap_or_default());
-        let path = last_path();
-        self.objects.put(&path, last).await.map(drop).map_err(StoreError::object(&path))
+        let path = self.last_path();
+        self.store.objects.put(&path, last).await.map(drop).map_err(StoreError::object(&path))
     }
 
     /// The newest checkpoint; none where there is none. Where two writers wrote its number in turn, it may be an older one,
     /// which is as right.
-    pub(crate) async fn read_checkpoint(&self) -> Result<Option<Snapshot>, StoreError> {
-        let Some(last) = self.read(&last_path()).await? else { return Ok(None) };
+    pub(crate) async fn read_checkpoint(self) -> Result<Option<Snapshot>, StoreError> {
+        let Some(last) = self.store.read(&self.last_path()).await? else { return Ok(None) };
         let last: LastCheckpoint =
-            serde_json::from_slice(&last).map_err(|err| StoreError::bad(&last_path(), err))?;
-        let path = checkpoint_path(last.version);
+            serde_json::from_slice(&last).map_err(|err| StoreError::bad(&self.last_path(), err))?;
+        let path = self.checkpoint_path(last.version);
         let missing = || StoreError::bad(&path, "it is missing");
-        let bytes = self.read(&path).await?.ok_or_else(missing)?;
+        let bytes = self.store.read(&path).await?.ok_or_else(missing)?;
         let found = decode(last.version, &bytes).map_err(|err| StoreError::bad(&path, err))?;
         let described = Action {
             protocol: found.protocol.clone(),
             meta_data: found.metadata.clone(),
             ..Action::default()
         };
-        check_actions(&[described])?;
-        found
-            .metadata()
-            .map_err(|_| StoreError::bad(&log_folder(), "a checkpoint has no table"))?;
+        check_actions(&self.log_folder(), &[described])?;
+        found.metadata(&path)?;
         Ok(Some(found))
     }
 }
@@ -360,7 +357,10 @@ mod tests {
     fn a_checkpoint_is_the_state() {
         let now = chrono::DateTime::from_timestamp(1_700_000_000, 0).unwrap();
         let mut snapshot = Snapshot::default();
-        snapshot.apply(&Commit { version: 0, actions: first_actions("s3://lab", "{}", now) });
+        snapshot.apply(&Commit {
+            version: 0,
+            actions: first_actions(("s3://lab", "sessions"), "{}", now),
+        });
         for parts in 0..3 {
             let found = decode(7, &encode(&snapshot).unwrap().into()).unwrap();
             assert_eq!(found.version, 7);

@@ -1,9 +1,10 @@
 //! Compaction: many small files of rows become one, so that a reader opens few. No row changes and no object is deleted.
 
-use crate::delta::{Action, Add, Remove, Snapshot, commit_info, table_path};
+use crate::delta::{Action, Add, Remove, Snapshot, commit_info};
 use crate::error::StoreError;
 use crate::location::{REQUESTS, Store};
-use crate::rows::{merged, row_count};
+use crate::part::{merged, row_count};
+use crate::table::Table;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
 use futures_util::stream::{self, StreamExt, TryStreamExt};
@@ -28,28 +29,46 @@ pub struct Compaction {
 }
 
 impl Store {
-    /// Joins small files of rows and writes a checkpoint.
+    /// Joins small files of rows of every table and writes checkpoints.
     pub fn compact(&self, now: fn() -> DateTime<Utc>) -> Result<Compaction, StoreError> {
         self.wait(async {
             self.probe(now()).await?;
-            for _ in 0..TRIES_MAX {
-                let snapshot = self.snapshot().await?;
-                let mut snapshot = snapshot.ok_or_else(|| self.no_table())?;
-                let before = snapshot.parts.len();
-                let rows = snapshot.parts.values().map(row_count).sum();
-                let is_done = self.join_small(&mut snapshot, now()).await?;
-                if is_done {
-                    self.write_checkpoint(&snapshot).await?;
-                    return Ok(Compaction { before, after: snapshot.parts.len(), rows });
-                }
+            let mut all = Compaction::default();
+            for table in self.tables() {
+                let Compaction { before, after, rows } = table.compact(now).await?;
+                all.before += before;
+                all.after += after;
+                all.rows += rows;
             }
-            Err(StoreError::Crowded { tries: TRIES_MAX })
+            match all.before {
+                0 => Err(self.no_table()),
+                _ => Ok(all),
+            }
         })
+    }
+}
+
+impl Table<'_> {
+    /// Nothing where there is no table.
+    async fn compact(self, now: fn() -> DateTime<Utc>) -> Result<Compaction, StoreError> {
+        for _ in 0..TRIES_MAX {
+            let Some(mut snapshot) = self.snapshot().await? else {
+                return Ok(Compaction::default());
+            };
+            let before = snapshot.parts.len();
+            let rows = snapshot.parts.values().map(row_count).sum();
+            let is_done = self.join_small(&mut snapshot, now()).await?;
+            if is_done {
+                self.write_checkpoint(&snapshot).await?;
+                return Ok(Compaction { before, after: snapshot.parts.len(), rows });
+            }
+        }
+        Err(StoreError::Crowded { tries: TRIES_MAX })
     }
 
     /// One change that puts the rows of small files into few; `false` where another writer was faster.
     async fn join_small(
-        &self,
+        self,
         snapshot: &mut Snapshot,
         now: DateTime<Utc>,
     ) -> Result<bool, StoreError> {
@@ -60,9 +79,9 @@ impl Store {
         let mut actions = vec![commit_info("OPTIMIZE", now)];
         let mut written = Vec::new();
         for group in &groups {
-            let part = merged(&self.read_group(group).await?, now)?;
-            let path = part.path();
-            self.put_new(&path, part.bytes).await?;
+            let part = merged(self.shape, &self.read_group(group).await?, now)?;
+            let path = self.path(&part.add.path);
+            self.store.put_new(&path, part.bytes).await?;
             actions.extend(group.iter().map(|add| Action::from(removal(add, now))));
             written.push((path, part.add.path.clone()));
             actions.push(part.add.into());
@@ -76,15 +95,15 @@ impl Store {
         }
         for (path, _) in &written {
             // Nothing names these rows.
-            let _ = self.objects.delete(path).await;
+            let _ = self.store.objects.delete(path).await;
         }
         Ok(false)
     }
 
-    async fn read_group(&self, group: &[Add]) -> Result<Vec<(Path, Bytes)>, StoreError> {
+    async fn read_group(self, group: &[Add]) -> Result<Vec<(Path, Bytes)>, StoreError> {
         let read = stream::iter(group).map(|add| async {
-            let path = table_path(&add.path);
-            let bytes = self.read(&path).await?;
+            let path = self.path(&add.path);
+            let bytes = self.store.read(&path).await?;
             let bytes = bytes.ok_or_else(|| StoreError::bad(&path, "it is missing"))?;
             Ok((path, bytes))
         });

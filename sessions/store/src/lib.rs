@@ -1,9 +1,10 @@
 //! A library in an object store: rigs push finished sessions, everyone reads one table of them, and no server of ours runs.
 //!
 //! ```text
-//! objects/ab/cdef...                       pieces of files and lists of files, each named by the SHA-256 of its bytes
+//! objects/ab/cdef...                       pieces of files, lists of files and results, each named by the SHA-256 of its bytes
 //! sessions/_delta_log/00000000000000000000.json   one change of the table of sessions
 //! sessions/part-....parquet                rows: one of every version of every session
+//! fits/, moduli/, populations/             tables of results: a row for each number
 //! ```
 //!
 //! An object never changes and is never deleted. A version of a session is in the table only once all of its objects are
@@ -20,10 +21,13 @@ mod error;
 mod files;
 mod location;
 mod mirror;
+mod part;
 mod probe;
 mod pull;
 mod push;
+mod results;
 mod rows;
+mod table;
 #[cfg(test)]
 mod tests;
 mod verify;
@@ -34,5 +38,6 @@ pub use location::{Store, StoreUrl, is_store_url};
 pub use mirror::Mirror;
 pub use pull::Pulled;
 pub use push::{PushOutcome, PushRefusal};
+pub use results::{ResultNumber, ResultTable, ResultsOutcome, StudyResult};
 pub use rows::STORE_VERSION;
 pub use verify::StoreFault;

@@ -1,6 +1,6 @@
 //! The catalog of a store on this computer's disk. It follows the table by its changes, so that a search needs no store.
 
-use crate::delta::{Add, Commit, Snapshot, table_path};
+use crate::delta::{Add, Commit, Snapshot};
 use crate::error::StoreError;
 use crate::location::{REQUESTS, Store};
 use crate::rows::{SessionRow, rows_of};
@@ -79,12 +79,12 @@ impl Change {
     ) -> Result<Option<Self>, StoreError> {
         let Some(known) = known else { return Self::whole(store).await.map(Some) };
         // Another table may have been made at the same place.
-        let first = store.read_commit(0).await?;
+        let first = store.sessions().read_commit(0).await?;
         let is_same = first.is_some_and(|first| id_of(&first) == Some(&known.id));
         if !is_same {
             return Self::whole(store).await.map(Some);
         }
-        let commits = store.commits_from(known.version + 1).await?;
+        let commits = store.sessions().commits_from(known.version + 1).await?;
         let Some(last) = commits.last() else { return Ok(None) };
         let actions = || commits.iter().flat_map(|commit| &commit.actions);
         let removes = actions().any(|one| one.remove.as_ref().is_some_and(|one| one.data_change));
@@ -103,8 +103,8 @@ impl Change {
     }
 
     async fn whole(store: &Store) -> Result<Self, StoreError> {
-        let snapshot = store.snapshot().await?.ok_or_else(|| store.no_table())?;
-        let metadata = snapshot.metadata()?;
+        let snapshot = store.sessions().snapshot().await?.ok_or_else(|| store.no_table())?;
+        let metadata = snapshot.metadata(&store.sessions().log_folder())?;
         let (id, schema) = (metadata.id.clone(), metadata.schema_string.clone());
         let now = MirroredTable { id, version: snapshot.version, schema };
         let Snapshot { parts, .. } = snapshot;
@@ -123,7 +123,7 @@ fn rows_of_parts<'a>(
     hear: Hear<'a>,
 ) -> impl Iterator<Item = Result<SessionRow, StoreError>> + use<'a> {
     let fetched = stream::iter(parts).map(|part| async {
-        let path = table_path(&part.path);
+        let path = store.sessions().path(&part.path);
         let missing = || StoreError::bad(&path, "it is missing");
         let bytes = store.read(&path).await?.ok_or_else(missing)?;
         Ok((path, bytes))

@@ -1,13 +1,11 @@
 //! Pushing sessions: their objects first, then one change of the table for several sessions.
 
-use crate::delta::{Action, Metadata, commit_info, first_actions};
 use crate::error::StoreError;
 use crate::files::{FileList, FolderFault, LocalFile, LocalFiles, StoredFiles, local_files};
 use crate::location::Store;
 use crate::mirror::{Hear, Mirror};
-use crate::rows::{SessionRow, part, schema_with};
+use crate::rows::{SessionRow, part};
 use chrono::{DateTime, SecondsFormat, Utc};
-use object_store::ObjectStoreExt;
 use palpate_sessions::catalog::LocalSession;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -16,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Sessions in one change of the table. More at once are fewer files of rows; fewer are sooner in the table.
 const BATCH: usize = 64;
 /// How often another writer may be faster before a push gives up: with sixteen writers each is first in time.
-const TRIES_MAX: usize = 200;
+pub(crate) const TRIES_MAX: usize = 200;
 
 /// Why a session was not pushed, although it could be.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -100,7 +98,7 @@ impl Store {
         hear: Hear<'_>,
     ) -> Result<PushOutcome, StoreError> {
         self.wait(self.probe(now()))?;
-        self.wait(self.ensure_table(now()))?;
+        self.wait(self.sessions().ensure(now()))?;
         mirror.update(self, &mut |_, _| ControlFlow::Continue(()))?;
         let mut outcome = PushOutcome::default();
         for (batch, first) in sessions.chunks(BATCH).zip((0..).step_by(BATCH)) {
@@ -151,14 +149,6 @@ impl Store {
         Ok(stored)
     }
 
-    /// Makes the table, unless there is one.
-    pub(crate) async fn ensure_table(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
-        if self.read_commit(0).await?.is_none() {
-            self.commit(0, &first_actions(self.url.as_str(), &schema_with(None).0, now)).await?;
-        }
-        Ok(())
-    }
-
     /// Writes the rows of sessions whose files are stored. Of several writers one is first; the others read what it wrote.
     fn list(
         &self,
@@ -169,7 +159,7 @@ impl Store {
     ) -> Result<(), StoreError> {
         for _ in 0..TRIES_MAX {
             let Some(table) = mirror.table()? else {
-                return Err(StoreError::bad(&crate::delta::log_folder(), "the table is gone"));
+                return Err(self.sessions().gone());
             };
             let mut rows = Vec::new();
             let (mut refused, mut known) = (Vec::new(), 0);
@@ -189,8 +179,8 @@ impl Store {
                 }
             }
             let is_there = rows.is_empty() || {
-                let version = table.version + 1;
-                self.wait(self.add_rows(version, &table.schema, &rows, at))?
+                let part = part(&rows, at)?;
+                self.wait(self.sessions().append(table.version + 1, &table.schema, part, at))?
             };
             mirror.update(self, &mut |_, _| ControlFlow::Continue(()))?;
             if is_there {
@@ -238,63 +228,5 @@ impl Store {
                 "version {version} in the store has another {file}; pull the session, and make the edits of this folder there"
             )),
         })
-    }
-
-    /// Adds rows to the table as its next version; `false` where another writer was faster.
-    async fn add_rows(
-        &self,
-        version: u64,
-        schema: &str,
-        rows: &[SessionRow],
-        now: DateTime<Utc>,
-    ) -> Result<bool, StoreError> {
-        let part = part(rows, now)?;
-        let path = part.path();
-        self.put_new(&path, part.bytes).await?;
-        let mut actions = vec![commit_info("WRITE", now)];
-        let (schema, has_more) = schema_with(Some(schema));
-        if has_more {
-            actions.push(self.with_schema(schema).await?);
-        }
-        actions.push(part.add.clone().into());
-        match self.commit(version, &actions).await {
-            Ok(true) => {
-                self.checkpoint_at(version).await;
-                Ok(true)
-            }
-            // A change whose answer was lost is sent again, and then finds its own name taken.
-            Ok(false) if self.names(version, &part.add.path).await? => Ok(true),
-            Ok(false) => {
-                // Nothing names these rows, and the next try writes its own.
-                let _ = self.objects.delete(&path).await;
-                Ok(false)
-            }
-            // The change may have arrived although its answer did not: the file of rows stays.
-            Err(err) => Err(err),
-        }
-    }
-
-    /// Whether the change of a version adds a file of rows.
-    pub(crate) async fn names(&self, version: u64, part: &str) -> Result<bool, StoreError> {
-        let commit = self.read_commit(version).await?;
-        let adds = commit.iter().flat_map(|one| &one.actions).filter_map(|one| one.add.as_ref());
-        Ok(adds.into_iter().any(|add| add.path == part))
-    }
-
-    /// The table described again, with more columns.
-    async fn with_schema(&self, schema_string: String) -> Result<Action, StoreError> {
-        let missing = || StoreError::bad(&crate::delta::log_folder(), "the table is gone");
-        let snapshot = self.snapshot().await?.ok_or_else(missing)?;
-        let metadata = Metadata { schema_string, ..snapshot.metadata()?.clone() };
-        Ok(Action { meta_data: Some(metadata), ..Action::default() })
-    }
-
-    /// Writes a checkpoint where one is due. Without it everything can be read all the same, so that its failure is no fault.
-    async fn checkpoint_at(&self, version: u64) {
-        if version.is_multiple_of(crate::checkpoint::COMMITS)
-            && let Ok(Some(snapshot)) = self.snapshot().await
-        {
-            let _ = self.write_checkpoint(&snapshot).await;
-        }
     }
 }

@@ -1,22 +1,16 @@
 //! Rows of the table of sessions: one of every version of every session.
 
-use crate::delta::{Add, table_path};
 use crate::error::StoreError;
+use crate::part::{Part, is_named, part_of, read_frame, unwritable};
+use crate::table::Shape;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
 use object_store::path::Path;
 use palpate_model::metadata::{MANIFEST_FIELDS, METADATA_KEYS, MetadataKind};
 use palpate_sessions::catalog::{CatalogEntry, NamedValueSource};
-use palpate_sessions::text::{checksum, sha256};
-use palpate_tables::export::parquet_bytes;
-use polars_core::prelude::{
-    Column, DataFrame, DataType, IntoColumn, NamedFrom, PolarsResult, Series,
-};
-use polars_core::utils::accumulate_dataframes_vertical;
-use polars_io::SerReader;
-use polars_io::parquet::read::{ParallelStrategy, ParquetReader};
-use serde_json::{Value, json};
-use std::io::Cursor;
+use palpate_sessions::text::checksum;
+use polars_core::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
+use serde_json::json;
 
 /// Version of the store's layout.
 pub const STORE_VERSION: u32 = 1;
@@ -33,6 +27,9 @@ pub(crate) struct SessionRow {
     /// What the catalog knows of the session; its folder is the session's identifier.
     pub entry: CatalogEntry,
 }
+
+/// The table of sessions.
+pub(crate) static SESSIONS: Shape = Shape { name: "sessions", columns, key: "session_id" };
 
 type Cell = fn(&SessionRow) -> Option<String>;
 type Count = fn(&SessionRow) -> i64;
@@ -93,21 +90,6 @@ fn facts() -> impl Iterator<Item = (&'static str, &'static MetadataKind)> {
     keys.map(|key| (key.name, &key.kind))
 }
 
-/// The schema of a table with the columns of `known` and those of this program, and whether there are more than before.
-pub(crate) fn schema_with(known: Option<&str>) -> (String, bool) {
-    let known = known.and_then(|text| serde_json::from_str::<Value>(text).ok());
-    let mut fields = known
-        .map_or_else(Vec::new, |known| known["fields"].as_array().cloned().unwrap_or_default());
-    let before = fields.len();
-    for (name, kind) in columns() {
-        if !fields.iter().any(|field| field["name"] == name) {
-            fields.push(json!({ "name": name, "type": kind, "nullable": true, "metadata": {} }));
-        }
-    }
-    let has_more = fields.len() > before;
-    (json!({ "type": "struct", "fields": fields }).to_string(), has_more)
-}
-
 fn fact<'a>(row: &'a SessionRow, name: &str) -> Option<&'a palpate_sessions::catalog::NamedValue> {
     let is_it = |one: &&palpate_sessions::catalog::NamedValue| {
         one.source == NamedValueSource::About && one.name == name
@@ -145,94 +127,10 @@ fn frame(rows: &[SessionRow]) -> PolarsResult<DataFrame> {
     DataFrame::new(rows.len(), all)
 }
 
-/// A file of rows that is written but not yet in the table.
-pub(crate) struct Part {
-    pub bytes: Bytes,
-    pub add: Add,
-}
-
-impl Part {
-    pub fn path(&self) -> Path {
-        table_path(&self.add.path)
-    }
-}
-
 /// The bytes of a file of rows.
 pub(crate) fn part(rows: &[SessionRow], now: DateTime<Utc>) -> Result<Part, StoreError> {
-    let frame = frame(rows).map_err(|err| StoreError::bad(&table_path("part"), err))?;
-    part_of(frame, true, now)
-}
-
-fn part_of(frame: DataFrame, data_change: bool, now: DateTime<Utc>) -> Result<Part, StoreError> {
-    let failed = |err| StoreError::bad(&table_path("part"), err);
-    let ids =
-        frame.column("session_id").and_then(|column| column.str().cloned()).map_err(failed)?;
-    let (first, last) = (ids.iter().flatten().min(), ids.iter().flatten().max());
-    let stats = json!({
-        "numRecords": frame.height(), "minValues": { "session_id": first },
-        "maxValues": { "session_id": last }, "nullCount": { "session_id": 0 },
-    });
-    let bytes = parquet_bytes(frame).map_err(failed)?;
-    let add = Add {
-        // Named by its content and time, so that no two writers share a name.
-        path: format!("part-{}-{}.parquet", now.format("%Y%m%dT%H%M%S%3fZ"), &sha256(&bytes)[..32]),
-        partition_values: std::collections::BTreeMap::new(),
-        size: count(bytes.len() as u64),
-        modification_time: now.timestamp_millis(),
-        data_change,
-        stats: Some(stats.to_string()),
-    };
-    Ok(Part { bytes: bytes.into(), add })
-}
-
-/// Number of rows of a file, by what the log says of it.
-pub(crate) fn row_count(add: &Add) -> usize {
-    let stats = add.stats.as_deref().and_then(|text| serde_json::from_str::<Value>(text).ok());
-    let count = stats.and_then(|stats| stats["numRecords"].as_u64());
-    count.and_then(|count| usize::try_from(count).ok()).unwrap_or(0)
-}
-
-/// One file of the rows of several.
-pub(crate) fn merged(parts: &[(Path, Bytes)], now: DateTime<Utc>) -> Result<Part, StoreError> {
-    let known = columns();
-    let mut frames = Vec::with_capacity(parts.len());
-    for (path, bytes) in parts {
-        let failed = |err| StoreError::bad(path, err);
-        let mut frame = read_frame(bytes, None).map_err(failed)?;
-        for (name, kind) in &known {
-            if frame.column(name).is_err() {
-                let kind = match *kind {
-                    "long" => DataType::Int64,
-                    "double" => DataType::Float64,
-                    _ => DataType::String,
-                };
-                let empty = Series::full_null((*name).into(), frame.height(), &kind);
-                frame.with_column(empty.into_column()).map_err(failed)?;
-            }
-        }
-        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-        let more =
-            frame.get_column_names().into_iter().find(|name| !names.contains(&name.as_str()));
-        if let Some(name) = more {
-            return Err(StoreError::Unknown { what: format!("the column {name}") });
-        }
-        frames.push(frame.select(names).map_err(failed)?);
-    }
-    let failed = |err| StoreError::bad(&table_path("part"), err);
-    part_of(accumulate_dataframes_vertical(frames).map_err(failed)?, false, now)
-}
-
-fn read_frame(bytes: &Bytes, columns: Option<Vec<String>>) -> PolarsResult<DataFrame> {
-    let reader = ParquetReader::new(Cursor::new(bytes)).with_columns(columns);
-    reader.read_parallel(ParallelStrategy::None).finish()
-}
-
-/// Whether a file of rows has the bytes that its name says. Another program's name says nothing.
-fn is_named(path: &Path, bytes: &Bytes) -> bool {
-    let name =
-        path.filename().and_then(|name| name.strip_prefix("part-")?.strip_suffix(".parquet"));
-    let sum = name.and_then(|name| name.rsplit_once('Z')?.1.strip_prefix('-'));
-    sum.is_none_or(|sum| sha256(bytes).starts_with(sum))
+    let frame = frame(rows).map_err(unwritable(&SESSIONS))?;
+    part_of(&SESSIONS, frame, true, now)
 }
 
 /// The rows of a file, each read when its turn comes.

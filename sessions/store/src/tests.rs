@@ -1,10 +1,10 @@
 //! A store under writers that race, connections that break and bytes that flip.
 
 mod many;
+mod results;
 
-use crate::delta::{commit_path, table_path};
 use crate::files::object_path;
-use crate::rows::row_count;
+use crate::part::row_count;
 use crate::{Mirror, PushOutcome, Store, StoreError, StoreUrl};
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
@@ -366,10 +366,10 @@ fn of_racing_writers_every_session_is_listed_once() {
     // The checkpoint says the same as all changes.
     let whole = rig.store.wait(async {
         let mut whole = crate::delta::Snapshot::default();
-        for commit in rig.store.commits_from(0).await.unwrap() {
+        for commit in rig.store.sessions().commits_from(0).await.unwrap() {
             whole.apply(&commit);
         }
-        let known = rig.store.read_checkpoint().await.unwrap().unwrap();
+        let known = rig.store.sessions().read_checkpoint().await.unwrap().unwrap();
         assert_eq!(known.parts, whole.parts);
         assert_eq!(known.metadata, whole.metadata);
         whole
@@ -418,7 +418,7 @@ fn a_store_that_overwrites_names_is_refused_before_anything_is_sent() {
     let refused = rig.push(&["a"]).unwrap_err().to_string();
     assert!(refused.contains("If-None-Match"), "{refused}");
     let rig = Rig::with(&objects);
-    assert!(rig.store.wait(rig.store.snapshot()).unwrap().is_none());
+    assert!(rig.store.wait(rig.store.sessions().snapshot()).unwrap().is_none());
 }
 
 #[test]
@@ -444,9 +444,9 @@ fn a_flipped_byte_anywhere_is_found() {
     let (_, content) = rig.mirror.catalog().mirrored_content("a").unwrap().unwrap();
     let list = rig.store.wait(rig.store.file_list(&content)).unwrap();
     let sums = list.files.iter().flat_map(|file| file.pieces.clone()).chain([content]);
-    let commit = rig.store.wait(rig.store.read_commit(1)).unwrap().unwrap();
+    let commit = rig.store.wait(rig.store.sessions().read_commit(1)).unwrap().unwrap();
     let part = commit.actions.iter().find_map(|one| one.add.clone()).unwrap().path;
-    let paths = sums.map(|sum| object_path(&sum)).chain([table_path(&part)]);
+    let paths = sums.map(|sum| object_path(&sum)).chain([rig.store.sessions().path(&part)]);
     for path in paths {
         let whole: Bytes = rig.store.wait(rig.store.read(&path)).unwrap().unwrap();
         for at in 0..whole.len() {
@@ -459,7 +459,7 @@ fn a_flipped_byte_anywhere_is_found() {
         rig.store.wait(objects.put(&path, whole.into())).unwrap();
     }
     assert_eq!(rig.table(), [("a".to_owned(), 1)].into());
-    let path = commit_path(1);
+    let path = rig.store.sessions().commit_path(1);
     rig.store.wait(objects.put(&path, "{".into())).unwrap();
     assert!(matches!(rig.store.verify(true, &mut go_on), Err(StoreError::Bad { .. })));
 }

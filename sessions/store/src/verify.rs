@@ -1,11 +1,12 @@
 //! Verification: whether everything that the table names is in the store, with the right bytes.
 
-use crate::delta::table_path;
 use crate::error::StoreError;
 use crate::files::{PIECE_BYTES, object_path};
 use crate::location::{REQUESTS, Store};
 use crate::mirror::Hear;
+use crate::results::{ResultTable, VerifiedResults};
 use crate::rows::{SessionRow, rows_of};
+use crate::table::Table;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -27,11 +28,12 @@ impl Store {
         hear: Hear<'_>,
     ) -> Result<(usize, Vec<StoreFault>), StoreError> {
         self.wait(async {
-            let snapshot = self.snapshot().await?.ok_or_else(|| self.no_table())?;
+            let snapshot = self.sessions().snapshot().await?;
+            let mut is_there = snapshot.is_some();
             let mut faults = Vec::new();
             let mut rows = Vec::new();
-            for add in snapshot.parts.values() {
-                let path = table_path(&add.path);
+            for add in snapshot.iter().flat_map(|table| table.parts.values()) {
+                let path = self.sessions().path(&add.path);
                 let read = match self.read(&path).await? {
                     None => Err(StoreError::bad(&path, "it is missing")),
                     Some(bytes) => {
@@ -56,7 +58,21 @@ impl Store {
                     faults.push(fault(&place, err));
                 }
             }
-            Ok((rows.len(), faults))
+            for one in ResultTable::ALL {
+                let table = Table { store: self, shape: one.shape() };
+                let VerifiedResults { objects, faults: found } = table.verify_results().await?;
+                faults.extend(found.iter().map(|(place, sentence)| fault(place, sentence)));
+                is_there |= !objects.is_empty() || !found.is_empty();
+                for content in objects.values() {
+                    if let Err(err) = self.verify_object(content, None, is_deep).await {
+                        faults.push(fault(&format!("a result in {one}"), err));
+                    }
+                }
+            }
+            match is_there {
+                true => Ok((rows.len(), faults)),
+                false => Err(self.no_table()),
+            }
         })
     }
 
@@ -73,20 +89,29 @@ impl Store {
                 (sum, bytes)
             })
         });
-        let checked = stream::iter(pieces).map(|(sum, bytes)| async move {
-            if is_deep {
-                return self.checked(sum).await.map(drop);
-            }
-            let path = object_path(sum);
-            match self.size(&path).await? {
-                Some(found) if found == bytes => Ok(()),
-                Some(found) => {
-                    Err(StoreError::bad(&path, format!("it has {found} of {bytes} bytes")))
-                }
-                None => Err(StoreError::bad(&path, "it is missing")),
-            }
-        });
+        let checked =
+            stream::iter(pieces).map(|(sum, bytes)| self.verify_object(sum, Some(bytes), is_deep));
         checked.buffer_unordered(REQUESTS).try_collect().await
+    }
+
+    /// That an object is there; with the bytes that its name says, or with so many.
+    async fn verify_object(
+        &self,
+        sum: &str,
+        bytes: Option<u64>,
+        is_deep: bool,
+    ) -> Result<(), StoreError> {
+        if is_deep {
+            return self.checked(sum).await.map(drop);
+        }
+        let path = object_path(sum);
+        match (self.size(&path).await?, bytes) {
+            (None, _) => Err(StoreError::bad(&path, "it is missing")),
+            (Some(found), Some(bytes)) if found != bytes => {
+                Err(StoreError::bad(&path, format!("it has {found} of {bytes} bytes")))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -66,9 +66,11 @@ fn add(store: &Store, original: &CatalogEntry, numbers: std::ops::Range<usize>, 
         let rows: Vec<SessionRow> = (first..last).map(|number| row(original, number)).collect();
         store.wait(async {
             let part = part(&rows, now()).unwrap();
-            assert!(store.put_new(&part.path(), part.bytes).await.unwrap());
-            let version = store.snapshot().await.unwrap().unwrap().version + 1;
-            assert!(store.commit(version, &[part.add.into()]).await.unwrap());
+            assert!(
+                store.put_new(&store.sessions().path(&part.add.path), part.bytes).await.unwrap()
+            );
+            let version = store.sessions().snapshot().await.unwrap().unwrap().version + 1;
+            assert!(store.sessions().commit(version, &[part.add.into()]).await.unwrap());
         });
     }
 }
@@ -125,7 +127,7 @@ fn many_sessions_are_found_in_the_catalog_of_a_store() {
     let folder = tempfile::tempdir().unwrap();
     let url = format!("file://{}", folder.path().join("store").display());
     let store = Store::create(&StoreUrl::parse(&url).unwrap()).unwrap();
-    store.wait(store.ensure_table(now())).unwrap();
+    store.wait(store.sessions().ensure(now())).unwrap();
     add(&store, &original, 0..count, FILE_ROWS);
     println!("{count} sessions in a store, {} MB for making it", storage_mb().unwrap_or(0));
 
