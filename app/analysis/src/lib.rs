@@ -56,6 +56,7 @@ pub mod select;
 pub mod session_actions;
 pub mod session_entries;
 pub mod shared_library;
+pub mod shared_results;
 pub mod source;
 pub mod specimen_queue;
 pub mod study_table;

@@ -1,5 +1,6 @@
 //! A library that many rigs share, in an object store: push finished sessions, pull them, search them, look after them.
 
+use crate::compliance::ComplianceCorrectionError;
 use crate::progress::Progress;
 use crate::report::text::{counted, megabytes};
 use chrono::{DateTime, Utc};
@@ -7,9 +8,9 @@ use palpate_runner::wall_now;
 use palpate_sessions::Catalog;
 use palpate_sessions::catalog::{CatalogError, LocalSession};
 use palpate_sessions::{FolderError, library_folder};
-use palpate_store::{
-    Compaction, Mirror, Pulled, PushOutcome, Store, StoreError, StoreFault, StoreUrl,
-};
+pub use palpate_store::StoreVerification;
+use palpate_store::{Compaction, Mirror, Pulled, PushOutcome, Store, StoreError, StoreUrl};
+use palpate_tables::lake::LakeError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -24,6 +25,10 @@ pub enum SharedLibraryError {
     Folder(#[from] FolderError),
     #[error(transparent)]
     Catalog(#[from] CatalogError),
+    #[error(transparent)]
+    Lake(#[from] LakeError),
+    #[error(transparent)]
+    Compliance(#[from] ComplianceCorrectionError),
     #[error("{} is not a session; give the folder of one", path.display())]
     NotASession { path: PathBuf },
 }
@@ -54,7 +59,12 @@ pub struct SharedLibrary {
     mirror: Mirror,
 }
 
-fn now() -> DateTime<Utc> {
+/// The address of a store as it is, unless it is none.
+pub fn store_address(text: &str) -> Result<String, StoreError> {
+    StoreUrl::parse(text).map(|url| url.as_str().to_owned())
+}
+
+pub(crate) fn now() -> DateTime<Utc> {
     DateTime::from(wall_now())
 }
 
@@ -152,13 +162,13 @@ impl SharedLibrary {
         Ok(self.store.pull(&self.mirror, &all, out, &mut hear)?)
     }
 
-    /// Number of versions of sessions that were looked at, and what is wrong.
+    /// Looks at every session and result, and where `is_deep` at every byte.
     pub fn verify(
         &self,
         is_deep: bool,
         progress: &dyn Progress,
-    ) -> Result<(usize, Vec<StoreFault>), SharedLibraryError> {
-        let mut hear = |done, of| progress.report(done, of, "verifying sessions");
+    ) -> Result<StoreVerification, SharedLibraryError> {
+        let mut hear = |done, of| progress.report(done, of, "verifying");
         Ok(self.store.verify(is_deep, &mut hear)?)
     }
 

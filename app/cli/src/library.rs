@@ -4,7 +4,9 @@ use super::output::Output;
 use super::{Failure, output::merged};
 use clap::{Args, Subcommand};
 use palpate_analysis::report::text::{counted, megabytes};
-use palpate_analysis::shared_library::{SharedLibrary, SharedLibraryError, push_words};
+use palpate_analysis::shared_library::{
+    SharedLibrary, SharedLibraryError, StoreVerification, push_words,
+};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -102,16 +104,19 @@ fn pull(args: &PullArgs, output: &Output) -> Result<(), Failure> {
 fn verify(args: &VerifyArgs, output: &Output) -> Result<(), Failure> {
     let library = SharedLibrary::open(&args.store).map_err(failure)?;
     let bar = output.count_bar(0);
-    let (sessions, faults) = library.verify(args.deep, &bar).map_err(failure)?;
+    let found = library.verify(args.deep, &bar).map_err(failure)?;
     drop(bar);
-    let object = json!({ "store": library.address(), "versions": sessions, "faults": faults });
+    let object = merged(json!({ "store": library.address() }), &found);
+    let StoreVerification { versions, results, faults } = found;
     output.answer("library verify", &object, || {
         let lines = faults.iter().map(|one| format!("{}: {}", one.place, one.sentence));
+        let mut looked_at = counted(versions, "session version");
+        if results > 0 {
+            looked_at += &format!(" and {}", counted(results, "result"));
+        }
         let head = match faults.len() {
-            0 => format!("all {} in the store are whole", counted(sessions, "session version")),
-            count => {
-                format!("{} in {}", counted(count, "fault"), counted(sessions, "session version"))
-            }
+            0 => format!("all {looked_at} in the store are whole"),
+            count => format!("{} in {looked_at}", counted(count, "fault")),
         };
         [head].into_iter().chain(lines).collect::<Vec<_>>().join("\n")
     });

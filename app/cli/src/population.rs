@@ -4,13 +4,15 @@ use super::arguments::positive;
 use super::fit::jobs;
 use super::new_file;
 use super::output::Output;
-use super::{Failure, compliance, study};
+use super::{Failure, compliance, library, study};
 use clap::Args;
 use palpate_analysis::fit::{FitRecipe, StoredFitError};
 use palpate_analysis::population::{
     PopulationError, PopulationMethod, PopulationReport, PopulationRequest, SavePopulationError,
     check_new_name, population, save_population, study_recipe, write_results,
 };
+use palpate_analysis::shared_library::store_address;
+use palpate_analysis::shared_results::{ResultsOutcome, add_population, results_words};
 use palpate_sessions::{LibraryError, library_folder};
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -56,6 +58,10 @@ pub struct PopulationArgs {
     /// Save the population in the library under this name, for simulated specimens population:NAME#NUMBER
     #[arg(long, value_name = "NAME", conflicts_with = "stored")]
     save: Option<String>,
+    /// Also add the population to the tables of this store, as in s3://bucket/folder or file:///folder; one that is there
+    /// is passed over
+    #[arg(long, value_name = "STORE", value_parser = store_address)]
+    store: Option<String>,
     /// Number of sessions fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -90,16 +96,21 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
     drop(bar);
     let found = found?;
     let saved = place.map(|(library, name)| save_population(library, name, &found)).transpose();
-    // What took long to find is printed even if it cannot be saved.
+    let added = args.store.as_deref();
+    let added = added.map(|address| add_population(address, &request, &found)).transpose();
+    // What took long to find is printed even if it cannot be saved or added.
     let place = saved.as_ref().ok().and_then(Option::as_ref);
+    let store = added.as_ref().ok().and_then(Option::as_ref);
     let answer = PopulationAnswer {
         found: &found.report,
         id: place.map(|one| one.id.as_str()),
         file: place.map(|one| one.path.as_path()),
+        store,
     };
     output.answer("population", &answer, || {
         let saved = place.map(|one| format!("saved as {}, {}", one.id, one.path.display()));
-        [found.report.text()].into_iter().chain(saved).collect::<Vec<_>>().join("\n")
+        let added = store.map(results_words);
+        [found.report.text()].into_iter().chain(saved).chain(added).collect::<Vec<_>>().join("\n")
     });
     if let Some(folder) = &args.out {
         write_results(&found, folder).map_err(|err| {
@@ -110,7 +121,8 @@ pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure>
         })?;
         output.note(&format!("wrote {}", folder.display()));
     }
-    saved.map(|_| ()).map_err(save_failure)
+    saved.map_err(save_failure)?;
+    added.map(|_| ()).map_err(library::failure)
 }
 
 #[derive(Serialize)]
@@ -122,6 +134,8 @@ struct PopulationAnswer<'a> {
     id: Option<&'a str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     file: Option<&'a Path>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    store: Option<&'a ResultsOutcome>,
 }
 
 fn save_failure(err: SavePopulationError) -> Failure {

@@ -1,7 +1,7 @@
 //! `palpate library` and `palpate find --store`: sessions of one computer in a store, on another computer.
 
 use crate::support::{
-    answer, assert_prints, assert_refused, assert_says, palpate, short_run, succeeded,
+    answer, assert_prints, assert_refused, assert_says, palpate, short_run, succeeded, typed,
 };
 use std::fs;
 use std::path::Path;
@@ -83,4 +83,60 @@ fn wrong_addresses_names_and_folders_are_refused() {
     let unknown = palpate(at, &["library", "pull", &store, "nothing", "--out", "x"]);
     assert_refused(&unknown, 2, "no session nothing is in the store");
     assert!(!at.join("x").exists());
+}
+
+/// Results of workers that share a lake: each once, whoever added it, and again after a lost store.
+#[cfg(unix)]
+#[test]
+fn fits_moduli_and_populations_of_a_lake_are_in_a_store_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let store = store(at);
+    let (one, two) = ("runs/one", "runs/two");
+    fs::create_dir_all(at.join("runs")).unwrap();
+    for (animal, out) in [one, two].into_iter().enumerate() {
+        for (lobe, press) in [(1, 1), (1, 2), (2, 1)] {
+            let seed = (10 * animal + 3 * lobe + press).to_string();
+            let specimen = format!("liver {animal} lobe {lobe}");
+            let animal = format!("animal.name={animal}");
+            let words = ["--specimen", &specimen, "--seed", &seed, "--about", &animal];
+            succeeded(&short_run(at, &format!("{out}-{lobe}-{press}"), &words));
+        }
+    }
+    succeeded(&palpate(at, &["export", "runs", "--lake", "lake"]));
+    let fit = |shard: &str, more: &[&str]| {
+        let words = ["fit", "lake", "--shard", shard, "--store", &store, "--json"];
+        answer(&palpate(at, &[&words, more].concat()))
+    };
+    let outcome = |answer: &serde_json::Value| {
+        let number = |key: &str| answer["store"][key].as_u64().unwrap();
+        (number("added"), number("known"))
+    };
+    let (first, rest) = (outcome(&fit("1/2", &[])), outcome(&fit("2/2", &[])));
+    assert_eq!((first.0 + rest.0, first.1 + rest.1), (6, 0));
+    assert_eq!(outcome(&fit("1/1", &[])), (0, 6));
+    // Another family is another computation.
+    assert_eq!(outcome(&fit("1/1", &["--family", "prony-1"])), (6, 0));
+
+    let line = format!(
+        "material lake --indenter flat-punch --radius 10 --thickness 25 --poisson 0.49 --depth-max 1.5 --store {store} --json"
+    );
+    let moduli = typed(at, &line);
+    assert_eq!(outcome(&answer(&moduli)), (6, 0));
+    let words = ["population", "lake", "--two-stage", "--stored", "--parameters", "mu1"];
+    let population = || palpate(at, &[&words[..], &["--store", &store, "--json"]].concat());
+    assert_eq!(outcome(&answer(&population())), (1, 0));
+    assert_eq!(outcome(&answer(&population())), (0, 1));
+    let verified = palpate(at, &["library", "verify", &store, "--deep"]);
+    assert_prints(&verified, "all 0 session versions and 19 results in the store are whole");
+
+    // A lost object of a result is found, and the stored results of the lake mend another store.
+    let (compacted, lost) = (palpate(at, &["library", "compact", &store]), at.join("store/fits"));
+    succeeded(&compacted);
+    fs::remove_dir_all(lost).unwrap();
+    assert_eq!(outcome(&fit("1/1", &[])), (6, 0));
+
+    assert_refused(&palpate(at, &["fit", one, "--store", &store]), 2, "--store needs a lake");
+    let wrong = palpate(at, &["fit", "lake", "--store", "/srv/store"]);
+    assert_refused(&wrong, 2, "is not the address of a store");
 }

@@ -40,4 +40,4 @@ pub use pull::Pulled;
 pub use push::{PushOutcome, PushRefusal};
 pub use results::{ResultNumber, ResultTable, ResultsOutcome, StudyResult};
 pub use rows::STORE_VERSION;
-pub use verify::StoreFault;
+pub use verify::{StoreFault, StoreVerification};

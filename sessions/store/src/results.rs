@@ -154,7 +154,7 @@ impl<'a> NamedResult<'a> {
 }
 
 impl Store {
-    /// Adds results to a table, which is made if there is none; those whose computation is there are passed over.
+    /// Adds results to a table, which is made with the first of them; those whose computation is there are passed over.
     pub fn add_results(
         &self,
         table: ResultTable,
@@ -163,6 +163,9 @@ impl Store {
         hear: Hear<'_>,
     ) -> Result<ResultsOutcome, StoreError> {
         let mut outcome = ResultsOutcome::default();
+        if results.is_empty() {
+            return Ok(outcome);
+        }
         self.wait(async {
             self.probe(now()).await?;
             let of_store = Table { store: self, shape: table.shape() };

@@ -201,7 +201,7 @@ impl Rig {
 
     /// Version of each session in the table; panics on any fault.
     fn table(&self) -> BTreeMap<String, u64> {
-        let (_, faults) = self.store.verify(true, &mut go_on).unwrap();
+        let faults = self.store.verify(true, &mut go_on).unwrap().faults;
         assert_eq!(faults, []);
         let mut fresh = Mirror::open(&self.folder.path().join("fresh")).unwrap();
         fresh.update(&self.store, &mut go_on).unwrap();
@@ -454,7 +454,7 @@ fn a_flipped_byte_anywhere_is_found() {
             bytes[at] ^= 0x10;
             rig.store.wait(objects.put(&path, bytes.into())).unwrap();
             let found = rig.store.verify(true, &mut go_on);
-            assert!(!found.unwrap().1.is_empty(), "byte {at} of {path}");
+            assert!(!found.unwrap().faults.is_empty(), "byte {at} of {path}");
         }
         rig.store.wait(objects.put(&path, whole.into())).unwrap();
     }

@@ -19,17 +19,23 @@ pub struct StoreFault {
     pub sentence: String,
 }
 
+/// What was looked at in a store, and what is wrong there.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct StoreVerification {
+    /// Versions of sessions.
+    pub versions: usize,
+    pub results: usize,
+    pub faults: Vec<StoreFault>,
+}
+
 impl Store {
-    /// Looks at every version of every session: that it is in the table once, and its objects are there; where `is_deep`, also
-    /// at every byte.
-    pub fn verify(
-        &self,
-        is_deep: bool,
-        hear: Hear<'_>,
-    ) -> Result<(usize, Vec<StoreFault>), StoreError> {
+    /// Looks at every version of every session and at every result: that it is in its table once, and its objects are there;
+    /// where `is_deep`, also at every byte.
+    pub fn verify(&self, is_deep: bool, hear: Hear<'_>) -> Result<StoreVerification, StoreError> {
         self.wait(async {
             let snapshot = self.sessions().snapshot().await?;
             let mut is_there = snapshot.is_some();
+            let mut results = 0;
             let mut faults = Vec::new();
             let mut rows = Vec::new();
             for add in snapshot.iter().flat_map(|table| table.parts.values()) {
@@ -63,6 +69,7 @@ impl Store {
                 let VerifiedResults { objects, faults: found } = table.verify_results().await?;
                 faults.extend(found.iter().map(|(place, sentence)| fault(place, sentence)));
                 is_there |= !objects.is_empty() || !found.is_empty();
+                results += objects.len();
                 for content in objects.values() {
                     if let Err(err) = self.verify_object(content, None, is_deep).await {
                         faults.push(fault(&format!("a result in {one}"), err));
@@ -70,7 +77,7 @@ impl Store {
                 }
             }
             match is_there {
-                true => Ok((rows.len(), faults)),
+                true => Ok(StoreVerification { versions: rows.len(), results, faults }),
                 false => Err(self.no_table()),
             }
         })

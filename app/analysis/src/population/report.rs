@@ -110,6 +110,12 @@ pub struct EffectRow {
 }
 
 impl EffectRow {
+    /// Whether it is the mean of all sessions, and not an effect.
+    #[must_use]
+    pub fn is_mean(&self) -> bool {
+        is_mean(&self.effect)
+    }
+
     pub(super) fn of(estimate: &EffectEstimate, unit: Option<String>, fit: &PopulationFit) -> Self {
         let is_mean = is_mean(&estimate.effect);
         let own = fit.standard_deviations.iter();

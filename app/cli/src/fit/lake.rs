@@ -1,14 +1,15 @@
 //! Fits the sessions of a lake, or of one shard, and stores the fits in the lake.
 
-use super::super::{Failure, export, material, output::Output, source_failure};
+use super::super::{Failure, export, library, material, output::Output, source_failure};
 use super::{FitArgs, batch, jobs};
 use palpate_analysis::fit::{
     FitRecipe, LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally,
     SourceFitError, fit_lake,
 };
 use palpate_analysis::progress::Progress;
+use palpate_analysis::shared_results::{LakeResults, add_lake_results, results_words};
 use palpate_sessions::text::sha256_of_file;
-use palpate_tables::lake::{LakeError, Shard};
+use palpate_tables::lake::{LakeError, LakeResult, Shard};
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,22 +22,33 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     check(args)?;
+    let shard = args.shard.unwrap_or(Shard::WHOLE);
     let request = LakeFitRequest {
         lake,
-        shard: args.shard.unwrap_or(Shard::WHOLE),
+        shard,
         recipe,
         fixed: &args.fixed,
         free: &args.free,
         compliance_sha256: args.compliance.as_deref().map(hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };
-    fit_each("fit", lake, output, |is_ending, hear| fit_lake(&request, is_ending, hear))
+    let place = ResultPlace { lake, shard, result: LakeResult::Fit, store: args.store.as_deref() };
+    fit_each("fit", &place, output, |is_ending, hear| fit_lake(&request, is_ending, hear))
+}
+
+/// Where results are stored.
+pub(crate) struct ResultPlace<'a> {
+    pub lake: &'a Path,
+    pub shard: Shard,
+    pub result: LakeResult,
+    /// The address of a store whose tables have them too.
+    pub store: Option<&'a str>,
 }
 
 /// Fits a lake as `command`, with notes, progress and the tally.
 pub(crate) fn fit_each(
     command: &str,
-    lake: &Path,
+    place: &ResultPlace<'_>,
     output: &Output,
     fit: impl FnOnce(&AtomicBool, &mut dyn FnMut(LakeFitEvent<'_>)) -> Result<LakeTally, LakeFitError>,
 ) -> Result<(), Failure> {
@@ -60,21 +72,35 @@ pub(crate) fn fit_each(
             failed.push(json!({ "session_id": id, "error": reason }));
         }
     });
-    drop(bar);
     let tally = tally.map_err(failure)?;
+    let ResultPlace { lake, shard, result, store } = *place;
+    // What an interrupted command made is added by the next.
+    let store = store.filter(|_| !is_ending.load(Ordering::Relaxed));
+    let added = store
+        .map(|address| {
+            add_lake_results(address, &LakeResults::of(lake, shard, result, &tally), &bar)
+        })
+        .transpose();
+    drop(bar);
     let mut object = json!(tally);
     object["lake"] = json!(lake);
     object["failed"] = json!(failed);
+    let outcome = added.as_ref().ok().and_then(Option::as_ref);
+    if let Some(outcome) = outcome {
+        object["store"] = json!(outcome);
+    }
     output.answer(command, &object, || {
         let made = if command == "fit" { "fits" } else { "moduli" };
-        format!(
+        let made = format!(
             "{} {made} made, {} already present, {} sessions rejected, {} not fitted",
             tally.made,
             tally.were_there,
             tally.rejected,
             failed.len()
-        )
+        );
+        [made].into_iter().chain(outcome.map(results_words)).collect::<Vec<_>>().join("\n")
     });
+    added.map_err(library::failure)?;
     if failed.is_empty() {
         return Ok(());
     }
@@ -100,6 +126,16 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
         ("--save", args.save.is_some()),
         ("--analysis", args.analysis.is_some()),
     ])
+}
+
+/// Refuses the first of these options, which only a lake has, that is given.
+pub(crate) fn check_given(options: &[(&str, bool)]) -> Result<(), Failure> {
+    match options.iter().find(|(_, is_given)| *is_given) {
+        Some((name, _)) => {
+            Err(Failure::usage(format!("{name} needs a lake; give one lake, or leave out {name}")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses the first of these options that is given.

@@ -17,6 +17,7 @@ use palpate_analysis::fit::{FitChoice, FitRecipe, remember};
 use palpate_analysis::recordings::{self, is_collection};
 use palpate_analysis::report::fit_json::{FitObject, FitOverlay};
 use palpate_analysis::report::{picture, text};
+use palpate_analysis::shared_library::store_address;
 use palpate_analysis::source::{RecordStretch, SourceSelection};
 use palpate_model::calibration::ForceUncertainty;
 use palpate_rheology::fit::FitOptions;
@@ -87,6 +88,10 @@ pub struct FitArgs {
     /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
     #[arg(long, value_name = "I/N", conflicts_with = "share")]
     shard: Option<Shard>,
+    /// Also add the fits of a lake to the tables of this store, as in s3://bucket/folder or file:///folder; a fit that is there
+    /// is passed over
+    #[arg(long, value_name = "STORE", value_parser = store_address)]
+    store: Option<String>,
     /// Number of sources fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -131,9 +136,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     {
         return lake::run(lake, args, &recipe, output);
     }
-    if args.shard.is_some() {
-        return Err(Failure::usage("--shard needs a lake; give one lake, or leave out --shard"));
-    }
+    lake::check_given(&[("--shard", args.shard.is_some()), ("--store", args.store.is_some())])?;
     if let Some(shared) = &args.share {
         return joint::run(args, Some(shared), &recipe, output);
     }

@@ -15,10 +15,11 @@ use palpate_analysis::property::{Property, PropertyRequest, find_property};
 use palpate_analysis::report::master_curve::master_curve_text;
 use palpate_analysis::report::property::property_text;
 use palpate_analysis::session_actions::MaterialToStore;
+use palpate_analysis::shared_library::store_address;
 use palpate_indentation::{
     Base, ContactLaw, Indenter, PoissonBasis, PyramidFaces, Quantity, RelaxationFamily,
 };
-use palpate_tables::lake::{Shard, is_lake};
+use palpate_tables::lake::{LakeResult, Shard, is_lake};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -109,6 +110,10 @@ pub struct MaterialArgs {
     /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
+    /// Also add the moduli of a lake to the tables of this store, as in s3://bucket/folder or file:///folder; a modulus that is there
+    /// is passed over
+    #[arg(long, value_name = "STORE", value_parser = store_address)]
+    store: Option<String>,
     /// Number of sessions of a lake fitted at a time; without it the number of processors
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -184,9 +189,7 @@ pub(super) fn run(args: &MaterialArgs, output: &Output) -> Result<(), Failure> {
     if is_lake(source) {
         return over_lake(args, &press, output);
     }
-    if args.shard.is_some() {
-        return Err(Failure::usage("--shard needs a lake; give a lake, or leave out --shard"));
-    }
+    lake::check_given(&[("--shard", args.shard.is_some()), ("--store", args.store.is_some())])?;
     let property = match args.property {
         PropertyWord::Modulus => Property::Modulus,
         PropertyWord::Unloading => Property::Unloading,
@@ -249,13 +252,20 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
         ("--save", args.save.is_some()),
         ("--analysis", args.analysis.is_some()),
     ])?;
+    let shard = args.shard.unwrap_or(Shard::WHOLE);
     let request = LakeMaterialRequest {
         press,
-        shard: args.shard.unwrap_or(Shard::WHOLE),
+        shard,
         compliance_sha256: args.compliance.as_deref().map(lake::hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };
-    lake::fit_each("material", &press.source, output, |is_ending, hear| {
+    let place = lake::ResultPlace {
+        lake: &press.source,
+        shard,
+        result: LakeResult::Modulus,
+        store: args.store.as_deref(),
+    };
+    lake::fit_each("material", &place, output, |is_ending, hear| {
         material_lake(&request, is_ending, hear)
     })
 }

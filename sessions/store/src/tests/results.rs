@@ -78,7 +78,7 @@ fn workers_that_race_and_begin_again_add_every_result_once() {
     let found = verified(&rig);
     assert_eq!(found.faults, []);
     assert_eq!(found.objects.len(), RESULTS);
-    assert_eq!(rig.store.verify(true, &mut go_on).unwrap().1, []);
+    assert_eq!(rig.store.verify(true, &mut go_on).unwrap().faults, []);
     let all: Vec<_> = (0..RESULTS).map(|session| fit(session, 9)).collect();
     let outcome = add(&rig, &all).unwrap();
     assert_eq!(outcome, ResultsOutcome { added: 0, known: RESULTS });
@@ -117,9 +117,9 @@ fn a_flipped_byte_of_a_result_is_found() {
             bytes[at] ^= 0x10;
             rig.store.wait(objects.put(&path, bytes.into())).unwrap();
             let found = rig.store.verify(true, &mut go_on).unwrap();
-            assert!(!found.1.is_empty(), "byte {at} of {path}");
+            assert!(!found.faults.is_empty(), "byte {at} of {path}");
         }
         rig.store.wait(objects.put(&path, whole.into())).unwrap();
     }
-    assert_eq!(rig.store.verify(true, &mut go_on).unwrap().1, []);
+    assert_eq!(rig.store.verify(true, &mut go_on).unwrap().faults, []);
 }

@@ -101,6 +101,37 @@ pub fn read_fit<T: DeserializeOwned>(
     read.map(Some).map_err(|err| LakeError::BadFit { path, reason: err.to_string() })
 }
 
+/// A whole result as it is stored.
+#[derive(Clone, Debug)]
+pub struct StoredResult {
+    /// The bytes of its file.
+    pub text: String,
+    pub settings: Value,
+    pub result: Value,
+}
+
+/// The result of a session; `None` where there is none.
+pub fn read_result(
+    lake: &Path,
+    result: LakeResult,
+    model: &str,
+    session_id: &str,
+) -> Result<Option<StoredResult>, LakeError> {
+    let path = model_folder(lake, result, model).join(format!("{session_id}.json"));
+    let text = match fs::read_to_string(&path) {
+        Err(err) if err.kind() == ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(|source| LakeError::Io { path: path.clone(), source })?,
+    };
+    let bad = |reason: String| LakeError::BadFit { path: path.clone(), reason };
+    let mut stored: Value = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
+    let [_, _, key] = result.names();
+    let [settings, result] = ["settings", key].map(|key| stored[key].take());
+    match settings.is_object() && result.is_object() {
+        true => Ok(Some(StoredResult { text, settings, result })),
+        false => Err(bad(format!("it has no settings or no {key}"))),
+    }
+}
+
 /// What [`store_fit`] stored of a fit.
 #[derive(Clone, Debug, Deserialize)]
 pub struct StoredFitFile<T> {

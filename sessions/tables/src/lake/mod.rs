@@ -21,10 +21,12 @@ mod rows;
 mod write;
 
 pub use fits::{
-    FitFile, FitState, LakeResult, StoredFitFile, find_fit, list_models, model_folder, read_fit,
-    store_fit,
+    FitFile, FitState, LakeResult, StoredFitFile, StoredResult, find_fit, list_models,
+    model_folder, read_fit, read_result, store_fit,
 };
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
-pub use read::{LakeError, LakeSession, list_sessions, read_manifest, read_session};
+pub use read::{
+    LakeError, LakeSession, list_sessions, read_checksums, read_manifest, read_session,
+};
 pub(crate) use write::kind_name;
 pub use write::{LakeAddition, LakeQuality, add_session};

@@ -11,6 +11,7 @@ use palpate_sessions::record::{EntryKind, LogEntry};
 use palpate_sessions::text::crc32_of;
 use polars_core::prelude::{DataFrame, PolarsError, PolarsResult};
 use polars_io::prelude::{ParallelStrategy, ParquetReader, SerReader};
+use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
@@ -75,6 +76,11 @@ pub fn read_manifest(
     let checksums = Checksums::read(lake, &one.partition, &one.id)?;
     let (manifest, _, rejection) = read_outline(lake, one, &checksums)?;
     Ok((manifest, rejection))
+}
+
+/// The stored checksums of a session's files, as JSON: with its name they identify its data.
+pub fn read_checksums(lake: &Path, one: &LakeSession) -> Result<Value, LakeError> {
+    Ok(json!(Checksums::read(lake, &one.partition, &one.id)?))
 }
 
 fn path_of(lake: &Path, one: &LakeSession, part: LakePart) -> PathBuf {
