@@ -53,7 +53,7 @@ fn workers_that_race_and_begin_again_add_every_result_once() {
             scope.spawn(move || {
                 let rig = Rig::of(Faulty {
                     objects,
-                    one_of: 6,
+                    one_of: 30,
                     seed: worker as u64 + 1,
                     ..Faulty::default()
                 });
@@ -61,7 +61,7 @@ fn workers_that_race_and_begin_again_add_every_result_once() {
                 for first in (0..RESULTS).step_by(8) {
                     let share: Vec<_> =
                         (0..12).map(|k| fit((first + k) % RESULTS, worker)).collect();
-                    while add(&rig, &share).is_err() {}
+                    assert!((0..200).any(|_| add(&rig, &share).is_ok()));
                 }
             });
         }
