@@ -7,8 +7,7 @@ use super::schema::{bad_text, collect_rows};
 use super::update::{FORGET_ALL, entry_of, put};
 use super::walk::{LibrarySession, fingerprint_of};
 use super::{Catalog, CatalogError};
-use rusqlite::{Connection, OptionalExtension, params};
-use std::collections::BTreeSet;
+use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use std::path::Path;
 
 /// Up to where a store's table was read.
@@ -104,60 +103,35 @@ impl Catalog {
         found.optional().map_err(self.failed())
     }
 
-    /// Begins to read the whole table of an identity, and returns its files of rows that were read before an interruption. All
-    /// that was known is forgotten, unless it is the beginning of the same reading. None where the table is no longer as it `was`:
-    /// another process was faster.
-    pub fn begin_mirrored(
-        &mut self,
-        was: Option<&MirroredTable>,
-        id: &str,
-    ) -> Result<Option<BTreeSet<String>>, CatalogError> {
-        if self.mirrored_table()?.as_ref() != was {
-            return Ok(None);
-        }
-        let mut parts = BTreeSet::new();
-        self.write(|db| {
-            let sql = "SELECT part FROM mirrored_part WHERE id = ?";
-            parts.extend(collect_rows(db, sql, [id], |row| row.get::<_, String>(0))?);
-            if was.is_some() || parts.is_empty() {
-                parts.clear();
-                db.execute_batch(FORGET_ALL)?;
-                db.execute_batch("DELETE FROM mirrored; DELETE FROM mirrored_part;")?;
-            }
-            Ok(())
-        })?;
-        Ok(Some(parts))
-    }
-
-    /// Takes sessions of the table; of each the latest version is kept.
-    pub fn take_mirrored(&mut self, sessions: &[MirroredSession]) -> Result<(), CatalogError> {
-        self.write(|db| sessions.iter().try_for_each(|one| take(db, one)))
-    }
-
-    /// Remembers that a file of rows of a table was taken whole.
-    pub fn end_mirrored_part(&mut self, id: &str, part: &str) -> Result<(), CatalogError> {
-        self.write(|db| {
-            let sql = "INSERT OR IGNORE INTO mirrored_part (id, part) VALUES (?, ?)";
-            db.execute(sql, [id, part]).map(drop)
-        })
-    }
-
-    /// Remembers up to where the table was read, unless it is no longer as it `was`. Returns whether it still was.
-    pub fn end_mirrored(
+    /// Takes the sessions that the table had from one of its versions to another, all or none. Where `was` is none, all that
+    /// was known before is forgotten. Returns whether it was still read up to there: another process may have been faster.
+    pub fn take_mirrored<E: From<CatalogError>>(
         &mut self,
         was: Option<&MirroredTable>,
         now: &MirroredTable,
-    ) -> Result<bool, CatalogError> {
-        if self.mirrored_table()?.as_ref() != was {
+        sessions: impl Iterator<Item = Result<MirroredSession, E>>,
+    ) -> Result<bool, E> {
+        let known = self.mirrored_table()?;
+        if was.is_some() && known.as_ref() != was {
             return Ok(false);
         }
-        self.write(|db| {
-            db.execute_batch("DELETE FROM mirrored; DELETE FROM mirrored_part;")?;
+        let failed = self.failed();
+        let db = self.db.transaction_with_behavior(TransactionBehavior::Immediate);
+        let db = db.map_err(&failed)?;
+        if was.is_none() {
+            db.execute_batch(FORGET_ALL).map_err(&failed)?;
+        }
+        for one in sessions {
+            take(&db, &one?).map_err(&failed)?;
+        }
+        let end = || {
+            db.execute("DELETE FROM mirrored", [])?;
             let version = i64::try_from(now.version).map_err(bad_text)?;
             let values = params![now.id, version, now.schema];
-            let sql = "INSERT INTO mirrored (id, version, schema) VALUES (?, ?, ?)";
-            db.execute(sql, values).map(drop)
-        })?;
+            db.execute("INSERT INTO mirrored (id, version, schema) VALUES (?, ?, ?)", values)
+        };
+        end().map_err(&failed)?;
+        db.commit().map_err(&failed)?;
         Ok(true)
     }
 

@@ -7,7 +7,7 @@ use std::error::Error;
 /// Identifies the file as palpate's: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and their content. An older catalog is replaced; only the table `head` is kept.
-pub const VERSION: i64 = 13;
+pub const VERSION: i64 = 12;
 
 /// Identifiers of a millisecond: a session's identifier is its start in ms times this, plus a number from 1, so that sessions in
 /// the order of their identifiers are in that of their starts, and the latest of many are found without sorting them.
@@ -17,8 +17,8 @@ pub(super) const IDS: i64 = 4096;
 /// named values of a session, whose identifier is their owner; those of a plan, which many sessions have alike, are there once
 /// under the negative of the plan's identifier. `head` has the recorded heads of JSON-lines files, each row with its checksum.
 /// `words` has all text of an entry in `text`, and again the text of each [`SearchField`](super::SearchField) in a column of its
-/// name. `mirrored` says up to where the table of a store was read, `mirrored_part` which of its files were while it is read for the
-/// first time, and `pushed` which of this computer's folders it has as they are; all are empty in a library's catalog.
+/// name. `mirrored` says up to where the table of a store was read, and `pushed` which of this computer's folders it has as they
+/// are; both are empty in a library's catalog.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -78,11 +78,6 @@ CREATE TABLE mirrored (
     version INTEGER NOT NULL,
     schema TEXT NOT NULL
 ) STRICT;
-CREATE TABLE mirrored_part (
-    id TEXT NOT NULL,
-    part TEXT NOT NULL,
-    PRIMARY KEY (id, part)
-) STRICT, WITHOUT ROWID;
 CREATE TABLE pushed (
     folder TEXT PRIMARY KEY,
     fingerprint TEXT NOT NULL

@@ -41,54 +41,21 @@ impl Mirror {
     }
 
     /// Reads what changed in the store's table. Returns the number of versions of sessions that were read; `hear` is called
-    /// with the files of rows that were read and all. A first reading that was interrupted goes on where it was.
+    /// with the files of rows that were read and all.
     pub fn update(&mut self, store: &Store, hear: Hear<'_>) -> Result<usize, StoreError> {
         loop {
             let known = self.table()?;
             let change = store.wait(Change::since(store, known.as_ref()))?;
-            let Some(Change { is_whole, now, mut parts }) = change else { return Ok(0) };
-            let mut was = known;
-            let all = parts.len();
-            if is_whole {
-                let Some(taken) = self.catalog.begin_mirrored(was.as_ref(), &now.id)? else {
-                    continue;
-                };
-                parts.retain(|part| !taken.contains(&part.path));
-                was = None;
-            }
-            let before = all - parts.len();
-            let mut hear = |done| hear(before + done, all);
+            let Some(change) = change else { return Ok(0) };
             let mut count = 0;
-            for (part, rows) in parts.iter().zip(fetched(store, &parts, &mut hear)) {
-                count += self.take(rows?)?;
-                if is_whole {
-                    self.catalog.end_mirrored_part(&now.id, &part.path)?;
-                }
-            }
-            if self.catalog.end_mirrored(was.as_ref(), &now)? {
+            let rows = rows_of_parts(store, &change.parts, hear);
+            let sessions = rows.map(|row| row.map(mirrored)).inspect(|_| count += 1);
+            if self.catalog.take_mirrored(change.was.as_ref(), &change.now, sessions)? {
                 return Ok(count);
             }
         }
     }
-
-    /// Takes the rows of a file, and returns their number.
-    fn take(
-        &mut self,
-        rows: impl Iterator<Item = Result<SessionRow, StoreError>>,
-    ) -> Result<usize, StoreError> {
-        let mut rows = rows.map(|row| row.map(mirrored)).peekable();
-        let mut count = 0;
-        while rows.peek().is_some() {
-            let some: Vec<MirroredSession> = rows.by_ref().take(ROWS).collect::<Result<_, _>>()?;
-            self.catalog.take_mirrored(&some)?;
-            count += some.len();
-        }
-        Ok(count)
-    }
 }
-
-/// Rows of one change of the catalog: about a second, for which other processes wait that change it.
-const ROWS: usize = 2_000;
 
 fn mirrored(row: SessionRow) -> MirroredSession {
     let folder = row.entry.session_id.clone();
@@ -98,8 +65,8 @@ fn mirrored(row: SessionRow) -> MirroredSession {
 
 /// What a table has more than was known.
 struct Change {
-    /// Whether everything is read, because nothing was known or what was known is no longer so.
-    is_whole: bool,
+    /// None where everything is read again.
+    was: Option<MirroredTable>,
     now: MirroredTable,
     parts: Vec<Add>,
 }
@@ -132,7 +99,7 @@ impl Change {
             id: known.id.clone(),
         };
         let parts = actions().filter_map(|one| one.add.clone()).filter(|add| add.data_change);
-        Ok(Some(Self { is_whole: false, now, parts: parts.collect() }))
+        Ok(Some(Self { was: Some(known.clone()), now, parts: parts.collect() }))
     }
 
     async fn whole(store: &Store) -> Result<Self, StoreError> {
@@ -141,7 +108,7 @@ impl Change {
         let (id, schema) = (metadata.id.clone(), metadata.schema_string.clone());
         let now = MirroredTable { id, version: snapshot.version, schema };
         let Snapshot { parts, .. } = snapshot;
-        Ok(Self { is_whole: true, now, parts: parts.into_values().collect() })
+        Ok(Self { was: None, now, parts: parts.into_values().collect() })
     }
 }
 
@@ -150,12 +117,11 @@ fn id_of(commit: &Commit) -> Option<&String> {
 }
 
 /// The rows of files, in their order. Files are fetched several at a time, and one is read at a time.
-fn fetched<'a>(
+fn rows_of_parts<'a>(
     store: &'a Store,
     parts: &'a [Add],
-    hear: &'a mut dyn FnMut(usize) -> ControlFlow<()>,
-) -> impl Iterator<Item = Result<impl Iterator<Item = Result<SessionRow, StoreError>>, StoreError>>
-{
+    hear: Hear<'a>,
+) -> impl Iterator<Item = Result<SessionRow, StoreError>> + use<'a> {
     let fetched = stream::iter(parts).map(|part| async {
         let path = store.sessions().path(&part.path);
         let missing = || StoreError::bad(&path, "it is missing");
@@ -164,14 +130,21 @@ fn fetched<'a>(
     });
     let mut fetched = Box::pin(fetched.buffered(REQUESTS));
     let mut done = 0;
-    std::iter::from_fn(move || {
+    let files = std::iter::from_fn(move || {
         let next = store.wait(fetched.try_next()).transpose()?;
         Some(next.and_then(|(path, bytes)| {
             done += 1;
-            match hear(done).is_break() {
+            match hear(done, parts.len()).is_break() {
                 true => Err(StoreError::Ended),
                 false => rows_of(&path, &bytes),
             }
         }))
+    });
+    files.flat_map(|file| {
+        let (rows, err) = match file {
+            Ok(rows) => (Some(rows), None),
+            Err(err) => (None, Some(Err(err))),
+        };
+        rows.into_iter().flatten().chain(err)
     })
 }

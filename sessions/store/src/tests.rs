@@ -477,33 +477,3 @@ fn another_table_at_the_same_place_is_read_from_its_start() {
     rig.mirror.update(&rig.store, &mut go_on).unwrap();
     assert_eq!(rig.mirror.catalog().mirrored_ids().unwrap(), ["b"]);
 }
-
-#[test]
-fn a_first_reading_that_was_interrupted_goes_on_where_it_was() {
-    let objects: Arc<InMemory> = Arc::default();
-    let mut rig = Rig::with(&objects);
-    for session in ["a", "b", "c"] {
-        rig.record(session);
-        rig.push(&[session]).unwrap();
-    }
-    let mut other = Rig::with(&objects);
-    let mut end_at_third = |done, of| match (done, of) {
-        (3, 3) => ControlFlow::Break(()),
-        _ => ControlFlow::Continue(()),
-    };
-    let ended = other.mirror.update(&other.store, &mut end_at_third);
-    assert!(matches!(ended, Err(StoreError::Ended)));
-    assert_eq!(other.mirror.catalog().mirrored_ids().unwrap(), ["a", "b"]);
-    assert!(!other.mirror.is_known().unwrap());
-    assert_eq!(other.mirror.update(&other.store, &mut go_on).unwrap(), 1);
-    assert_eq!(other.mirror.catalog().mirrored_ids().unwrap(), ["a", "b", "c"]);
-    assert!(other.mirror.is_known().unwrap());
-    // The beginning of another table's reading is no beginning of this one's.
-    let mut third = Rig::with(&Arc::default());
-    third.record("d");
-    third.push(&["d"]).unwrap();
-    let mut fresh = Rig::with(&objects);
-    assert!(fresh.mirror.update(&fresh.store, &mut end_at_third).is_err());
-    assert_eq!(fresh.mirror.update(&third.store, &mut go_on).unwrap(), 1);
-    assert_eq!(fresh.mirror.catalog().mirrored_ids().unwrap(), ["d"]);
-}
