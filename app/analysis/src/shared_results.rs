@@ -1,39 +1,38 @@
 //! Results of lakes and studies in the tables of a shared library, with what they were computed from and how.
 
-use crate::fit::LakeTally;
+use crate::fit::lake_model;
 use crate::population::{Population, PopulationRequest};
 use crate::progress::Progress;
 use crate::report::text::counted;
 use crate::shared_library::{SharedLibraryError, now};
 use palpate_model::estimate::FittedParameter;
+use palpate_population::{Evidence, StudySession};
 use palpate_sessions::text::{sha256, sha256_of_file};
 pub use palpate_store::ResultsOutcome;
 use palpate_store::{ResultNumber, ResultTable, Store, StoreUrl, StudyResult};
 use palpate_tables::lake::{
-    LakeError, LakeResult, LakeSession, Shard, StoredResult, list_sessions, model_folder,
-    read_checksums, read_result,
+    LakeError, LakeResult, LakeSession, StoredResult, list_sessions, model_folder, read_checksums,
+    read_result,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The results of a lake, or of one shard of it, that were found with a model or a law.
+/// Results of sessions of a lake.
 #[derive(Clone, Copy, Debug)]
 pub struct LakeResults<'a> {
     pub lake: &'a Path,
-    pub shard: Shard,
     pub result: LakeResult,
-    /// Key of the model or of the law, as [`LakeTally::model`].
+    /// Key of the model or of the law, as [`LakeTally::model`](crate::fit::LakeTally::model).
     pub model: &'a str,
+    /// Sessions that were fitted, now or before with the same settings.
+    pub fitted: &'a BTreeSet<String>,
 }
 
-impl<'a> LakeResults<'a> {
-    /// Those that a fit of the lake made or found.
-    #[must_use]
-    pub fn of(lake: &'a Path, shard: Shard, result: LakeResult, tally: &'a LakeTally) -> Self {
-        Self { lake, shard, result, model: &tally.model }
-    }
-
+impl LakeResults<'_> {
     fn read(&self, session: &LakeSession) -> Result<Option<StudyResult>, LakeError> {
         let Self { lake, result, model, .. } = *self;
         let Some(stored) = read_result(lake, result, model, &session.id)? else { return Ok(None) };
@@ -63,14 +62,16 @@ fn store(address: &str) -> Result<Store, SharedLibraryError> {
     Ok(Store::create(&StoreUrl::parse(address)?)?)
 }
 
-/// Adds what a lake stores to the tables of a store.
+/// Adds what a lake stores of some sessions to the tables of a store. Once `is_ending` is set nothing more is added; asked again it
+/// goes on.
 pub fn add_lake_results(
     address: &str,
     results: &LakeResults<'_>,
+    is_ending: &AtomicBool,
     progress: &dyn Progress,
 ) -> Result<ResultsOutcome, SharedLibraryError> {
     let sessions = list_sessions(results.lake)?;
-    let sessions = sessions.iter().filter(|one| results.shard.has(&one.id));
+    let sessions = sessions.iter().filter(|one| results.fitted.contains(&one.id));
     let found: Result<Vec<Option<StudyResult>>, LakeError> =
         sessions.map(|one| results.read(one)).collect();
     let found: Vec<StudyResult> = found?.into_iter().flatten().collect();
@@ -78,7 +79,10 @@ pub fn add_lake_results(
         LakeResult::Fit => ResultTable::Fits,
         LakeResult::Modulus => ResultTable::Moduli,
     };
-    let mut hear = |done, of| progress.report(done, of, "adding results");
+    let mut hear = |done, of| match is_ending.load(Ordering::Relaxed) {
+        true => ControlFlow::Break(()),
+        false => progress.report(done, of, "adding results"),
+    };
     Ok(store(address)?.add_results(table, &found, now, &mut hear)?)
 }
 
@@ -89,7 +93,7 @@ pub fn add_population(
     found: &Population,
 ) -> Result<ResultsOutcome, SharedLibraryError> {
     let result = population_result(request, found)?;
-    let mut hear = |_, _| std::ops::ControlFlow::Continue(());
+    let mut hear = |_, _| ControlFlow::Continue(());
     Ok(store(address)?.add_results(ResultTable::Populations, &[result], now, &mut hear)?)
 }
 
@@ -178,20 +182,31 @@ fn population_result(
         sha256_of_file(path).map_err(|source| LakeError::Io { path: path.into(), source })
     };
     let software_version = env!("CARGO_PKG_VERSION");
+    // As of the fits.
+    let model = lake_model(&request.recipe.options);
     let settings = json!({
-        "software_version": software_version, "model": found.report.model, "method": request.method.key(),
+        "software_version": software_version, "model": model, "method": request.method.key(),
         "parameters": request.parameters, "levels": request.levels, "effects": request.effects,
         "influence": request.is_influence_wanted, "wanted_percent": request.wanted_percent,
         "compliance_sha256": compliance.map(hash).transpose()?,
     });
+    let evidence = |one: &StudySession| match &one.evidence {
+        Evidence::Exact => Vec::new(),
+        Evidence::Information(information) => information.iter().copied().collect(),
+    };
+    // The folder's path is of this computer alone.
+    let name = |one: &StudySession| {
+        Path::new(&one.name).file_name().map(|name| name.to_string_lossy().into_owned())
+    };
     let sessions: Vec<Value> = found.study.sessions.iter().map(|one| {
-        json!({ "session": one.name, "groups": one.groups, "design": one.design, "logarithms": one.values })
+        json!({ "session": name(one), "groups": one.groups, "design": one.design, "logarithms": one.values,
+            "information": evidence(one) })
     }).collect();
     let data = json!({ "sessions_sha256": sha256(json!(sessions).to_string().as_bytes()) });
     let text = json!({ "settings": settings, "sessions": sessions, "population": found.report });
     Ok(StudyResult {
         session_id: None,
-        model: found.report.model.clone(),
+        model,
         software_version: software_version.into(),
         settings,
         data,

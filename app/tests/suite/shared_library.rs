@@ -1,7 +1,7 @@
 //! `palpate library` and `palpate find --store`: sessions of one computer in a store, on another computer.
 
 use crate::support::{
-    answer, assert_prints, assert_refused, assert_says, palpate, short_run, succeeded, typed,
+    answer, assert_prints, assert_refused, assert_says, json, palpate, short_run, succeeded, typed,
 };
 use std::fs;
 use std::path::Path;
@@ -130,11 +130,19 @@ fn fits_moduli_and_populations_of_a_lake_are_in_a_store_once() {
     let verified = palpate(at, &["library", "verify", &store, "--deep"]);
     assert_prints(&verified, "all 0 session versions and 19 results in the store are whole");
 
-    // A lost object of a result is found, and the stored results of the lake mend another store.
+    // A fit of other settings is no fit of this command.
+    let other = palpate(at, &["fit", "lake", "--fixed", "mu3=0", "--store", &store, "--json"]);
+    assert_eq!(other.status.code(), Some(1));
+    assert_eq!(outcome(&json(&other)), (0, 0));
+
+    // Joined files have the same results; a lost table is made from the lake again, and a lost object is found.
     let (compacted, lost) = (palpate(at, &["library", "compact", &store]), at.join("store/fits"));
     succeeded(&compacted);
     fs::remove_dir_all(lost).unwrap();
     assert_eq!(outcome(&fit("1/1", &[])), (6, 0));
+
+    fs::remove_dir_all(at.join("store/objects")).unwrap();
+    assert_refused(&palpate(at, &["library", "verify", &store]), 1, "the store has 19 faults");
 
     assert_refused(&palpate(at, &["fit", one, "--store", &store]), 2, "--store needs a lake");
     let wrong = palpate(at, &["fit", "lake", "--store", "/srv/store"]);

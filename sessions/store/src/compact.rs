@@ -3,7 +3,7 @@
 use crate::delta::{Action, Add, Remove, Snapshot, commit_info};
 use crate::error::StoreError;
 use crate::location::{REQUESTS, Store};
-use crate::part::{merged, row_count};
+use crate::part::{OTHER_BYTES, is_named, merged, row_count};
 use crate::table::Table;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
@@ -33,34 +33,30 @@ impl Store {
     pub fn compact(&self, now: fn() -> DateTime<Utc>) -> Result<Compaction, StoreError> {
         self.wait(async {
             self.probe(now()).await?;
-            let mut all = Compaction::default();
+            let mut all = None;
             for table in self.tables() {
-                let Compaction { before, after, rows } = table.compact(now).await?;
-                all.before += before;
-                all.after += after;
-                all.rows += rows;
+                let Some(done) = table.compact(now).await? else { continue };
+                let all = all.get_or_insert(Compaction::default());
+                all.before += done.before;
+                all.after += done.after;
+                all.rows += done.rows;
             }
-            match all.before {
-                0 => Err(self.no_table()),
-                _ => Ok(all),
-            }
+            all.ok_or_else(|| self.no_table())
         })
     }
 }
 
 impl Table<'_> {
-    /// Nothing where there is no table.
-    async fn compact(self, now: fn() -> DateTime<Utc>) -> Result<Compaction, StoreError> {
+    /// None where there is no table.
+    async fn compact(self, now: fn() -> DateTime<Utc>) -> Result<Option<Compaction>, StoreError> {
         for _ in 0..TRIES_MAX {
-            let Some(mut snapshot) = self.snapshot().await? else {
-                return Ok(Compaction::default());
-            };
+            let Some(mut snapshot) = self.snapshot().await? else { return Ok(None) };
             let before = snapshot.parts.len();
             let rows = snapshot.parts.values().map(row_count).sum();
             let is_done = self.join_small(&mut snapshot, now()).await?;
             if is_done {
                 self.write_checkpoint(&snapshot).await?;
-                return Ok(Compaction { before, after: snapshot.parts.len(), rows });
+                return Ok(Some(Compaction { before, after: snapshot.parts.len(), rows }));
             }
         }
         Err(StoreError::Crowded { tries: TRIES_MAX })
@@ -105,7 +101,11 @@ impl Table<'_> {
             let path = self.path(&add.path);
             let bytes = self.store.read(&path).await?;
             let bytes = bytes.ok_or_else(|| StoreError::bad(&path, "it is missing"))?;
-            Ok((path, bytes))
+            // Its bytes would be right by the name of the joined file.
+            match is_named(&path, &bytes) {
+                true => Ok((path, bytes)),
+                false => Err(StoreError::bad(&path, OTHER_BYTES)),
+            }
         });
         read.buffered(REQUESTS).try_collect().await
     }

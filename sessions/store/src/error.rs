@@ -41,7 +41,7 @@ pub enum StoreError {
     NoSession { id: String },
     #[error("other writers were faster {tries} times in a row; try later")]
     Crowded { tries: usize },
-    #[error("ended on request; what is stored stays, and the next push goes on from there")]
+    #[error("ended on request; what is stored stays, and the same command goes on from there")]
     Ended,
 }
 

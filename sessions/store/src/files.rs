@@ -5,6 +5,7 @@
 
 use crate::error::StoreError;
 use crate::location::{REQUESTS, Store};
+use crate::part::OTHER_BYTES;
 use bytes::Bytes;
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use object_store::path::Path as ObjectPath;
@@ -277,7 +278,7 @@ impl Store {
         let bytes =
             self.read(&path).await?.ok_or_else(|| StoreError::bad(&path, "it is missing"))?;
         if sha256(&bytes) != sum {
-            return Err(StoreError::bad(&path, "its bytes have another SHA-256 than its name"));
+            return Err(StoreError::bad(&path, OTHER_BYTES));
         }
         Ok(bytes)
     }

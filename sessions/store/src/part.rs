@@ -13,7 +13,9 @@ use polars_core::utils::accumulate_dataframes_vertical;
 use polars_io::SerReader;
 use polars_io::parquet::read::{ParallelStrategy, ParquetReader};
 use serde_json::{Value, json};
+use std::hash::{BuildHasher, RandomState};
 use std::io::Cursor;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A file of rows that is written but not yet in the table.
 pub(crate) struct Part {
@@ -58,8 +60,13 @@ pub(crate) fn part_of(
     });
     let bytes = parquet_bytes(frame).map_err(failed)?;
     let add = Add {
-        // Named by its content and time, so that no two writers share a name.
-        path: format!("part-{}-{}.parquet", now.format("%Y%m%dT%H%M%S%3fZ"), &sha256(&bytes)[..32]),
+        // Named by its content, its time and its writer, so that no two writers share a name.
+        path: format!(
+            "part-{}-{:08x}Z-{}.parquet",
+            now.format("%Y%m%dT%H%M%S%3f"),
+            writer(),
+            &sha256(&bytes)[..32]
+        ),
         partition_values: std::collections::BTreeMap::new(),
         size: i64::try_from(bytes.len()).unwrap_or(i64::MAX),
         modification_time: now.timestamp_millis(),
@@ -67,6 +74,15 @@ pub(crate) fn part_of(
         stats: Some(stats.to_string()),
     };
     Ok(Part { bytes: bytes.into(), add })
+}
+
+/// A number that other threads and processes hardly have in the same millisecond.
+fn writer() -> u32 {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    // Computers that start many processes alike have like identifiers and counts, but not like addresses of their code.
+    let place = RandomState::new().hash_one((std::process::id(), count));
+    u32::try_from(place >> 32).unwrap_or(count)
 }
 
 /// Number of rows of a file, by what the log says of it.
@@ -115,6 +131,9 @@ pub(crate) fn read_frame(bytes: &Bytes, columns: Option<Vec<String>>) -> PolarsR
     let reader = ParquetReader::new(Cursor::new(bytes)).with_columns(columns);
     reader.read_parallel(ParallelStrategy::None).finish()
 }
+
+/// What is wrong with a file of rows that has not.
+pub(crate) const OTHER_BYTES: &str = "its bytes have another SHA-256 than its name";
 
 /// Whether a file of rows has the bytes that its name says. Another program's name says nothing.
 pub(crate) fn is_named(path: &Path, bytes: &Bytes) -> bool {

@@ -7,7 +7,7 @@ use crate::error::StoreError;
 use crate::files::object_path;
 use crate::location::{REQUESTS, Store};
 use crate::mirror::Hear;
-use crate::part::{Part, is_named, part_of, read_frame, unwritable};
+use crate::part::{OTHER_BYTES, Part, is_named, part_of, read_frame, unwritable};
 use crate::push::TRIES_MAX;
 use crate::table::{Shape, Table};
 use bytes::Bytes;
@@ -170,12 +170,13 @@ impl Store {
             self.probe(now()).await?;
             let of_store = Table { store: self, shape: table.shape() };
             of_store.ensure(now()).await?;
+            let mut known = KnownResults::default();
             for (batch, first) in results.chunks(BATCH).zip((0..).step_by(BATCH)) {
                 if hear(first, results.len()).is_break() {
                     return Err(StoreError::Ended);
                 }
                 let named = batch.iter().map(|one| NamedResult::of(table, one)).collect();
-                let added = of_store.add_results(named, now).await?;
+                let added = of_store.add_results(named, &mut known, now).await?;
                 outcome.added += added;
                 outcome.known += batch.len() - added;
             }
@@ -185,25 +186,32 @@ impl Store {
     }
 }
 
+/// What was read of a table: another writer may add files of rows, and a compaction joins them.
+#[derive(Default)]
+struct KnownResults {
+    parts: BTreeSet<String>,
+    computations: BTreeSet<String>,
+}
+
 impl Table<'_> {
     /// Number of results that were added.
     async fn add_results(
         self,
         results: Vec<NamedResult<'_>>,
+        known: &mut KnownResults,
         now: fn() -> DateTime<Utc>,
     ) -> Result<usize, StoreError> {
         let mut new: BTreeMap<String, NamedResult<'_>> =
             results.into_iter().map(|one| (one.computation.clone(), one)).collect();
-        // Files of rows whose computations were looked at: another writer may add more, and a compaction joins them.
-        let mut seen = BTreeSet::new();
         let mut are_stored = false;
         for _ in 0..TRIES_MAX {
             let snapshot = self.snapshot().await?.ok_or_else(|| self.gone())?;
-            let unseen = snapshot.parts.keys().filter(|part| !seen.contains(*part));
+            let unseen = snapshot.parts.keys().filter(|part| !known.parts.contains(*part));
             let read = stream::iter(unseen).map(|part| self.computations(self.path(part)));
             let read: Vec<_> = read.buffered(REQUESTS).try_collect().await?;
-            read.iter().flatten().for_each(|computation| drop(new.remove(computation)));
-            seen.extend(snapshot.parts.into_keys());
+            known.computations.extend(read.into_iter().flatten());
+            known.parts.extend(snapshot.parts.into_keys());
+            new.retain(|computation, _| !known.computations.contains(computation));
             if new.is_empty() {
                 return Ok(0);
             }
@@ -271,7 +279,7 @@ impl Table<'_> {
         let failed = |reason: &dyn ToString| StoreError::bad(path, reason.to_string());
         let bytes = self.store.read(path).await?.ok_or_else(|| failed(&"it is missing"))?;
         if !is_named(path, &bytes) {
-            return Err(failed(&"its bytes have another SHA-256 than its name"));
+            return Err(failed(&OTHER_BYTES));
         }
         let wanted = names.map(str::to_owned).to_vec();
         let frame = read_frame(&bytes, Some(wanted)).map_err(|err| failed(&err))?;

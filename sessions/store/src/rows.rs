@@ -1,7 +1,7 @@
 //! Rows of the table of sessions: one of every version of every session.
 
 use crate::error::StoreError;
-use crate::part::{Part, is_named, part_of, read_frame, unwritable};
+use crate::part::{OTHER_BYTES, Part, is_named, part_of, read_frame, unwritable};
 use crate::table::Shape;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
@@ -143,7 +143,7 @@ pub(crate) fn rows_of(
     let is_named = is_named(&path, bytes);
     let failed = move |reason: String| StoreError::bad(&path, reason);
     if !is_named {
-        return Err(failed("its bytes have another SHA-256 than its name".into()));
+        return Err(failed(OTHER_BYTES.into()));
     }
     let needed = Some(needed.map(str::to_owned).to_vec());
     let frame = read_frame(bytes, needed).map_err(|err| failed(err.to_string()))?;

@@ -70,10 +70,15 @@ impl Store {
                 faults.extend(found.iter().map(|(place, sentence)| fault(place, sentence)));
                 is_there |= !objects.is_empty() || !found.is_empty();
                 results += objects.len();
-                for content in objects.values() {
-                    if let Err(err) = self.verify_object(content, None, is_deep).await {
-                        faults.push(fault(&format!("a result in {one}"), err));
+                let checked = stream::iter(objects.values())
+                    .map(|content| self.verify_object(content, None, is_deep));
+                let mut checked = checked.buffer_unordered(REQUESTS).zip(stream::iter(0..));
+                while let Some((result, done)) = checked.next().await {
+                    if hear(done, objects.len()).is_break() {
+                        return Err(StoreError::Ended);
                     }
+                    faults
+                        .extend(result.err().map(|err| fault(&format!("a result in {one}"), err)));
                 }
             }
             match is_there {

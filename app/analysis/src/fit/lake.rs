@@ -103,7 +103,7 @@ struct StoredFit<'a> {
 }
 
 /// The key of a family's fits in a lake. Named or not, the modified Kelvin body is one, whose fits are in one folder.
-pub(super) fn lake_model(options: &FitOptions) -> String {
+pub(crate) fn lake_model(options: &FitOptions) -> String {
     match options.family().key() {
         key if key == "series-3" => MODEL.to_owned(),
         key => key,

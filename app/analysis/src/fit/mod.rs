@@ -8,8 +8,8 @@ mod stored;
 mod together;
 
 pub use choice::{FitChoice, FitChoiceError};
-pub(crate) use lake::LakePart;
 pub use lake::{LakeFitError, LakeFitEvent, LakeFitOutcome, LakeFitRequest, LakeTally, fit_lake};
+pub(crate) use lake::{LakePart, lake_model};
 pub use last::{KnownFit, KnownFitError, is_poorly_identified, remember};
 pub use stored::{StoredFitError, StoredFits};
 pub use together::{JointFit, JointFitRequest, fit_together};

@@ -11,6 +11,7 @@ use palpate_analysis::shared_results::{LakeResults, add_lake_results, results_wo
 use palpate_sessions::text::sha256_of_file;
 use palpate_tables::lake::{LakeError, LakeResult, Shard};
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,14 +33,13 @@ pub(super) fn run(
         compliance_sha256: args.compliance.as_deref().map(hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };
-    let place = ResultPlace { lake, shard, result: LakeResult::Fit, store: args.store.as_deref() };
+    let place = ResultPlace { lake, result: LakeResult::Fit, store: args.store.as_deref() };
     fit_each("fit", &place, output, |is_ending, hear| fit_lake(&request, is_ending, hear))
 }
 
 /// Where results are stored.
 pub(crate) struct ResultPlace<'a> {
     pub lake: &'a Path,
-    pub shard: Shard,
     pub result: LakeResult,
     /// The address of a store whose tables have them too.
     pub store: Option<&'a str>,
@@ -55,17 +55,17 @@ pub(crate) fn fit_each(
     let is_ending = Arc::new(AtomicBool::new(false));
     batch::end_on_signals(&is_ending)?;
     let bar = output.count_bar(0);
-    let mut failed = Vec::new();
+    let (mut fitted, mut failed) = (BTreeSet::new(), Vec::new());
     let tally = fit(&is_ending, &mut |event| match event {
         LakeFitEvent::Note(note) => output.note(&note),
         LakeFitEvent::Done(count, of) => {
             // The sessions under way are waited for in any case.
             let _ = bar.report(count, of, "");
         }
-        LakeFitEvent::Next(
-            _,
-            Ok(LakeFitOutcome::Fitted | LakeFitOutcome::AlreadyFitted | LakeFitOutcome::Rejected),
-        ) => {}
+        LakeFitEvent::Next(id, Ok(LakeFitOutcome::Fitted | LakeFitOutcome::AlreadyFitted)) => {
+            fitted.insert(id.to_owned());
+        }
+        LakeFitEvent::Next(_, Ok(LakeFitOutcome::Rejected)) => {}
         LakeFitEvent::Next(id, Err(err)) => {
             let reason = failure(err).sentence().to_owned();
             bar.suspend(|| output.note(&format!("{id}: {reason}")));
@@ -73,14 +73,12 @@ pub(crate) fn fit_each(
         }
     });
     let tally = tally.map_err(failure)?;
-    let ResultPlace { lake, shard, result, store } = *place;
+    let ResultPlace { lake, result, store } = *place;
+    let results = LakeResults { lake, result, model: &tally.model, fitted: &fitted };
     // What an interrupted command made is added by the next.
     let store = store.filter(|_| !is_ending.load(Ordering::Relaxed));
-    let added = store
-        .map(|address| {
-            add_lake_results(address, &LakeResults::of(lake, shard, result, &tally), &bar)
-        })
-        .transpose();
+    let added =
+        store.map(|address| add_lake_results(address, &results, &is_ending, &bar)).transpose();
     drop(bar);
     let mut object = json!(tally);
     object["lake"] = json!(lake);

@@ -261,7 +261,6 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
     };
     let place = lake::ResultPlace {
         lake: &press.source,
-        shard,
         result: LakeResult::Modulus,
         store: args.store.as_deref(),
     };

@@ -75,6 +75,7 @@ fn workers_that_race_and_begin_again_add_every_result_once() {
         });
     });
     let rig = Rig::with(&objects);
+    assert_eq!(rig.store.compact(now).unwrap().after, 1);
     let found = verified(&rig);
     assert_eq!(found.faults, []);
     assert_eq!(found.objects.len(), RESULTS);
