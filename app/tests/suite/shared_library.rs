@@ -1,7 +1,8 @@
 //! `palpate library` and `palpate find --store`: sessions of one computer in a store, on another computer.
 
 use crate::support::{
-    answer, assert_prints, assert_refused, assert_says, json, palpate, short_run, succeeded, typed,
+    answer, assert_prints, assert_refused, assert_says, palpate, short_run, stdout, succeeded,
+    typed,
 };
 use std::fs;
 use std::path::Path;
@@ -133,7 +134,9 @@ fn fits_moduli_and_populations_of_a_lake_are_in_a_store_once() {
     // A fit of other settings is no fit of this command.
     let other = palpate(at, &["fit", "lake", "--fixed", "mu3=0", "--store", &store, "--json"]);
     assert_eq!(other.status.code(), Some(1));
-    assert_eq!(outcome(&json(&other)), (0, 0));
+    let printed = stdout(&other);
+    let first = printed.lines().next().unwrap();
+    assert_eq!(outcome(&serde_json::from_str(first).unwrap()), (0, 0));
 
     // Joined files have the same results; a lost table is made from the lake again, and a lost object is found.
     let (compacted, lost) = (palpate(at, &["library", "compact", &store]), at.join("store/fits"));
@@ -142,7 +145,7 @@ fn fits_moduli_and_populations_of_a_lake_are_in_a_store_once() {
     assert_eq!(outcome(&fit("1/1", &[])), (6, 0));
 
     fs::remove_dir_all(at.join("store/objects")).unwrap();
-    assert_refused(&palpate(at, &["library", "verify", &store]), 1, "the store has 19 faults");
+    assert_refused(&palpate(at, &["library", "verify", &store]), 1, "the store has 13 faults");
 
     assert_refused(&palpate(at, &["fit", one, "--store", &store]), 2, "--store needs a lake");
     let wrong = palpate(at, &["fit", "lake", "--store", "/srv/store"]);
