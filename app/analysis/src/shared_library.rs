@@ -9,7 +9,9 @@ use palpate_sessions::Catalog;
 use palpate_sessions::catalog::{CatalogError, LocalSession};
 use palpate_sessions::{FolderError, library_folder};
 pub use palpate_store::StoreVerification;
-use palpate_store::{Compaction, Mirror, Pulled, PushOutcome, Store, StoreError, StoreUrl};
+use palpate_store::{
+    Compaction, Mirror, Pulled, PushOutcome, PushRequest, Store, StoreError, StoreUrl,
+};
 use palpate_tables::lake::LakeError;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -131,7 +133,8 @@ impl SharedLibrary {
         Ok(self.mirror.update(&self.store, &mut hear)?)
     }
 
-    /// Pushes sessions, or all of this computer's library where none is named.
+    /// Pushes sessions, or all of this computer's library where none is named. Those that are named are sent again where the store
+    /// has lost a part of them.
     pub fn push(
         &mut self,
         sessions: &[PathBuf],
@@ -146,7 +149,9 @@ impl SharedLibrary {
             }
             sessions => (PathBuf::new(), read_all(sessions)?),
         };
-        Ok(self.store.push(&mut self.mirror, (&root, &local), now, &mut hear)?)
+        let are_checked = !sessions.is_empty();
+        let request = PushRequest { library: &root, sessions: &local, are_checked };
+        Ok(self.store.push(&mut self.mirror, request, now, &mut hear)?)
     }
 
     /// Pulls sessions, or all where none is named, into folders below `out`.

@@ -11,8 +11,8 @@ use palpate_sessions::text::{sha256, sha256_of_file};
 pub use palpate_store::ResultsOutcome;
 use palpate_store::{ResultNumber, ResultTable, Store, StoreUrl, StudyResult};
 use palpate_tables::lake::{
-    LakeError, LakeResult, LakeSession, StoredResult, list_sessions, model_folder, read_checksums,
-    read_result,
+    LakeError, LakeResult, LakeSession, StoredResult, list_sessions, read_checksums, read_result,
+    result_path,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -42,7 +42,7 @@ impl LakeResults<'_> {
             LakeResult::Modulus => modulus_numbers(&found),
         };
         let numbers = numbers.map_err(|err| LakeError::BadFit {
-            path: model_folder(lake, result, model).join(format!("{}.json", session.id)),
+            path: result_path(lake, result, model, &session.id),
             reason: err.to_string(),
         })?;
         let software_version = settings["software_version"].as_str().unwrap_or_default().to_owned();

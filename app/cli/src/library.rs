@@ -28,7 +28,7 @@ pub struct PushArgs {
     /// The store, as in s3://bucket/folder or file:///folder; credentials of S3 come from AWS_ACCESS_KEY_ID,
     /// AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT
     store: String,
-    /// Session folders; without any, all sessions of the library
+    /// Session folders, which are sent again where the store has lost a part of them; without any, all new sessions of the library
     #[arg(value_name = "SESSION")]
     sessions: Vec<PathBuf>,
 }
@@ -123,7 +123,7 @@ fn verify(args: &VerifyArgs, output: &Output) -> Result<(), Failure> {
     match faults.len() {
         0 => Ok(()),
         count => Err(Failure::failed(format!(
-            "the store has {}; push these sessions from a computer that has them",
+            "the store has {}; remove objects with wrong bytes, and push these sessions by their folders from a computer that has them",
             counted(count, "fault")
         ))),
     }

@@ -70,6 +70,10 @@ pub struct PopulationArgs {
 pub(super) fn run(args: &PopulationArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("folder", args.out.as_deref())?;
     let recipe = recipe(args.family.clone(), args.compliance.as_deref())?;
+    if args.store.is_some() {
+        // Before a population is found that could not be added.
+        recipe.corrections.file().map_err(Failure::usage)?;
+    }
     let request = PopulationRequest {
         paths: &args.sources,
         recipe: &recipe,

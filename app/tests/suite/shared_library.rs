@@ -66,8 +66,10 @@ fn what_one_computer_pushes_another_finds_and_pulls() {
     let object = fs::read_dir(here.join("store/objects")).unwrap().next().unwrap().unwrap().path();
     fs::remove_dir_all(object).unwrap();
     let failed = palpate(there, &["library", "verify", &store]);
-    assert_refused(&failed, 1, "push these sessions from a computer that has them");
+    assert_refused(&failed, 1, "push these sessions by their folders");
     assert_prints(&failed, "it is missing");
+    succeeded(&palpate(here, &["library", "push", &store, "library/sessions/a", "elsewhere"]));
+    succeeded(&palpate(there, &["library", "verify", &store, "--deep"]));
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub use error::StoreError;
 pub use location::{Store, StoreUrl, is_store_url};
 pub use mirror::Mirror;
 pub use pull::Pulled;
-pub use push::{PushOutcome, PushRefusal};
+pub use push::{PushOutcome, PushRefusal, PushRequest};
 pub use results::{ResultNumber, ResultTable, ResultsOutcome, StudyResult};
 pub use rows::STORE_VERSION;
 pub use verify::{StoreFault, StoreVerification};

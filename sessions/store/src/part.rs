@@ -2,20 +2,21 @@
 
 use crate::delta::Add;
 use crate::error::StoreError;
+use crate::probe::name_of_writer;
 use crate::table::Shape;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
 use object_store::path::Path;
 use palpate_sessions::text::sha256;
 use palpate_tables::export::parquet_bytes;
-use polars_core::prelude::{DataFrame, DataType, IntoColumn, PolarsError, PolarsResult, Series};
+use polars_core::prelude::{
+    Column, DataFrame, DataType, IntoColumn, NamedFrom, PolarsError, PolarsResult, Series,
+};
 use polars_core::utils::accumulate_dataframes_vertical;
 use polars_io::SerReader;
 use polars_io::parquet::read::{ParallelStrategy, ParquetReader};
 use serde_json::{Value, json};
-use std::hash::{BuildHasher, RandomState};
 use std::io::Cursor;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A file of rows that is written but not yet in the table.
 pub(crate) struct Part {
@@ -62,9 +63,9 @@ pub(crate) fn part_of(
     let add = Add {
         // Named by its content, its time and its writer, so that no two writers share a name.
         path: format!(
-            "part-{}-{:08x}Z-{}.parquet",
+            "part-{}-{}Z-{}.parquet",
             now.format("%Y%m%dT%H%M%S%3f"),
-            writer(),
+            name_of_writer(),
             &sha256(&bytes)[..32]
         ),
         partition_values: std::collections::BTreeMap::new(),
@@ -74,15 +75,6 @@ pub(crate) fn part_of(
         stats: Some(stats.to_string()),
     };
     Ok(Part { bytes: bytes.into(), add })
-}
-
-/// A number that other threads and processes hardly have in the same millisecond.
-fn writer() -> u32 {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let count = COUNT.fetch_add(1, Ordering::Relaxed);
-    // Computers that start many processes alike have like identifiers and counts, but not like addresses of their code.
-    let place = RandomState::new().hash_one((std::process::id(), count));
-    u32::try_from(place >> 32).unwrap_or(count)
 }
 
 /// Number of rows of a file, by what the log says of it.
@@ -127,12 +119,23 @@ pub(crate) fn merged(
     part_of(shape, frame, false, now)
 }
 
+/// A column for each cell of a row.
+pub(crate) fn columns_of<R, T>(rows: &[R], cells: &[(&str, impl Fn(&R) -> T)]) -> Vec<Column>
+where
+    Series: NamedFrom<Vec<T>, [T]>,
+{
+    let columns = cells.iter().map(|(name, of)| {
+        Series::new((*name).into(), rows.iter().map(of).collect::<Vec<T>>()).into_column()
+    });
+    columns.collect()
+}
+
 pub(crate) fn read_frame(bytes: &Bytes, columns: Option<Vec<String>>) -> PolarsResult<DataFrame> {
     let reader = ParquetReader::new(Cursor::new(bytes)).with_columns(columns);
     reader.read_parallel(ParallelStrategy::None).finish()
 }
 
-/// What is wrong with a file of rows that has not.
+/// What is wrong with an object whose bytes are not those that its name says.
 pub(crate) const OTHER_BYTES: &str = "its bytes have another SHA-256 than its name";
 
 /// Whether a file of rows has the bytes that its name says. Another program's name says nothing.

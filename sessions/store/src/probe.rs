@@ -15,15 +15,17 @@ const WRITERS: u8 = 8;
 /// Bytes of each: enough that a server is still receiving one while it looks at another's name.
 const BYTES: usize = 1 << 16;
 
-/// Probes of this process, so that no two share a name.
-static COUNT: AtomicU64 = AtomicU64::new(0);
+/// A name that no other writer on this computer has, and none twice.
+pub(crate) fn name_of_writer() -> String {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    format!("{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+}
 
 impl Store {
     /// Puts one name several times at once and once more: one of them may succeed, and its bytes must stay.
     pub(crate) async fn probe(&self, now: DateTime<Utc>) -> Result<(), StoreError> {
         let now = now.timestamp_nanos_opt().unwrap_or_default();
-        let place = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        let path = Path::from(format!("probe/{now}-{}-{}", place.0, place.1));
+        let path = Path::from(format!("probe/{now}-{}", name_of_writer()));
         let body = |writer: u8| Bytes::from(vec![writer; BYTES]);
         let racing = (0..WRITERS).map(|writer| self.put_new(&path, body(writer)));
         let mut written = join_all(racing).await.into_iter().collect::<Result<Vec<bool>, _>>()?;

@@ -16,6 +16,16 @@ const BATCH: usize = 64;
 /// How often another writer may be faster before a push gives up: with sixteen writers each is first in time.
 pub(crate) const TRIES_MAX: usize = 200;
 
+/// Sessions to push.
+#[derive(Clone, Copy, Debug)]
+pub struct PushRequest<'a> {
+    /// Below which each session has the folder of its entry.
+    pub library: &'a Path,
+    pub sessions: &'a [LocalSession],
+    /// Whether sessions that were pushed as they are are looked at again, for objects that the store has lost.
+    pub are_checked: bool,
+}
+
 /// Why a session was not pushed, although it could be.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PushRefusal {
@@ -56,7 +66,7 @@ enum Verdict {
 fn choose(
     mirror: &Mirror,
     folder: &Path,
-    local: &LocalSession,
+    (local, are_checked): (&LocalSession, bool),
     outcome: &mut PushOutcome,
 ) -> Result<Option<Vec<LocalFile>>, StoreError> {
     let entry = &local.entry;
@@ -71,7 +81,8 @@ fn choose(
         outcome.unfinished.push(entry.folder.clone());
         return Ok(None);
     }
-    if mirror.catalog.is_pushed(folder, &local.fingerprint)?
+    if !are_checked
+        && mirror.catalog.is_pushed(folder, &local.fingerprint)?
         && mirror.catalog.mirrored_content(&entry.session_id)?.is_some()
     {
         outcome.known += 1;
@@ -88,15 +99,16 @@ fn choose(
 }
 
 impl Store {
-    /// Pushes finished sessions below a folder, each named by the folder of its entry. What the store has already is not
+    /// Pushes finished sessions. What the store has already is not
     /// sent again, and an upload that was cut off goes on.
     pub fn push(
         &self,
         mirror: &mut Mirror,
-        (library, sessions): (&Path, &[LocalSession]),
+        request: PushRequest<'_>,
         now: fn() -> DateTime<Utc>,
         hear: Hear<'_>,
     ) -> Result<PushOutcome, StoreError> {
+        let PushRequest { library, sessions, are_checked } = request;
         self.wait(self.probe(now()))?;
         self.wait(self.sessions().ensure(now()))?;
         mirror.update(self, &mut |_, _| ControlFlow::Continue(()))?;
@@ -105,7 +117,7 @@ impl Store {
             let mut chosen = Vec::new();
             for local in batch {
                 let folder = library.join(&local.entry.folder);
-                if let Some(files) = choose(mirror, &folder, local, &mut outcome)? {
+                if let Some(files) = choose(mirror, &folder, (local, are_checked), &mut outcome)? {
                     let session_id = local.entry.session_id.clone();
                     chosen.push((folder, local, LocalFiles { session_id, files }));
                 }

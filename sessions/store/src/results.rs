@@ -7,7 +7,7 @@ use crate::error::StoreError;
 use crate::files::object_path;
 use crate::location::{REQUESTS, Store};
 use crate::mirror::Hear;
-use crate::part::{OTHER_BYTES, Part, is_named, part_of, read_frame, unwritable};
+use crate::part::{OTHER_BYTES, Part, columns_of, is_named, part_of, read_frame, unwritable};
 use crate::push::TRIES_MAX;
 use crate::table::{Shape, Table};
 use bytes::Bytes;
@@ -15,7 +15,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use futures_util::stream::{self, StreamExt, TryStreamExt};
 use object_store::path::Path;
 use palpate_sessions::text::sha256;
-use polars_core::prelude::{DataFrame, IntoColumn, NamedFrom, Series};
+use polars_core::prelude::DataFrame;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -42,13 +42,18 @@ pub struct ResultNumber {
     /// What the number is of the parameter: its value, or a term of a population.
     pub term: String,
     pub parameter: String,
-    /// Of value, errors and intervals.
+    /// Of value, errors and intervals; empty where they have none.
     pub unit: String,
     pub value: f64,
+    /// Standard error; of a modulus the standard uncertainty of all sources.
     pub std_error: Option<f64>,
+    /// Ends of the 95 % interval.
     pub ci95: [Option<f64>; 2],
+    /// Standard uncertainty that the calibration adds.
     pub systematic_error: Option<f64>,
+    /// Ends of the 95 % interval of everything that is known to be uncertain.
     pub total95: [Option<f64>; 2],
+    /// Whether it was kept at a given value.
     pub is_fixed: bool,
 }
 
@@ -90,7 +95,7 @@ impl ResultTable {
 const KEY: &str = "computation_sha256";
 
 type Word = fn(&Row<'_>) -> Option<String>;
-type Number = fn(&ResultNumber) -> Option<f64>;
+type Number = fn(&Row<'_>) -> Option<f64>;
 
 const WORDS: [(&str, Word); 11] = [
     (KEY, |row| Some(row.computation.clone())),
@@ -107,13 +112,13 @@ const WORDS: [(&str, Word); 11] = [
 ];
 
 const NUMBERS: [(&str, Number); 7] = [
-    ("value", |one| Some(one.value)),
-    ("std_error", |one| one.std_error),
-    ("ci95_low", |one| one.ci95[0]),
-    ("ci95_high", |one| one.ci95[1]),
-    ("systematic_error", |one| one.systematic_error),
-    ("total95_low", |one| one.total95[0]),
-    ("total95_high", |one| one.total95[1]),
+    ("value", |row| Some(row.number.value)),
+    ("std_error", |row| row.number.std_error),
+    ("ci95_low", |row| row.number.ci95[0]),
+    ("ci95_high", |row| row.number.ci95[1]),
+    ("systematic_error", |row| row.number.systematic_error),
+    ("total95_low", |row| row.number.total95[0]),
+    ("total95_high", |row| row.number.total95[1]),
 ];
 
 const IS_FIXED: &str = "is_fixed";
@@ -251,16 +256,10 @@ impl Table<'_> {
             })
         });
         let rows: Vec<Row<'_>> = rows.collect();
-        let words = WORDS.iter().map(|(name, of)| {
-            Series::new((*name).into(), rows.iter().map(of).collect::<Vec<_>>()).into_column()
-        });
-        let numbers = NUMBERS.iter().map(|(name, of)| {
-            let values: Vec<_> = rows.iter().map(|row| of(row.number)).collect();
-            Series::new((*name).into(), values).into_column()
-        });
-        let fixed: Vec<bool> = rows.iter().map(|row| row.number.is_fixed).collect();
-        let fixed = Series::new(IS_FIXED.into(), fixed).into_column();
-        let frame = DataFrame::new(rows.len(), words.chain(numbers).chain([fixed]).collect());
+        let fixed = [(IS_FIXED, |row: &Row<'_>| row.number.is_fixed)];
+        let columns =
+            [columns_of(&rows, &WORDS), columns_of(&rows, &NUMBERS), columns_of(&rows, &fixed)];
+        let frame = DataFrame::new(rows.len(), columns.concat());
         part_of(self.shape, frame.map_err(unwritable(self.shape))?, true, now)
     }
 

@@ -1,7 +1,7 @@
 //! Rows of the table of sessions: one of every version of every session.
 
 use crate::error::StoreError;
-use crate::part::{OTHER_BYTES, Part, is_named, part_of, read_frame, unwritable};
+use crate::part::{OTHER_BYTES, Part, columns_of, is_named, part_of, read_frame, unwritable};
 use crate::table::Shape;
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
@@ -9,7 +9,7 @@ use object_store::path::Path;
 use palpate_model::metadata::{MANIFEST_FIELDS, METADATA_KEYS, MetadataKind};
 use palpate_sessions::catalog::{CatalogEntry, NamedValueSource};
 use palpate_sessions::text::checksum;
-use polars_core::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
+use polars_core::prelude::{DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 
 /// Version of the store's layout.
@@ -98,12 +98,6 @@ fn fact<'a>(row: &'a SessionRow, name: &str) -> Option<&'a palpate_sessions::cat
 }
 
 fn frame(rows: &[SessionRow]) -> PolarsResult<DataFrame> {
-    let words = WORDS.iter().map(|(name, of)| {
-        Series::new((*name).into(), rows.iter().map(of).collect::<Vec<_>>()).into_column()
-    });
-    let counts = COUNTS.iter().map(|(name, of)| {
-        Series::new((*name).into(), rows.iter().map(of).collect::<Vec<_>>()).into_column()
-    });
     let durations: Vec<f64> = rows.iter().map(|row| row.entry.duration_s).collect();
     let duration = Series::new("duration_s".into(), durations).into_column();
     let facts = facts().map(|(name, kind)| {
@@ -123,7 +117,8 @@ fn frame(rows: &[SessionRow]) -> PolarsResult<DataFrame> {
         };
         series.into_column()
     });
-    let all: Vec<Column> = words.chain(counts).chain([duration]).chain(facts).collect();
+    let (words, counts) = (columns_of(rows, &WORDS), columns_of(rows, &COUNTS));
+    let all = words.into_iter().chain(counts).chain([duration]).chain(facts).collect();
     DataFrame::new(rows.len(), all)
 }
 

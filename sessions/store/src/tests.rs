@@ -5,7 +5,7 @@ mod results;
 
 use crate::files::object_path;
 use crate::part::row_count;
-use crate::{Mirror, PushOutcome, Store, StoreError, StoreUrl};
+use crate::{Mirror, PushOutcome, PushRequest, Store, StoreError, StoreUrl};
 use bytes::Bytes;
 use chrono::{DateTime, Utc};
 use futures_util::stream::BoxStream;
@@ -188,8 +188,16 @@ impl Rig {
 
     fn push(&mut self, sessions: &[&str]) -> Result<PushOutcome, StoreError> {
         let local: Vec<LocalSession> = sessions.iter().map(|one| self.local(one)).collect();
-        let library = self.library();
-        self.store.push(&mut self.mirror, (&library, &local), now, &mut go_on)
+        self.push_local(&local, false)
+    }
+
+    fn push_local(
+        &mut self,
+        sessions: &[LocalSession],
+        are_checked: bool,
+    ) -> Result<PushOutcome, StoreError> {
+        let request = PushRequest { library: &self.library(), sessions, are_checked };
+        self.store.push(&mut self.mirror, request, now, &mut go_on)
     }
 
     fn pull(&mut self, session: &str) -> Result<PathBuf, StoreError> {
@@ -268,8 +276,7 @@ fn a_table_that_names_a_folder_elsewhere_pulls_nothing() {
         rig.record("a");
         let mut local = rig.local("a");
         local.entry.session_id = name.into();
-        let library = rig.library();
-        rig.store.push(&mut rig.mirror, (&library, &[local]), now, &mut go_on).unwrap();
+        rig.push_local(&[local], false).unwrap();
         let before = files(rig.folder.path()).len();
         let refused = rig.pull(name).unwrap_err();
         assert!(matches!(refused, StoreError::Bad { .. }), "{name}: {refused}");
@@ -283,13 +290,12 @@ fn unfinished_sessions_and_spare_folders_are_not_pushed() {
     rig.record("a");
     rig.record("b");
     rig.write("b", "spare", "/elsewhere");
-    let library = rig.library();
     let mut unfinished = rig.local("a");
     unfinished.entry.ending = None;
     let mut damaged = rig.local("a");
     damaged.entry.trouble = Some("its log is damaged".into());
     let all = [unfinished, damaged, rig.local("b")];
-    let outcome = rig.store.push(&mut rig.mirror, (&library, &all), now, &mut go_on).unwrap();
+    let outcome = rig.push_local(&all, false).unwrap();
     assert_eq!((outcome.unfinished.len(), outcome.refused.len(), outcome.pushed.len()), (1, 2, 0));
     assert!(outcome.refused[0].reason.contains("damaged"));
     assert!(outcome.refused[1].reason.contains("spare folder"));
@@ -476,4 +482,25 @@ fn another_table_at_the_same_place_is_read_from_its_start() {
     std::mem::swap(&mut rig.store, &mut other.store);
     rig.mirror.update(&rig.store, &mut go_on).unwrap();
     assert_eq!(rig.mirror.catalog().mirrored_ids().unwrap(), ["b"]);
+}
+
+#[test]
+fn a_lost_object_is_sent_again_where_its_session_is_checked() {
+    let objects: Arc<InMemory> = Arc::default();
+    let mut rig = Rig::with(&objects);
+    rig.record("a");
+    rig.push(&["a"]).unwrap();
+    let (_, content) = rig.mirror.catalog().mirrored_content("a").unwrap().unwrap();
+    let list = rig.store.wait(rig.store.file_list(&content)).unwrap();
+    for lost in [content, list.files[0].pieces[0].clone()] {
+        rig.store.wait(objects.delete(&object_path(&lost))).unwrap();
+        // Without a look at the store the session is as it was pushed.
+        assert_eq!(rig.push(&["a"]).unwrap().known, 1);
+        assert!(!rig.store.verify(false, &mut go_on).unwrap().faults.is_empty());
+        let local = rig.local("a");
+        let again = rig.push_local(&[local], true).unwrap();
+        assert_eq!((again.known, again.pushed.len()), (1, 0));
+        assert_eq!(rig.store.verify(true, &mut go_on).unwrap().faults, []);
+    }
+    assert_eq!(rig.table(), [("a".to_owned(), 1)].into());
 }

@@ -23,10 +23,9 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     check(args)?;
-    let shard = args.shard.unwrap_or(Shard::WHOLE);
     let request = LakeFitRequest {
         lake,
-        shard,
+        shard: args.shard.unwrap_or(Shard::WHOLE),
         recipe,
         fixed: &args.fixed,
         free: &args.free,

@@ -252,10 +252,9 @@ fn over_lake(args: &MaterialArgs, press: &MaterialRequest, output: &Output) -> R
         ("--save", args.save.is_some()),
         ("--analysis", args.analysis.is_some()),
     ])?;
-    let shard = args.shard.unwrap_or(Shard::WHOLE);
     let request = LakeMaterialRequest {
         press,
-        shard,
+        shard: args.shard.unwrap_or(Shard::WHOLE),
         compliance_sha256: args.compliance.as_deref().map(lake::hash_file).transpose()?,
         jobs: jobs(args.jobs),
     };

@@ -52,7 +52,7 @@ pub enum FitState {
 
 impl FitFile<'_> {
     pub fn path(&self) -> PathBuf {
-        model_folder(self.lake, self.result, self.model).join(format!("{}.json", self.session_id))
+        result_path(self.lake, self.result, self.model, self.session_id)
     }
 
     fn settings_sha256(&self) -> String {
@@ -91,14 +91,23 @@ pub fn read_fit<T: DeserializeOwned>(
     model: &str,
     session_id: &str,
 ) -> Result<Option<StoredFitFile<T>>, LakeError> {
-    let folder = model_folder(lake, LakeResult::Fit, model);
-    let path = folder.join(format!("{session_id}.json"));
-    let text = match fs::read(&path) {
-        Err(err) if err.kind() == ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(|source| LakeError::Io { path: path.clone(), source })?,
-    };
-    let read = serde_json::from_slice(&text);
+    let path = result_path(lake, LakeResult::Fit, model, session_id);
+    let Some(text) = read_text(&path)? else { return Ok(None) };
+    let read = serde_json::from_str(&text);
     read.map(Some).map_err(|err| LakeError::BadFit { path, reason: err.to_string() })
+}
+
+/// The file of a session's result.
+#[must_use]
+pub fn result_path(lake: &Path, result: LakeResult, model: &str, session_id: &str) -> PathBuf {
+    model_folder(lake, result, model).join(format!("{session_id}.json"))
+}
+
+fn read_text(path: &Path) -> Result<Option<String>, LakeError> {
+    match fs::read_to_string(path) {
+        Err(err) if err.kind() == ErrorKind::NotFound => Ok(None),
+        text => text.map(Some).map_err(|source| LakeError::Io { path: path.into(), source }),
+    }
 }
 
 /// A whole result as it is stored.
@@ -117,11 +126,8 @@ pub fn read_result(
     model: &str,
     session_id: &str,
 ) -> Result<Option<StoredResult>, LakeError> {
-    let path = model_folder(lake, result, model).join(format!("{session_id}.json"));
-    let text = match fs::read_to_string(&path) {
-        Err(err) if err.kind() == ErrorKind::NotFound => return Ok(None),
-        text => text.map_err(|source| LakeError::Io { path: path.clone(), source })?,
-    };
+    let path = result_path(lake, result, model, session_id);
+    let Some(text) = read_text(&path)? else { return Ok(None) };
     let bad = |reason: String| LakeError::BadFit { path: path.clone(), reason };
     let mut stored: Value = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
     let [_, _, key] = result.names();

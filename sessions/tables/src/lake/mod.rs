@@ -22,7 +22,7 @@ mod write;
 
 pub use fits::{
     FitFile, FitState, LakeResult, StoredFitFile, StoredResult, find_fit, list_models,
-    model_folder, read_fit, read_result, store_fit,
+    model_folder, read_fit, read_result, result_path, store_fit,
 };
 pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
 pub use read::{
