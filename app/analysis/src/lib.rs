@@ -59,6 +59,7 @@ pub mod shared_library;
 pub mod shared_results;
 pub mod source;
 pub mod specimen_queue;
+pub mod station_settings;
 pub mod study_table;
 pub mod support_bundle;
 pub mod tick_replay;

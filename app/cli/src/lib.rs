@@ -57,6 +57,8 @@ mod scene;
 mod select;
 #[cfg(feature = "haptics")]
 mod slave;
+#[cfg(feature = "station")]
+mod station;
 mod steps;
 mod study;
 mod support_bundle;
@@ -121,6 +123,8 @@ macro_rules! commands {
 commands! { windows;
     Window(window::WindowArgs) => window::run [windows];
     Run(run::RunArgs) => run::run;
+    #[cfg(feature = "station")] Serve(station::serve::ServeArgs) => station::serve::run;
+    #[cfg(feature = "station")] #[command(subcommand)] Token(station::token::TokenCommand) => station::token::run;
     #[command(subcommand)] Queue(queue::QueueCommand) => queue::run;
     #[command(subcommand)] Protocol(protocol::ProtocolCommand) => protocol::run;
     DailyCheck(daily_check::DailyCheckArgs) => daily_check::run;

@@ -18,8 +18,8 @@ use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{EngineInput, Operator};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Weak};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -59,7 +59,40 @@ pub enum RunnerRequest {
 pub struct Runner {
     requests: SyncSender<RunnerRequest>,
     snapshot: Arc<ArcSwap<RunnerSnapshot>>,
+    /// Held by the thread for as long as it lives.
+    life: Weak<()>,
     thread: Option<JoinHandle<()>>,
+}
+
+/// Snapshots of a runner and requests to it for another thread. It keeps no runner alive.
+#[derive(Clone)]
+pub struct RunnerHandle {
+    requests: SyncSender<RunnerRequest>,
+    snapshot: Arc<ArcSwap<RunnerSnapshot>>,
+    life: Weak<()>,
+}
+
+impl RunnerHandle {
+    /// The newest snapshot; the last one once the runner has ended.
+    pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
+        self.snapshot.load_full()
+    }
+
+    pub fn is_alive(&self) -> bool {
+        self.life.strong_count() > 0
+    }
+
+    /// Asks for something. Fails only when the runner has ended or is swamped.
+    pub fn request(&self, request: RunnerRequest) -> Result<(), String> {
+        send(&self.requests, request)
+    }
+}
+
+fn send(requests: &SyncSender<RunnerRequest>, request: RunnerRequest) -> Result<(), String> {
+    requests.try_send(request).map_err(|_| {
+        "the thread that controls the rig does not answer; close palpate and check the rig"
+            .to_string()
+    })
 }
 
 impl Runner {
@@ -79,23 +112,32 @@ impl Runner {
         let shared = Arc::clone(&snapshot);
         let to_stop = requests.clone();
         let (registered, is_registered) = sync_channel(1);
+        let alive = Arc::new(());
+        let life = Arc::downgrade(&alive);
         let thread = std::thread::Builder::new().name("runner".into()).spawn(move || {
             let link = main_loop.rig.halt_handle();
             main_loop.registered = Some(RigRegistration::new(to_stop, link));
             let _ = registered.send(());
             main_loop.run(first, &receiver, &shared, &wake);
+            drop(alive);
         })?;
         // A panic anywhere from here on stops this rig, however late the thread gets its first turn.
         let _ = is_registered.recv();
-        Ok(Self { requests, snapshot, thread: Some(thread) })
+        Ok(Self { requests, snapshot, life, thread: Some(thread) })
     }
 
     /// Asks for something. Fails only when the runner has ended or is swamped.
     pub fn request(&self, request: RunnerRequest) -> Result<(), String> {
-        self.requests.try_send(request).map_err(|_| {
-            "the thread that controls the rig does not answer; close palpate and check the rig"
-                .to_string()
-        })
+        send(&self.requests, request)
+    }
+
+    /// For a thread that watches, and may ask for a stop.
+    pub fn handle(&self) -> RunnerHandle {
+        RunnerHandle {
+            requests: self.requests.clone(),
+            snapshot: Arc::clone(&self.snapshot),
+            life: self.life.clone(),
+        }
     }
 
     /// Passes on the operator's choice.
@@ -109,7 +151,7 @@ impl Runner {
     }
 
     pub fn is_alive(&self) -> bool {
-        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
+        self.life.strong_count() > 0
     }
 
     #[cfg(test)]

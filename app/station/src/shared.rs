@@ -1,0 +1,63 @@
+//! What all connections share.
+
+use crate::access::Access;
+use crate::live::Published;
+use crate::remote::RemoteDesk;
+use palpate_analysis::station_settings::StationSettings;
+use palpate_runner::{RunnerHandle, Stopwatch};
+use std::path::PathBuf;
+use std::sync::atomic::AtomicUsize;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use tokio::sync::{Semaphore, watch};
+
+pub(crate) struct Shared {
+    pub runner: RunnerHandle,
+    pub access: Access,
+    pub desk: Arc<Mutex<RemoteDesk>>,
+    pub library: PathBuf,
+    /// Since the station was started.
+    watch: Stopwatch,
+    pub watchers: AtomicUsize,
+    /// The newest live messages.
+    pub live: watch::Sender<Arc<Published>>,
+    /// Searches of the library: one at a time, and a few that wait.
+    pub searches: Semaphore,
+    pub searches_waiting: Semaphore,
+}
+
+/// Searches that may wait for the one in progress.
+const SEARCHES_WAITING: usize = 8;
+
+impl Shared {
+    pub fn new(
+        settings: &StationSettings,
+        runner: RunnerHandle,
+        desk: Arc<Mutex<RemoteDesk>>,
+    ) -> Self {
+        let is_local = settings.address.ip().is_loopback();
+        let access = Access::new(
+            settings.library.clone(),
+            is_local,
+            settings.tls.is_some(),
+            settings.names.clone(),
+        );
+        let (live, _) = watch::channel(Arc::new(Published::of(&runner.snapshot(), true, None)));
+        Self {
+            runner,
+            access,
+            desk,
+            library: settings.library.clone(),
+            watch: Stopwatch::start(),
+            watchers: AtomicUsize::new(0),
+            live,
+            searches: Semaphore::new(1),
+            searches_waiting: Semaphore::new(SEARCHES_WAITING),
+        }
+    }
+
+    /// Time since the station was started.
+    pub fn now(&self) -> Duration {
+        Duration::from_secs_f64(self.watch.seconds())
+    }
+}
