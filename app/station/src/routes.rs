@@ -7,7 +7,7 @@ use crate::remote::{RemoteRefusal, RemoteRequest, RemoteRunState, lock};
 use crate::shared::Shared;
 use crate::tokens::Scope;
 use crate::view::{API_VERSION, Curve, StationState, events};
-use axum::extract::rejection::{JsonRejection, QueryRejection};
+use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::extract::{DefaultBodyLimit, Extension, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
@@ -23,8 +23,8 @@ use palpate_sessions::specimen_queue::SpecimenQueue;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 pub(crate) const STOP: &str = "/api/v1/stop";
@@ -292,8 +292,17 @@ async fn ask_run(
     caller.require(Scope::Run)?;
     let Json(body) = body.map_err(|err| Problem::new(err.status(), err.body_text()))?;
     let request = RemoteRequest { queue: body.queue, values: body.values, remark: body.remark };
+    let bench = shared.bench.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let bench = bench.ok_or_else(|| {
+        Problem::conflict(
+            "this station starts nothing; serve the rig from a window or with 'palpate serve'",
+        )
+    })?;
+    let snapshot = shared.runner.snapshot();
     let mut desk = lock(&shared.desk);
-    let run = desk.ask(request, &caller.name, wall_now()).map_err(refused)?;
+    let run = desk
+        .ask(request, &caller.name, wall_now(), |plan| bench.check(plan, &snapshot.rig))
+        .map_err(refused)?;
     Ok((StatusCode::CREATED, object(run)?))
 }
 
@@ -303,13 +312,18 @@ struct WaitQuery {
     wait_s: Option<f64>,
 }
 
+fn number(id: Result<Path<u64>, PathRejection>) -> Result<u64, Problem> {
+    id.map(|Path(id)| id).map_err(|err| Problem::wrong(err.body_text()))
+}
+
 async fn remote_run(
     State(shared): State<Arc<Shared>>,
     Extension(caller): Extension<Caller>,
-    Path(id): Path<u64>,
+    id: Result<Path<u64>, PathRejection>,
     query: Asked<WaitQuery>,
 ) -> Answer {
     caller.require(Scope::Watch)?;
+    let id = number(id)?;
     let wait = asked(query)?.wait_s.unwrap_or(0.0);
     if !(0.0..=WAIT_MAX_S).contains(&wait) {
         return Err(Problem::wrong(format!("wait_s is from 0 to {WAIT_MAX_S}")));
@@ -335,9 +349,10 @@ async fn remote_run(
 async fn withdraw_run(
     State(shared): State<Arc<Shared>>,
     Extension(caller): Extension<Caller>,
-    Path(id): Path<u64>,
+    id: Result<Path<u64>, PathRejection>,
 ) -> Answer {
     caller.require(Scope::Run)?;
+    let id = number(id)?;
     let mut desk = lock(&shared.desk);
     desk.withdraw(id, &caller.name).map_err(refused)?;
     object(desk.run(id).map_err(refused)?)

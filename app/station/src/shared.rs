@@ -2,7 +2,7 @@
 
 use crate::access::Access;
 use crate::live::Published;
-use crate::remote::RemoteDesk;
+use crate::remote::{RemoteBench, RemoteDesk};
 use palpate_analysis::station_settings::StationSettings;
 use palpate_runner::{RunnerHandle, Stopwatch};
 use std::path::PathBuf;
@@ -15,6 +15,8 @@ pub(crate) struct Shared {
     pub runner: RunnerHandle,
     pub access: Access,
     pub desk: Arc<Mutex<RemoteDesk>>,
+    /// What runs over the network are made with; without it none is asked for.
+    pub bench: Arc<Mutex<Option<RemoteBench>>>,
     pub library: PathBuf,
     /// Since the station was started.
     watch: Stopwatch,
@@ -34,6 +36,7 @@ impl Shared {
         settings: &StationSettings,
         runner: RunnerHandle,
         desk: Arc<Mutex<RemoteDesk>>,
+        bench: Arc<Mutex<Option<RemoteBench>>>,
     ) -> Self {
         let is_local = settings.address.ip().is_loopback();
         let access = Access::new(
@@ -47,6 +50,7 @@ impl Shared {
             runner,
             access,
             desk,
+            bench,
             library: settings.library.clone(),
             watch: Stopwatch::start(),
             watchers: AtomicUsize::new(0),

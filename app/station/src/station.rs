@@ -92,7 +92,8 @@ impl Station {
         let address = listener.local_addr().map_err(failed)?;
         let desk = Arc::new(Mutex::new(RemoteDesk::default()));
         let bench = Arc::new(Mutex::new(bench));
-        let shared = Arc::new(Shared::new(settings, runner.clone(), Arc::clone(&desk)));
+        let shared = Shared::new(settings, runner.clone(), Arc::clone(&desk), Arc::clone(&bench));
+        let shared = Arc::new(shared);
         let starter = Starter::new(Arc::clone(&desk), runner);
         let (end, ended) = oneshot::channel();
         let is_tls = tls.is_some();

@@ -224,12 +224,13 @@ impl RemoteDesk {
         self.runs.iter().filter(|run| run.state == RemoteRunState::Waiting)
     }
 
-    /// Puts a run at the end of those that wait.
+    /// Puts a run at the end of those that wait; `check` says whether the rig can run its plan.
     pub fn ask(
         &mut self,
         request: RemoteRequest,
         token: &str,
         now: SystemTime,
+        check: impl FnOnce(&Plan) -> Result<(), String>,
     ) -> Result<&RemoteRun, RemoteRefusal> {
         self.expire(now);
         let Some(arming) = &self.arming else {
@@ -244,7 +245,8 @@ impl RemoteDesk {
             let most = format!("the remark is too long; give at most {REMARK_MAX} characters");
             return Err(RemoteRefusal::Values(most));
         }
-        arming.queue.plan(&request.values).map_err(RemoteRefusal::Values)?;
+        let plan = arming.queue.plan(&request.values).map_err(RemoteRefusal::Values)?;
+        check(&plan).map_err(RemoteRefusal::Values)?;
         let waiting = self.waiting().count();
         if waiting >= WAITING_MAX {
             return Err(RemoteRefusal::Full);

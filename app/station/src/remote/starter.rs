@@ -7,9 +7,10 @@ use palpate_analysis::source::SourceSelection;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::Plan;
+use palpate_protocols::preview::preview;
 use palpate_rheology::fit::FitOptions;
 use palpate_runner::{
-    AfterStop, PromptResponder, RunRequest, RunnerHandle, RunnerRequest, RunnerSnapshot,
+    AfterStop, PromptResponder, RigView, RunRequest, RunnerHandle, RunnerRequest, RunnerSnapshot,
     StartError, wall_now,
 };
 use palpate_sessions::new_session_folder;
@@ -30,6 +31,15 @@ pub struct RemoteBench {
     pub to_acknowledge: Vec<String>,
     pub is_virtual: bool,
     pub library: PathBuf,
+}
+
+impl RemoteBench {
+    /// Whether the rig can run a plan without an acknowledgement, or why not.
+    pub(crate) fn check(&self, plan: &Plan, rig: &RigView) -> Result<(), String> {
+        let curve = self.calibration.curve().map_err(|err| err.to_string())?;
+        let preview = preview(plan, &rig.description, &self.limits, &curve, rig.is_homed);
+        preview.check_start(false)
+    }
 }
 
 /// A run of ours that was asked of the runner.

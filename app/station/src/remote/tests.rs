@@ -23,23 +23,28 @@ fn request(speed: &str) -> RemoteRequest {
     }
 }
 
+/// A rig that can run everything.
+fn any(_: &Plan) -> Result<(), String> {
+    Ok(())
+}
+
 #[test]
 fn nothing_runs_that_is_not_armed() {
     let mut idle = RemoteDesk::default();
     let now = wall_now();
-    let refusal = idle.ask(request("2 mm/s"), "a", now).unwrap_err();
+    let refusal = idle.ask(request("2 mm/s"), "a", now, any).unwrap_err();
     assert!(refusal.to_string().contains("none was armed yet"), "{refusal}");
     let (mut desk, now) = desk(3);
     let other = RemoteRequest { queue: "forces".into(), ..request("2 mm/s") };
-    assert!(matches!(desk.ask(other, "a", now), Err(RemoteRefusal::OtherQueue { .. })));
-    assert!(matches!(desk.ask(request("9 mm/s"), "a", now), Err(RemoteRefusal::Values(_))));
-    assert_eq!(desk.ask(request("2 mm/s"), "a", now).unwrap().id, 1);
+    assert!(matches!(desk.ask(other, "a", now, any), Err(RemoteRefusal::OtherQueue { .. })));
+    assert!(matches!(desk.ask(request("9 mm/s"), "a", now, any), Err(RemoteRefusal::Values(_))));
+    assert_eq!(desk.ask(request("2 mm/s"), "a", now, any).unwrap().id, 1);
     // Its time is over: what waits is withdrawn, and nothing starts.
     let later = now + Duration::from_mins(10);
     assert!(desk.next(later).is_none());
     assert_eq!(desk.run(1).unwrap().state, RemoteRunState::Withdrawn);
     assert!(desk.armed().is_none());
-    let refusal = desk.ask(request("2 mm/s"), "a", later).unwrap_err();
+    let refusal = desk.ask(request("2 mm/s"), "a", later, any).unwrap_err();
     assert!(refusal.to_string().contains("its time is over"), "{refusal}");
 }
 
@@ -48,8 +53,8 @@ fn every_ending_but_finish_takes_the_arming_back() {
     use EndingKind::{Abort, Finish, Halt, Interlock, Stop};
     for ending in [Finish, Stop, Abort, Halt, Interlock] {
         let (mut desk, now) = desk(3);
-        desk.ask(request("2 mm/s"), "a", now).unwrap();
-        desk.ask(request("3 mm/s"), "a", now).unwrap();
+        desk.ask(request("2 mm/s"), "a", now, any).unwrap();
+        desk.ask(request("3 mm/s"), "a", now, any).unwrap();
         let (id, _, _) = desk.next(now).unwrap();
         assert!(desk.next(now).is_none(), "one at a time");
         desk.ended(id, ending, "why");
@@ -62,12 +67,12 @@ fn every_ending_but_finish_takes_the_arming_back() {
 #[test]
 fn an_arming_has_so_many_runs() {
     let (mut desk, now) = desk(2);
-    desk.ask(request("2 mm/s"), "a", now).unwrap();
-    desk.ask(request("3 mm/s"), "a", now).unwrap();
-    assert_eq!(desk.ask(request("4 mm/s"), "a", now).unwrap_err(), RemoteRefusal::Used);
+    desk.ask(request("2 mm/s"), "a", now, any).unwrap();
+    desk.ask(request("3 mm/s"), "a", now, any).unwrap();
+    assert_eq!(desk.ask(request("4 mm/s"), "a", now, any).unwrap_err(), RemoteRefusal::Used);
     desk.withdraw(2, "a").unwrap();
     assert_eq!(desk.withdraw(2, "a"), Err(RemoteRefusal::NotWaiting(2)));
-    desk.ask(request("4 mm/s"), "a", now).unwrap();
+    desk.ask(request("4 mm/s"), "a", now, any).unwrap();
     for id in [1, 3] {
         assert_eq!(desk.next(now).unwrap().0, id);
         desk.ended(id, EndingKind::Finish, "");
@@ -79,7 +84,7 @@ fn an_arming_has_so_many_runs() {
 #[test]
 fn a_busy_rig_starts_nothing() {
     let (mut desk, now) = desk(2);
-    desk.ask(request("2 mm/s"), "a", now).unwrap();
+    desk.ask(request("2 mm/s"), "a", now, any).unwrap();
     desk.set_busy(Some("the haptic loop runs".into()));
     assert!(desk.next(now).is_none());
     desk.set_busy(None);
@@ -90,7 +95,7 @@ fn a_busy_rig_starts_nothing() {
 fn what_is_remembered_is_bounded() {
     let (mut desk, now) = desk(1000);
     for number in 0..2000 {
-        let asked = desk.ask(request("2 mm/s"), "a", now).map(|run| run.id);
+        let asked = desk.ask(request("2 mm/s"), "a", now, any).map(|run| run.id);
         match asked {
             Ok(id) if number % 2 == 0 => desk.withdraw(id, "a").unwrap(),
             Ok(_) => {}

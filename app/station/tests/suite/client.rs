@@ -61,8 +61,20 @@ impl Lab {
     }
 
     pub fn at(address: &str, scale: TimeScale, is_plain_allowed: bool) -> Self {
+        Self::with(address, scale, is_plain_allowed, SimSettings::default())
+    }
+
+    pub fn with(
+        address: &str,
+        scale: TimeScale,
+        is_plain_allowed: bool,
+        settings: SimSettings,
+    ) -> Self {
         let library = tempfile::tempdir().unwrap();
-        let runner = Runner::start(Box::new(rig()), scale, None, || ()).unwrap();
+        let rig = SimRig::new(settings);
+        let (calibration, limits) =
+            (rig.calibration(), Limits::for_travel(rig.description().travel));
+        let runner = Runner::start(Box::new(rig), scale, None, || ()).unwrap();
         let settings = StationSettings {
             address: address.parse().unwrap(),
             tls: None,
@@ -71,8 +83,8 @@ impl Lab {
             library: library.path().to_owned(),
         };
         let bench = RemoteBench {
-            calibration: rig().calibration(),
-            limits: Limits::for_travel(rig().description().travel),
+            calibration,
+            limits,
             to_acknowledge: Vec::new(),
             is_virtual: true,
             library: library.path().to_owned(),

@@ -1,6 +1,7 @@
 //! Runs over the network: of a queue that a person at the rig has armed, and of nothing else.
 
 use super::client::{Answer, Lab};
+use palpate_drivers::sim::SimSettings;
 use palpate_runner::{TimeScale, wall_now};
 use palpate_sessions::Session;
 use palpate_station::remote::RemoteQueue;
@@ -16,9 +17,14 @@ const QUEUE: &str = "format = \"palpate-remote-queue 1\"\nname = \"speeds\"\npro
 /// A lab with a token that may ask for runs.
 fn lab(scale: TimeScale) -> (Lab, String) {
     let lab = Lab::new(scale);
+    let token = token(&lab);
+    (lab, token)
+}
+
+fn token(lab: &Lab) -> String {
     let all = [Scope::Watch, Scope::Stop, Scope::Run];
     let token = Tokens::add(lab.library.path(), "search", &all, String::new()).unwrap();
-    (lab, format!("Authorization: Bearer {token}"))
+    format!("Authorization: Bearer {token}")
 }
 
 fn arm(lab: &Lab, text: &str) {
@@ -56,7 +62,8 @@ fn a_program_asks_and_gets_the_fit() {
     arm(&lab, QUEUE);
     // Without a token nobody starts anything, not even on this computer.
     assert_eq!(ask(&lab, "X-Nothing: 1", "3 mm/s").status, 403);
-    for wrong in ["9 mm/s", "0 mm/s", "fast"] {
+    // The last is between two speeds of the motor.
+    for wrong in ["9 mm/s", "0 mm/s", "fast", "3.01 mm/s"] {
         let answer = ask(&lab, &token, wrong);
         assert_eq!(answer.status, 400, "{wrong}: {answer:?}");
     }
@@ -80,7 +87,7 @@ fn a_stop_takes_the_arming_back() {
     let (lab, token) = lab(TimeScale::Factor(1.0));
     arm(&lab, QUEUE);
     let first = ask(&lab, &token, "3 mm/s").json();
-    let second = ask(&lab, &token, "4 mm/s").json();
+    let second = ask(&lab, &token, "4.5 mm/s").json();
     until(
         || lab.runner.snapshot().run.as_ref().map(|_| ()),
         || "the first run does not begin".into(),
@@ -97,20 +104,19 @@ fn a_stop_takes_the_arming_back() {
 }
 
 #[test]
-fn an_interlock_takes_the_arming_back() {
-    let (lab, token) = lab(TimeScale::Max);
-    // A speed at which this depth exceeds the largest force.
-    let deep = QUEUE.replace("\"6 mm\"", "\"29 mm\"");
-    arm(&lab, &deep);
-    let asked = ask(&lab, &token, "8 mm/s").json();
+fn a_run_that_fails_takes_the_arming_back() {
+    // Ten times as stiff as the preview expects.
+    let stiff = SimSettings { stiffness: "1000".parse().unwrap(), ..SimSettings::default() };
+    let lab = Lab::with("127.0.0.1:0", TimeScale::Max, false, stiff);
+    let token = token(&lab);
+    arm(&lab, QUEUE);
+    let asked = ask(&lab, &token, "3 mm/s").json();
     let run = ended(&lab, &token, &asked["id"]);
-    if run["state"] == "refused" {
-        // The preview asks for an acknowledgement, which only a person at the rig can give.
-        assert!(run["reason"].as_str().unwrap().contains("acknowledge"), "{run}");
-    } else {
-        assert_ne!(run["ending"], "finish", "{run}");
-        assert!(lab.get("/api/v1/remote").json()["armed"].is_null());
-    }
+    assert_eq!(run["ending"], "abort", "{run}");
+    let state = lab.get("/api/v1/remote").json();
+    assert!(state["armed"].is_null());
+    assert!(state["disarmed"].as_str().unwrap().contains("ended by abort"), "{state}");
+    assert_eq!(ask(&lab, &token, "3 mm/s").status, 409);
 }
 
 #[test]
