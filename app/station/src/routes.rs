@@ -15,7 +15,6 @@ use axum::routing::{get, post};
 use axum::{Json, Router, middleware};
 use palpate_analysis::catalog_search::{CatalogSearch, search, update};
 use palpate_analysis::progress::NoProgress;
-use palpate_protocols::engine::Operator;
 use palpate_runner::{RunView, RunnerRequest, wall_now};
 use palpate_sessions::catalog::{CatalogEntry, CatalogQuery};
 use palpate_sessions::folder::free_bytes;
@@ -249,14 +248,11 @@ async fn stop(
 ) -> Answer {
     caller.require(Scope::Stop)?;
     shared.access.take_stop(peer, shared.now())?;
-    let passed = shared.runner.request(RunnerRequest::Operator(Operator::Stop));
-    let by = caller.words(peer);
-    // Both are logged even where the runner no longer answers.
-    tracing::warn!("stop over the network by {by}");
-    let note = format!("stop over the network by {by}");
-    let noted = shared.runner.request(RunnerRequest::Note(note));
-    lock(&shared.desk).disarm(&format!("the rig was stopped over the network by {by}"));
-    passed.and(noted).map_err(Problem::unavailable)?;
+    let words = format!("stop over the network by {}", caller.words(peer));
+    let passed = shared.runner.request(RunnerRequest::RemoteStop(words.clone()));
+    tracing::warn!("{words}");
+    lock(&shared.desk).disarm(&words);
+    passed.map_err(Problem::unavailable)?;
     object(&json!({ "is_passed_on": true, "remark": BEST_EFFORT }))
 }
 

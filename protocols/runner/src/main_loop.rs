@@ -50,6 +50,9 @@ pub enum RunnerRequest {
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
     Operator(Operator),
     Note(String),
+    /// A stop by somebody who is not at the rig, with the note that says who. The note takes as long as a sample does; behind
+    /// the stop it would be lost where the run ends at once.
+    RemoteStop(String),
     /// Reconnect the rig after its link was lost. Nothing moves, and the axis must be homed again. Ignored during a run.
     Reconnect,
     Shutdown,
@@ -400,6 +403,17 @@ impl MainLoop {
         }
     }
 
+    fn obey(&mut self, choice: Operator) {
+        if self.is_running() {
+            self.feed(EngineInput::Operator { choice });
+        } else if matches!(choice, Operator::Stop | Operator::Abort) {
+            self.rig.send(RigCommand::Stop);
+        } else if choice == Operator::Halt {
+            self.rig.send(RigCommand::Halt);
+            self.is_homed = false;
+        }
+    }
+
     fn serve(&mut self, request: RunnerRequest) -> bool {
         match request {
             RunnerRequest::Run(request, reply) => {
@@ -408,15 +422,10 @@ impl MainLoop {
                 // The caller may have stopped waiting; the snapshot holds the same answer.
                 let _ = reply.try_send(answer);
             }
-            RunnerRequest::Operator(choice) => {
-                if self.is_running() {
-                    self.feed(EngineInput::Operator { choice });
-                } else if matches!(choice, Operator::Stop | Operator::Abort) {
-                    self.rig.send(RigCommand::Stop);
-                } else if choice == Operator::Halt {
-                    self.rig.send(RigCommand::Halt);
-                    self.is_homed = false;
-                }
+            RunnerRequest::Operator(choice) => self.obey(choice),
+            RunnerRequest::RemoteStop(text) => {
+                self.feed(EngineInput::Note { text });
+                self.obey(Operator::Stop);
             }
             RunnerRequest::Note(text) => self.feed(EngineInput::Note { text }),
             RunnerRequest::Reconnect if self.is_running() => {}

@@ -99,7 +99,7 @@ fn a_stop_takes_the_arming_back() {
     assert_eq!(second["state"], "withdrawn");
     let state = lab.get("/api/v1/remote").json();
     assert!(state["armed"].is_null());
-    assert!(state["disarmed"].as_str().unwrap().contains("stopped over the network"));
+    assert!(state["disarmed"].as_str().unwrap().contains("stop over the network"));
     assert_eq!(ask(&lab, &token, "3 mm/s").status, 409);
 }
 
