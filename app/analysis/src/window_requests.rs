@@ -1,5 +1,6 @@
 //! Requests that open a window: the front end that parses them need not know any window.
 
+use crate::station_settings::StationSettings;
 use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
@@ -33,6 +34,8 @@ pub struct WorkbenchRequest {
     pub to_open: Vec<PathBuf>,
     /// Keep the rig from other programs while the window has it.
     pub locks: Vec<HolderLock>,
+    /// Serve the rig from the start.
+    pub station: Option<StationSettings>,
     /// Opens another rig for the same window, if that is possible.
     pub open_rig: Option<RigOpener>,
 }
@@ -56,6 +59,7 @@ impl WorkbenchRequest {
             scale,
             to_open: Vec::new(),
             locks: Vec::new(),
+            station: None,
             open_rig: None,
         }
     }

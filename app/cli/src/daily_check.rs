@@ -64,7 +64,8 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         },
         leader: None,
     };
-    let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, &|| (), output)?;
+    let snapshot =
+        super::run::execute(bench.rig, args.rig.time_scale, request, &mut |_| Ok(()), output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed(
             "the thread that runs protocols ended before the check began; start the check again",

@@ -18,6 +18,9 @@ pub struct WindowArgs {
     paths: Vec<PathBuf>,
     #[command(flatten)]
     rig: RigArgs,
+    #[cfg(feature = "station")]
+    #[command(flatten)]
+    serve: super::station::ServeBesideArgs,
 }
 
 pub(super) fn run(
@@ -33,6 +36,8 @@ pub(super) fn run(
     let doubts = if args.rig.calibration.is_none() { bench.doubts.clone() } else { Vec::new() };
     let request = request(bench, args.rig.time_scale)?;
     let request = WorkbenchRequest { to_open, doubts, ..request };
+    #[cfg(feature = "station")]
+    let request = WorkbenchRequest { station: args.serve.settings()?, ..request };
     windows.workbench(request).map_err(Failure::Failed)
 }
 

@@ -16,4 +16,4 @@ mod station;
 pub mod tokens;
 pub mod view;
 
-pub use station::{Station, StationError};
+pub use station::{BoundStation, Station, StationError};

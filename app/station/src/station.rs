@@ -74,13 +74,17 @@ pub struct Station {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Station {
-    /// Listens and serves on a thread of its own. With a bench, runs of an armed queue can be asked for.
-    pub fn start(
-        settings: &StationSettings,
-        runner: RunnerHandle,
-        bench: Option<RemoteBench>,
-    ) -> Result<Self, StationError> {
+/// A station that has its address and does not serve yet.
+pub struct BoundStation {
+    settings: StationSettings,
+    listener: std::net::TcpListener,
+    address: SocketAddr,
+    tls: Option<Arc<ServerConfig>>,
+}
+
+impl BoundStation {
+    /// Takes the address and reads the certificate: what can be refused is refused here, before anything moves.
+    pub fn bind(settings: &StationSettings) -> Result<Self, StationError> {
         let address = settings.address;
         if !address.ip().is_loopback() && settings.tls.is_none() && !settings.is_plain_allowed {
             return Err(StationError::Plain { address });
@@ -90,9 +94,19 @@ impl Station {
         let listener = std::net::TcpListener::bind(address).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
+        Ok(Self { settings: settings.clone(), listener, address, tls })
+    }
+
+    /// Serves on a thread of its own. With a bench, runs of an armed queue can be asked for.
+    pub fn serve(
+        self,
+        runner: RunnerHandle,
+        bench: Option<RemoteBench>,
+    ) -> Result<Station, StationError> {
+        let Self { settings, listener, address, tls } = self;
         let desk = Arc::new(Mutex::new(RemoteDesk::default()));
         let bench = Arc::new(Mutex::new(bench));
-        let shared = Shared::new(settings, runner.clone(), Arc::clone(&desk), Arc::clone(&bench));
+        let shared = Shared::new(&settings, runner.clone(), Arc::clone(&desk), Arc::clone(&bench));
         let shared = Arc::new(shared);
         let starter = Starter::new(Arc::clone(&desk), runner);
         let (end, ended) = oneshot::channel();
@@ -123,7 +137,18 @@ impl Station {
         };
         let thread = std::thread::Builder::new().name("station".into()).spawn(serve);
         let thread = thread.map_err(StationError::Thread)?;
-        Ok(Self { address, is_tls, desk, bench, end: Some(end), thread: Some(thread) })
+        Ok(Station { address, is_tls, desk, bench, end: Some(end), thread: Some(thread) })
+    }
+}
+
+impl Station {
+    /// Listens and serves. With a bench, runs of an armed queue can be asked for.
+    pub fn start(
+        settings: &StationSettings,
+        runner: RunnerHandle,
+        bench: Option<RemoteBench>,
+    ) -> Result<Self, StationError> {
+        BoundStation::bind(settings)?.serve(runner, bench)
     }
 
     /// Where it listens, with the port that was chosen where none was given.

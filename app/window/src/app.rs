@@ -5,6 +5,7 @@ use crate::screens::screen::{Screen, Screens};
 use crate::screens::{result, rig, run, start_page};
 use crate::settings::{SettingsFile, ZOOM};
 use crate::shell::activity::{activity, run_in_progress};
+use crate::shell::armed::armed_ui;
 use crate::shell::dropped_files::push_dropped;
 use crate::shell::event_log::{EventLog, FOLDED_HEIGHT};
 use crate::shell::frame_meter::FrameMeter;
@@ -206,6 +207,8 @@ impl WorkbenchApp {
         self.screens.stop();
         self.screens.close();
         let old = &self.workbench;
+        let station = old.station.settings();
+        let request = WorkbenchRequest { station, ..request };
         let options = WindowOptions {
             sessions: old.library.clone().ok(),
             list_ports: old.list_ports,
@@ -300,6 +303,9 @@ impl WorkbenchApp {
         }
         if let Some(reason) = self.workbench.dialog_refusal(self.screens.shown()) {
             panel("dialog_refusal", ui).show(ui, |ui| alarm_ui(ui, reason));
+        }
+        if let Some(armed) = self.workbench.station.armed() {
+            panel("armed", ui).show(ui, |ui| armed_ui(ui, &armed, commands));
         }
         if self.tour.is_on() {
             panel("tour", ui).show(ui, |ui| self.tour.ui(ui, commands));

@@ -5,6 +5,7 @@ use crate::shell::run_strip::RunControl;
 use crate::shell::sizes::PanelEdge;
 use crate::workers::PathPurpose;
 use crate::workers::queue_desk::QueueWork;
+use crate::workers::station::StationCommand;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -48,6 +49,8 @@ pub enum UiCommand {
     /// Writes the text of the note field into the run in progress, or a mark where it is empty.
     NoteTyped,
     ManualMove(ManualMove),
+    /// Serves the rig, or arms a queue for runs over the network.
+    Station(StationCommand),
     /// Takes the protocol that calibrates the load cell.
     MeasureCalibration,
     /// Takes the protocol of the daily check.

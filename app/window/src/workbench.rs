@@ -7,6 +7,7 @@ use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
 use crate::workers::queue_desk::QueueDesk;
+use crate::workers::station::{StationDesk, remote_bench};
 use crate::workers::{BackgroundTask, Dialog, PathPurpose};
 use eframe::egui::{Context, Ui};
 use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
@@ -16,6 +17,7 @@ use palpate_model::calibration::Calibration;
 use palpate_protocols::engine::Operator;
 use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
 use palpate_sessions::folder::HolderLock;
+use palpate_station::remote::RemoteBench;
 use rfd::FileDialog;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -53,6 +55,8 @@ pub struct Occupation {
 
 /// The window's side of the rig and the run, which belong to the runner.
 pub struct Workbench {
+    /// Dropped before the runner: nothing is started over the network in a window that closes.
+    pub station: StationDesk,
     runner: Runner,
     pub snapshot: Arc<RunnerSnapshot>,
     /// The last one whose run is not a move by hand.
@@ -118,7 +122,9 @@ impl Workbench {
             }
             None => palpate_sessions::library_folder().map_err(|err| err.to_string()),
         };
+        let station = StationDesk::new(request.station.clone(), library.as_ref().ok());
         let mut workbench = Self {
+            station,
             latest_run: LatestRun::new(&request.calibration),
             snapshot: runner.snapshot(),
             measured: runner.snapshot(),
@@ -152,6 +158,11 @@ impl Workbench {
             is_closing: false,
         };
         workbench.refresh_ports(ctx);
+        if request.station.is_some()
+            && let Some(bench) = workbench.remote_bench()
+        {
+            workbench.station.serve(&workbench.runner, bench);
+        }
         Ok(workbench)
     }
 
@@ -217,6 +228,21 @@ impl Workbench {
         }
     }
 
+    /// Whether a run over the network may begin now, or why not.
+    fn station_verdict(&self) -> Result<(), String> {
+        require(self.intent() == Intent::None && !self.has_next_run(), "the window starts a run")?;
+        match self.occupation.running.first() {
+            Some((_, words)) => Err((*words).to_owned()),
+            None => require(!self.latest_run.is_judging(), "the daily check is being judged"),
+        }
+    }
+
+    /// What runs over the network are made with; none without a library.
+    fn remote_bench(&self) -> Option<RemoteBench> {
+        let library = self.library.as_ref().ok()?.clone();
+        Some(remote_bench(&self.bench, self.is_simulated, library))
+    }
+
     /// Whether times may be measured now, or why not.
     pub fn measure_verdict(&self) -> Result<(), String> {
         let has_run = run_in_progress(&self.snapshot).is_some();
@@ -254,6 +280,11 @@ impl Workbench {
             UiCommand::Reconnect => {
                 let sent = self.runner.request(RunnerRequest::Reconnect);
                 self.keep_refusal(sent);
+            }
+            UiCommand::Station(command) => {
+                if let Some(bench) = self.remote_bench() {
+                    self.station.act(ctx, command, (&self.runner, bench));
+                }
             }
             UiCommand::ListPorts => self.refresh_ports(ctx),
             UiCommand::Queue(work, reason) => {
@@ -301,6 +332,9 @@ impl Workbench {
     pub fn operator(&mut self, choice: Operator) {
         let passed = self.runner.send_choice(choice);
         self.keep_refusal(passed);
+        if matches!(choice, Operator::Stop | Operator::Halt | Operator::Abort) {
+            self.station.disarm("a person at the rig stopped it");
+        }
     }
 
     /// Writes a note into the run in progress; false without one.
@@ -361,6 +395,8 @@ impl Workbench {
         self.ports.poll();
         self.poll_start();
         self.queue.poll(ctx);
+        let busy = self.station_verdict().err();
+        self.station.poll(busy);
     }
 
     /// Follows the run that is shown; true when a run that has a result has just ended.
@@ -371,6 +407,7 @@ impl Workbench {
         self.latest_run.update(ctx, run, &self.bench, depth_mm, library);
         if let Some(gate) = self.latest_run.take_gate() {
             self.bench.take_gate(gate);
+            self.station.disarm("a daily check was made at the rig");
             self.form.forget();
         }
         self.latest_run.take_ended(self.measured.run.as_ref())

@@ -97,12 +97,16 @@ pub(super) fn run(
     };
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let answers = if is_virtual { PromptResponder::Confirm } else { PromptResponder::Operator };
+    #[cfg(feature = "station")]
+    let bound = options.serve.bind()?;
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
         // A full channel holds a wake-up already.
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
+    #[cfg(feature = "station")]
+    let _station = super::station::serve_run(bound, &runner, output)?;
     let is_question_open = super::run::stop_on_signals(&runner)?;
     let prompts = (answers == PromptResponder::Operator)
         .then(|| OperatorPrompts::start(runner.requests(), is_question_open));

@@ -127,6 +127,9 @@ pub struct SessionArgs {
     /// Only preview the run
     #[arg(long)]
     pub(super) preview: bool,
+    #[cfg(feature = "station")]
+    #[command(flatten)]
+    pub(super) serve: super::station::ServeBesideArgs,
 }
 
 pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
@@ -226,7 +229,19 @@ pub(super) fn run_plan(
         };
     }
     check_start(&preview, &gate, options.acknowledge, output)?;
-    let snapshot = execute(bench.rig, options.rig.time_scale, request, begun, output)?;
+    #[cfg(feature = "station")]
+    let (mut bound, mut station) = (options.serve.bind()?, None);
+    let mut begin = |_runner: &Runner| {
+        #[cfg(feature = "station")]
+        {
+            station = super::station::serve_run(bound.take(), _runner, output)?;
+        }
+        begun();
+        Ok(())
+    };
+    let snapshot = execute(bench.rig, options.rig.time_scale, request, &mut begin, output)?;
+    #[cfg(feature = "station")]
+    drop(station);
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed(
             "the thread that runs protocols ended without a run; start the run again",
@@ -309,14 +324,14 @@ pub(super) fn execute(
     rig: Box<dyn Rig>,
     scale: TimeScale,
     request: RunRequest,
-    begun: &dyn Fn(),
+    begun: &mut dyn FnMut(&Runner) -> Result<(), Failure>,
     output: &Output,
 ) -> Result<Arc<RunnerSnapshot>, Failure> {
     let has_operator = request.answers == PromptResponder::Operator;
     let started = StartedRun::start(rig, scale, request).map_err(start_failure)?;
     let is_question_open = stop_on_signals(&started.runner)?;
     started.wait_for_start().map_err(start_failure)?;
-    begun();
+    begun(&started.runner)?;
     let requests = started.runner.requests();
     let prompts = has_operator.then(|| OperatorPrompts::start(requests, is_question_open));
     let mut prompts = prompts.transpose()?;

@@ -4,13 +4,14 @@ pub(super) mod serve;
 pub(super) mod token;
 
 use super::Failure;
+use super::output::Output;
 use super::rig::OpenRig;
 use clap::Args;
 use palpate_analysis::station_settings::{STATION_PORT, StationSettings, TlsFiles};
-use palpate_runner::RunnerHandle;
+use palpate_runner::{Runner, RunnerHandle};
 use palpate_sessions::library_folder;
 use palpate_station::remote::RemoteBench;
-use palpate_station::{Station, StationError};
+use palpate_station::{BoundStation, Station, StationError};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
@@ -29,6 +30,42 @@ pub struct StationArgs {
     /// A name by which browsers may call the station, beside its addresses; may be repeated
     #[arg(long = "host-name", value_name = "HOST")]
     names: Vec<String>,
+}
+
+/// A station beside a run or a window.
+#[derive(Clone, Debug, Default, Args)]
+pub struct ServeBesideArgs {
+    /// Serve the rig over HTTP meanwhile: watch and stop it from a browser, at this address or port, or at 127.0.0.1:7480
+    #[arg(long, value_name = "ADDRESS", value_parser = parse_address, num_args = 0..=1, require_equals = true,
+        default_missing_value = "7480")]
+    serve: Option<SocketAddr>,
+    #[command(flatten)]
+    station: StationArgs,
+}
+
+impl ServeBesideArgs {
+    /// The settings of the station, if there is to be one.
+    pub fn settings(&self) -> Result<Option<StationSettings>, Failure> {
+        self.serve.map(|address| self.station.settings(address)).transpose()
+    }
+
+    /// Takes the address, where a station is wanted: before anything moves.
+    pub fn bind(&self) -> Result<Option<BoundStation>, Failure> {
+        let settings = self.settings()?;
+        settings.map(|settings| BoundStation::bind(&settings).map_err(failure)).transpose()
+    }
+}
+
+/// Serves a run: it can be watched and stopped, and nothing can be started.
+pub(super) fn serve_run(
+    bound: Option<BoundStation>,
+    runner: &Runner,
+    output: &Output,
+) -> Result<Option<Station>, Failure> {
+    let Some(bound) = bound else { return Ok(None) };
+    let station = bound.serve(runner.handle(), None).map_err(failure)?;
+    output.note(&format!("the rig is served at {}/", station.url()));
+    Ok(Some(station))
 }
 
 /// Parses an address, or a port of this computer.
@@ -67,13 +104,17 @@ pub(super) fn start(
     runner: RunnerHandle,
     bench: Option<RemoteBench>,
 ) -> Result<Station, Failure> {
-    Station::start(settings, runner, bench).map_err(|err| match err {
+    Station::start(settings, runner, bench).map_err(failure)
+}
+
+fn failure(err: StationError) -> Failure {
+    match err {
         StationError::Plain { .. } => {
             Failure::usage(format!("{err}; add --certificate FILE --key FILE, or --plain"))
         }
         StationError::Tls { .. } => Failure::usage(err),
         StationError::Listen { .. } | StationError::Thread(_) => Failure::failed(err),
-    })
+    }
 }
 
 /// What runs over the network are made with.

@@ -18,6 +18,8 @@ let socket = null;
 let heardAt = 0;
 let pictures = { curve: { t_s: [], depth_mm: [], force_n: [] }, events: [] };
 let isOverDepth = false;
+// Name of the session of the run in progress, or a name that no session has.
+let inProgress = "/";
 
 async function ask(path, options = {}) {
   const headers = token() ? { Authorization: "Bearer " + token() } : {};
@@ -66,6 +68,7 @@ function show(message) {
       [clock(line.at_s) + "  " + line.text, line.is_alarm ? "alarm" : ""]));
   }
   const { rig, run } = message;
+  inProgress = run && !run.outcome ? run.session : "/";
   put("rig", rig.name);
   document.title = (run && !run.outcome ? Math.round(run.fraction * 100) + " % · " : "") + rig.name + " · palpate";
   const isBad = (outcome) => outcome && !["finish", "stop"].includes(outcome.ending);
@@ -218,8 +221,12 @@ async function lists() {
       "run " + run.id + "  " + Object.values(run.values).join(", ") + "  " + run.state
         + (run.reason && run.state !== "ended" ? ": " + run.reason : "")]));
     fill("sessions", sessions.sessions.length
-      ? sessions.sessions.map((one) => [new Date(one.started_at).toLocaleString() + "  " + (one.specimen || one.protocol)
-          + "  " + (one.ending || "no end"), ["finish", "stop"].includes(one.ending) ? "" : "alarm"])
+      ? sessions.sessions.map((one) => {
+          const isNow = one.folder.endsWith(inProgress);
+          return [new Date(one.started_at).toLocaleString() + "  " + (one.specimen || one.protocol)
+            + "  " + (one.ending || (isNow ? "in progress" : "no end")),
+            isNow || ["finish", "stop"].includes(one.ending) ? "" : "alarm"];
+        })
       : [["No session is recorded.", "faint"]]);
   } catch (error) {
     fill("sessions", [[error.message, "faint"]]);

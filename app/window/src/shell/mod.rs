@@ -2,6 +2,7 @@
 
 pub mod actions;
 pub mod activity;
+pub mod armed;
 pub mod dropped_files;
 pub mod event_log;
 pub mod frame_meter;

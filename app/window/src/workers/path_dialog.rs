@@ -30,6 +30,8 @@ pub enum PathPurpose {
     Opened,
     /// A rig file to connect.
     Rig,
+    /// A remote queue to arm.
+    RemoteQueue,
     /// A table of specimens for the queue.
     Specimens,
 }
@@ -129,6 +131,7 @@ pub fn pick(ask: PathPurpose, dialog: FileDialog) -> Option<(PathPurpose, PathBu
         PathPurpose::Specimens => of_kind("Table of specimens", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
         PathPurpose::Scene => of_kind("Scene", "scenes", &["toml"]),
+        PathPurpose::RemoteQueue => of_kind("Remote queue", "remote queues", &["toml"]),
         PathPurpose::Rig => of_kind("Rig file", "rig files", &["toml"]),
         PathPurpose::Protocol => of_kind("Protocol", "protocols", &["toml"]),
     };

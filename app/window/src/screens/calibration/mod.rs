@@ -226,6 +226,7 @@ impl Screen for CalibrationScreen {
         let (calibration, doubts) = (one.calibration.clone(), one.doubts.clone());
         if workbench.bench.take_calibration(calibration, doubts).is_ok() {
             workbench.form.forget();
+            workbench.station.disarm("another calibration was chosen at the rig");
         }
     }
 

@@ -1,19 +1,25 @@
 //! The screen of the rig: its readings in large letters, and manual moves.
 
+mod station;
+
 use super::rig_panel::rig_ui;
-use super::screen::{Commands, Screen, ScreenEntry, UiCommand, Workbench};
+use super::screen::{Commands, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use crate::command::ManualMove;
 use crate::theme::reading_style;
 use crate::widgets::{
     QuantityField, alarm_ui, fact_ui, placeholder_ui, quantity_ui, reason_button, require,
     section_ui, tokens_of,
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, RichText, ScrollArea, Ui, Vec2, vec2};
+use crate::workers::PathPurpose;
+use eframe::egui::{
+    Align, Button, Context, Key, Label, Layout, RichText, ScrollArea, Ui, Vec2, vec2,
+};
 use palpate_model::calibration::CalibrationCurve;
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::units::{MmPerS, Seconds};
 use palpate_runner::RigView;
+use station::StationForm;
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Rig",
@@ -33,11 +39,16 @@ const READING: Vec2 = vec2(180.0, 52.0);
 pub struct RigScreen {
     distance: QuantityField,
     speed: QuantityField,
+    station: StationForm,
 }
 
 impl Default for RigScreen {
     fn default() -> Self {
-        Self { distance: QuantityField::new(1.0), speed: QuantityField::new(3.0) }
+        Self {
+            distance: QuantityField::new(1.0),
+            speed: QuantityField::new(3.0),
+            station: StationForm::default(),
+        }
     }
 }
 
@@ -55,7 +66,19 @@ impl Screen for RigScreen {
             self.move_ui(ui, workbench, commands);
             section_ui(ui, "Limits that no protocol can loosen");
             limits_ui(ui, rig, &workbench.bench.limits);
+            section_ui(ui, "Station");
+            self.station.ui(ui, workbench, commands);
         });
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &UiCommand, _: &mut Workbench) -> Reaction {
+        match command {
+            UiCommand::Chosen(PathPurpose::RemoteQueue, path) => {
+                self.station.file = path.display().to_string();
+                Reaction::Show
+            }
+            _ => Reaction::NotMine,
+        }
     }
 
     fn has_right(&self) -> bool {
