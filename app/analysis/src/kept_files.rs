@@ -4,6 +4,7 @@
 
 use crate::fit::last;
 use crate::shared_library::STORES_FOLDER;
+use crate::station_settings::{TOKENS_FILE, TOKENS_FORMAT};
 use crate::window_requests::{SETTINGS_FILE, SETTINGS_VERSION};
 use palpate_model::calibration::CALIBRATION_FORMAT;
 use palpate_model::rig::compliance_document::COMPLIANCE_FORMAT;
@@ -140,6 +141,13 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             "TOML; locks are empty".to_owned(),
             "you; locks: a program that holds a rig",
             "delete a lock that no program holds",
+        ),
+        (
+            "tokens of stations",
+            TOKENS_FILE,
+            format!("JSON, format {TOKENS_FORMAT}"),
+            "'palpate token'",
+            "'palpate token remove NAME', or delete the file",
         ),
         (
             "log of the program",

@@ -6,6 +6,12 @@ use std::path::PathBuf;
 /// The port where none is chosen.
 pub const STATION_PORT: u16 = 7480;
 
+/// The file of tokens in the library.
+pub const TOKENS_FILE: &str = "station-tokens.json";
+
+/// Version of that file.
+pub const TOKENS_FORMAT: u32 = 1;
+
 /// Certificate chain and private key, each a PEM file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TlsFiles {

@@ -1,5 +1,6 @@
 //! Tokens: who may do what over the network. Only their SHA-256 is stored.
 
+use palpate_analysis::station_settings::{TOKENS_FILE, TOKENS_FORMAT};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -7,12 +8,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use thiserror::Error;
-
-/// The file of tokens in the library.
-pub const TOKENS_FILE: &str = "station-tokens.json";
-
-/// Version of that file.
-const TOKENS_FORMAT: u32 = 1;
 
 /// A file of more is not one of ours: a laboratory has some tens of tokens.
 const BYTES_MAX: u64 = 256 * 1024;

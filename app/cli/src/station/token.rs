@@ -7,7 +7,7 @@ use palpate_runner::wall_now;
 use palpate_sessions::journal::format_time;
 use palpate_sessions::library_folder;
 use palpate_station::tokens::{Scope, Tokens, TokensError};
-use std::path::PathBuf;
+use std::path::Path;
 
 /// Make, list or remove tokens for stations
 #[derive(Debug, Subcommand)]
@@ -59,7 +59,7 @@ pub(crate) fn run(command: &TokenCommand, output: &Output) -> Result<(), Failure
     }
 }
 
-fn add(args: &TokenAddArgs, library: &PathBuf, output: &Output) -> Result<(), Failure> {
+fn add(args: &TokenAddArgs, library: &Path, output: &Output) -> Result<(), Failure> {
     let day = format_time(wall_now());
     let secret = Tokens::add(library, &args.name, &args.scope, day).map_err(failure)?;
     let object = serde_json::json!({ "name": args.name, "token": secret, "scopes": args.scope });
@@ -71,7 +71,7 @@ fn add(args: &TokenAddArgs, library: &PathBuf, output: &Output) -> Result<(), Fa
     Ok(())
 }
 
-fn list(library: &PathBuf, output: &Output) -> Result<(), Failure> {
+fn list(library: &Path, output: &Output) -> Result<(), Failure> {
     let tokens = Tokens::read(library).map_err(failure)?;
     let listed: Vec<_> = tokens
         .all()
