@@ -19,7 +19,9 @@ mod tls;
 
 pub use housekeeping::{ANNOUNCED_FILE, ANNOUNCED_VERSION};
 pub use notice::{CalibrationValidity, NOTICE_VERSION, Notice, NoticeKind, NoticeRun};
-pub use notifier::{END_WITHIN, Notifier, TargetTest, UNSENT_MAX, UnsentNotice, test_targets};
+pub use notifier::{
+    END_WITHIN, Notifier, Patience, TargetTest, UNSENT_MAX, UnsentNotice, test_targets,
+};
 pub use queue::{ATTEMPTS_MAX, WAITING_MAX};
 pub use rules::{AnnouncedCalibrations, Circumstances, DISK_LOW_BYTES, MOVES_BY_HAND, NoticeRules};
 pub use run_notices::{NotificationError, RunNotices, validity};

@@ -3,7 +3,7 @@
 use crate::housekeeping::Housekeeping;
 use crate::notice::Notice;
 use crate::queue::{NoticeQueue, WaitingNotice};
-use crate::send::{PING_EVERY, SendError, Sender};
+use crate::send::{ATTEMPT_MAX, PING_EVERY, SendError, Sender};
 use crate::target::Target;
 use futures_util::future::{Either, join_all, select};
 use std::collections::VecDeque;
@@ -16,6 +16,21 @@ use tokio::sync::{Notify, watch};
 /// How long the end of a program waits for what is not sent yet: long enough for two attempts at a server that answers,
 /// short enough for a person who closes a window.
 pub const END_WITHIN: Duration = Duration::from_secs(10);
+
+/// How long a notifier waits for servers.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    /// The longest attempt to send a notice.
+    pub attempt: Duration,
+    /// The longest wait at the end of the program.
+    pub end: Duration,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self { attempt: ATTEMPT_MAX, end: END_WITHIN }
+    }
+}
 
 /// Wait between attempts while the program ends.
 const LAST_WAIT: Duration = Duration::from_secs(1);
@@ -32,7 +47,7 @@ pub struct UnsentNotice {
     pub reason: String,
 }
 
-/// Sends notices from a thread of its own. Dropped, it takes [`END_WITHIN`] at most.
+/// Sends notices from a thread of its own. Dropped, it takes [`Patience::end`] at most.
 pub struct Notifier {
     lines: Vec<Arc<Line>>,
     shared: Arc<Shared>,
@@ -61,12 +76,13 @@ pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Notifier {
     /// Starts the thread.
-    pub fn start(targets: Vec<Target>) -> std::io::Result<Self> {
-        Self::start_with(targets, Arc::default())
+    pub fn start(targets: Vec<Target>, patience: Patience) -> std::io::Result<Self> {
+        Self::start_with(targets, patience, Arc::default())
     }
 
     pub(crate) fn start_with(
         targets: Vec<Target>,
+        patience: Patience,
         housekeeping: Arc<Housekeeping>,
     ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
@@ -84,7 +100,7 @@ impl Notifier {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
         let served = lines.clone();
         let thread = std::thread::Builder::new().name("notifications".into()).spawn(move || {
-            runtime.block_on(serve(&served, housekeeping, is_closing));
+            runtime.block_on(serve(&served, patience, housekeeping, is_closing));
             // The name of a server may be looked up for longer than anybody waits.
             runtime.shutdown_background();
             served.iter().for_each(|line| line.give_up_all());
@@ -109,7 +125,7 @@ impl Notifier {
         lock(&self.shared.unsent).iter().cloned().collect()
     }
 
-    /// Sends what waits, within [`END_WITHIN`], and returns what could not be sent since the start.
+    /// Sends what waits, within [`Patience::end`], and returns what could not be sent since the start.
     #[must_use]
     pub fn finish(mut self) -> Vec<UnsentNotice> {
         self.end();
@@ -132,15 +148,18 @@ impl Drop for Notifier {
 
 async fn serve(
     lines: &[Arc<Line>],
+    patience: Patience,
     housekeeping: Arc<Housekeeping>,
     mut closing: watch::Receiver<bool>,
 ) {
-    let tasks = lines.iter().map(|line| tokio::spawn(Arc::clone(line).serve(closing.clone())));
+    let tasks = lines
+        .iter()
+        .map(|line| tokio::spawn(Arc::clone(line).serve(patience.attempt, closing.clone())));
     let mut tasks: Vec<_> = tasks.collect();
     tasks.push(tokio::spawn(housekeeping.serve(closing.clone())));
     // An error means that the notifier is gone, which is an end too.
     let _ = closing.wait_for(|is_closing| *is_closing).await;
-    let _ = tokio::time::timeout(END_WITHIN, join_all(tasks)).await;
+    let _ = tokio::time::timeout(patience.end, join_all(tasks)).await;
 }
 
 /// Waits until it is so, but not once the program ends.
@@ -156,11 +175,11 @@ pub(crate) async fn unless_closing(
 }
 
 impl Line {
-    async fn serve(self: Arc<Self>, mut closing: watch::Receiver<bool>) {
+    async fn serve(self: Arc<Self>, longest: Duration, mut closing: watch::Receiver<bool>) {
         let mut sender = Sender::new(&self.target);
         if let Ok(sender) = &mut sender {
             // A broker is to know at once that palpate is there; a notice that comes meanwhile does not wait for that.
-            let (alive, news) = (pin!(sender.keep_alive()), pin!(self.news.notified()));
+            let (alive, news) = (pin!(sender.keep_alive(longest)), pin!(self.news.notified()));
             if let Either::Right(_) = select(alive, news).await {
                 self.news.notify_one();
             }
@@ -178,7 +197,7 @@ impl Line {
                 };
                 unless_closing(news, &mut closing).await;
                 if let (true, Ok(sender)) = (is_quiet && !*closing.borrow(), &mut sender) {
-                    sender.keep_alive().await;
+                    sender.keep_alive(longest).await;
                 }
                 continue;
             };
@@ -186,7 +205,7 @@ impl Line {
                 sender = Sender::new(&self.target);
             }
             let result = match &mut sender {
-                Ok(sender) => sender.send(&first.notice).await,
+                Ok(sender) => sender.send(&first.notice, longest).await,
                 Err(err) => Err(err.clone()),
             };
             if let Some(wait) = self.judge(&first, result) {
@@ -277,7 +296,7 @@ pub fn test_targets(targets: &[Target], notice: &Notice) -> std::io::Result<Vec<
         async move {
             let result = match Sender::new(&target) {
                 Ok(mut sender) => {
-                    let result = sender.send(notice).await;
+                    let result = sender.send(notice, ATTEMPT_MAX).await;
                     let _ = tokio::time::timeout(LAST_WAIT, sender.close()).await;
                     result
                 }

@@ -2,7 +2,7 @@
 
 use crate::housekeeping::{Housekeeping, read_announced};
 use crate::notice::CalibrationValidity;
-use crate::notifier::{Notifier, UnsentNotice, lock};
+use crate::notifier::{Notifier, Patience, UnsentNotice, lock};
 use crate::rules::{Circumstances, NoticeRules};
 use crate::settings::{NotificationSettings, SettingsError};
 use palpate_model::calibration::Calibration;
@@ -40,18 +40,22 @@ impl RunNotices {
     pub fn of_library(library: &Path) -> Result<Option<Self>, NotificationError> {
         match NotificationSettings::of_library(library)? {
             Some(settings) if !settings.targets.is_empty() => {
-                Ok(Some(Self::start(settings, library)?))
+                Ok(Some(Self::start(settings, library, Patience::default())?))
             }
             _ => Ok(None),
         }
     }
 
     /// Starts with these settings; `library` keeps what was announced.
-    pub fn start(settings: NotificationSettings, library: &Path) -> std::io::Result<Self> {
+    pub fn start(
+        settings: NotificationSettings,
+        library: &Path,
+        patience: Patience,
+    ) -> std::io::Result<Self> {
         let housekeeping = Arc::new(Housekeeping::default());
         let rules = NoticeRules::new(read_announced(library));
         Ok(Self {
-            notifier: Notifier::start_with(settings.targets, Arc::clone(&housekeeping))?,
+            notifier: Notifier::start_with(settings.targets, patience, Arc::clone(&housekeeping))?,
             housekeeping,
             library: library.to_owned(),
             state: Mutex::new(WatchState { rules, calibration: None }),

@@ -1,6 +1,6 @@
 //! `notifications.toml`: who gets which notices, with the line of every mistake.
 
-use crate::notice::NoticeKind;
+use crate::notice::{NoticeKind, one_line};
 use crate::secret::{Secret, check_private, read_secret};
 use crate::target::{EmailTarget, MqttTarget, Security, Target, TargetAddress, WebhookTarget};
 use palpate_protocols::file::ProtocolProblem;
@@ -347,6 +347,7 @@ impl Reader {
         (text, line): &(String, u32),
     ) -> Option<lettre::message::Mailbox> {
         let parsed = text.parse().ok();
+        let text = one_line(text);
         if parsed.is_none() {
             self.problems.error(
                 *line,

@@ -70,8 +70,8 @@ impl Sender {
         })
     }
 
-    /// Sends a notice, once.
-    pub async fn send(&mut self, notice: &Notice) -> Result<(), SendError> {
+    /// Sends a notice, once, within the time of an attempt.
+    pub async fn send(&mut self, notice: &Notice, longest: Duration) -> Result<(), SendError> {
         let attempt = async {
             match self {
                 Self::Webhook(webhook) => webhook.send(notice).await,
@@ -79,20 +79,20 @@ impl Sender {
                 Self::Mqtt(mqtt) => mqtt.send(notice).await,
             }
         };
-        match tokio::time::timeout(ATTEMPT_MAX, attempt).await {
+        match tokio::time::timeout(longest, attempt).await {
             Ok(result) => result,
             Err(_) => {
                 self.disconnect();
-                let seconds = ATTEMPT_MAX.as_secs();
+                let seconds = longest.as_secs_f64();
                 Err(SendError::passing(format!("the server did not answer within {seconds} s")))
             }
         }
     }
 
     /// Keeps a connection that stays open; the others have none.
-    pub async fn keep_alive(&mut self) {
+    pub async fn keep_alive(&mut self, longest: Duration) {
         if let Self::Mqtt(mqtt) = self
-            && tokio::time::timeout(ATTEMPT_MAX, mqtt.keep_alive()).await.is_err()
+            && tokio::time::timeout(longest, mqtt.keep_alive()).await.is_err()
         {
             self.disconnect();
         }

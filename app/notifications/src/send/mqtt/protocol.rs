@@ -162,7 +162,7 @@ mod tests {
         let will = Publish { topic: "a/b", text: "off" };
         let bytes =
             connect(&Connect { client: "p", keep_alive_s: 60, will, login: Some(("u", "pw")) });
-        let expected = b"\x10\x1f\x00\x04MQTT\x04\xce\x00\x3c\x00\x01p\x00\x03a/b\x00\x03off\x00\x01u\x00\x02pw";
+        let expected = b"\x10\x1e\x00\x04MQTT\x04\xce\x00\x3c\x00\x01p\x00\x03a/b\x00\x03off\x00\x01u\x00\x02pw";
         assert_eq!(bytes.unwrap(), expected);
         // Figure 3.11 of section 3.3.2 has the same topic and identifier.
         assert_eq!(
