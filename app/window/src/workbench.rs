@@ -9,17 +9,19 @@ use crate::window::WindowOptions;
 use crate::workers::queue_desk::QueueDesk;
 use crate::workers::{BackgroundTask, Dialog, PathPurpose};
 use eframe::egui::{Context, Ui};
-use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
+use palpate_analysis::window_requests::{RigOpener, RunWatcher, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
 use palpate_model::calibration::Calibration;
 use palpate_protocols::engine::Operator;
-use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
+use palpate_runner::{
+    RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, SnapshotReader, StartError,
+};
 use palpate_sessions::folder::HolderLock;
 use rfd::FileDialog;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::{Arc, OnceLock};
 
 /// How far the start of a run is.
 enum Start {
@@ -72,6 +74,10 @@ pub struct Workbench {
     pub next_rig: Option<WorkbenchRequest>,
     /// Dropped after the runner, which has the rig.
     _locks: Vec<HolderLock>,
+    /// Dropped after the runner, whose thread must not be the one that waits for a network.
+    watcher: Option<Arc<dyn RunWatcher>>,
+    /// Problems of the watcher that were shown.
+    watcher_problems: usize,
     pub dialog: Dialog<(PathPurpose, PathBuf)>,
     /// The screen that opened the last dialog, and why the dialog was not shown.
     dialog_of: Option<(&'static str, Option<String>)>,
@@ -108,8 +114,17 @@ impl Workbench {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let is_simulated = request.rig.is_virtual();
-        let runner = Runner::start(request.rig, request.scale, None, wake)
-            .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
+        let (seen, watcher) = (Arc::new(OnceLock::new()), request.watcher.clone());
+        let newest: Arc<OnceLock<SnapshotReader>> = Arc::clone(&seen);
+        let runner = Runner::start(request.rig, request.scale, None, move || {
+            // On the runner's thread: a hidden window draws no frames, and its runs end all the same.
+            if let (Some(watcher), Some(newest)) = (&watcher, newest.get()) {
+                watcher.see(&newest.snapshot());
+            }
+            wake();
+        })
+        .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
+        let _ = seen.set(runner.snapshots());
         let mut form = ProtocolForm::default();
         let library = match sessions {
             Some(folder) => {
@@ -140,6 +155,8 @@ impl Workbench {
             open_rig: request.open_rig,
             next_rig: None,
             _locks: request.locks,
+            watcher: request.watcher,
+            watcher_problems: 0,
             dialog: Dialog::default(),
             dialog_of: None,
             notice: None,
@@ -359,8 +376,17 @@ impl Workbench {
             self.measured = Arc::clone(&self.snapshot);
         }
         self.ports.poll();
+        self.poll_watcher();
         self.poll_start();
         self.queue.poll(ctx);
+    }
+
+    /// Shows what the watcher of the runs could not do.
+    fn poll_watcher(&mut self) {
+        let problems = self.watcher.as_ref().map(|watcher| watcher.problems()).unwrap_or_default();
+        if problems.len() != std::mem::replace(&mut self.watcher_problems, problems.len()) {
+            self.notice = problems.into_iter().next_back();
+        }
     }
 
     /// Follows the run that is shown; true when a run that has a result has just ended.

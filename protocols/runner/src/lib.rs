@@ -33,7 +33,7 @@ use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
 pub use leading::{LeadSource, SharedLeadSource, SlaveSample};
 use live_feed::LiveFeed;
-pub use main_loop::{Runner, RunnerRequest};
+pub use main_loop::{Runner, RunnerRequest, SnapshotReader};
 pub use snapshot::{
     ContactTrigger, Lateness, LogLine, PlannedWeight, PromptView, RigView, RunView, RunnerSnapshot,
 };

@@ -62,6 +62,18 @@ pub struct Runner {
     thread: Option<JoinHandle<()>>,
 }
 
+/// Reads the newest snapshot from any thread, also in what [`Runner::start`] calls after each one.
+#[derive(Clone)]
+pub struct SnapshotReader(Arc<ArcSwap<RunnerSnapshot>>);
+
+impl SnapshotReader {
+    /// The newest snapshot.
+    #[must_use]
+    pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
+        self.0.load_full()
+    }
+}
+
 impl Runner {
     /// Takes a rig and starts the runner's thread. `wake` is called after each snapshot.
     ///
@@ -120,6 +132,11 @@ impl Runner {
     /// The newest snapshot.
     pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
         self.snapshot.load_full()
+    }
+
+    #[must_use]
+    pub fn snapshots(&self) -> SnapshotReader {
+        SnapshotReader(Arc::clone(&self.snapshot))
     }
 }
 

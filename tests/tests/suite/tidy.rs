@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 17] = [
+const PACKAGES: [&str; 18] = [
     "model",
     "model/rheology",
     "model/haptics",
@@ -23,6 +23,7 @@ const PACKAGES: [&str; 17] = [
     "app/figures",
     "app/analysis",
     "app/cli",
+    "app/notifications",
     "app/window",
     "app",
 ];
