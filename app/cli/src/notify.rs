@@ -73,3 +73,24 @@ fn test(targets: &[Target], output: &Output) -> Result<(), Failure> {
         ))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use palpate_analysis::kept_files::kept_files;
+    use palpate_notifications::{
+        ANNOUNCED_FILE, ANNOUNCED_VERSION, SETTINGS_FILE, SETTINGS_VERSION,
+    };
+    use std::path::Path;
+
+    #[test]
+    fn list_of_kept_files_has_those_of_notifications() {
+        let files = kept_files(Path::new("library"));
+        for (name, form) in [
+            (SETTINGS_FILE, format!("TOML, palpate-notifications {SETTINGS_VERSION}")),
+            (ANNOUNCED_FILE, format!("JSON, version {ANNOUNCED_VERSION}")),
+        ] {
+            let there = files.iter().any(|one| one.place.ends_with(name) && one.form == form);
+            assert!(there, "{name}");
+        }
+    }
+}

@@ -26,6 +26,6 @@ pub use queue::{ATTEMPTS_MAX, WAITING_MAX};
 pub use rules::{AnnouncedCalibrations, Circumstances, DISK_LOW_BYTES, MOVES_BY_HAND, NoticeRules};
 pub use run_notices::{NotificationError, RunNotices, validity};
 pub use secret::{Secret, SecretError};
-pub use send::ATTEMPT_MAX;
+pub use send::{ATTEMPT_MAX, SILENCE_MAX};
 pub use settings::{NotificationSettings, SETTINGS_FILE, SETTINGS_VERSION, SettingsError};
 pub use target::{EmailTarget, MqttTarget, Security, Target, TargetAddress, WebhookTarget};

@@ -3,7 +3,7 @@
 use crate::housekeeping::Housekeeping;
 use crate::notice::Notice;
 use crate::queue::{NoticeQueue, WaitingNotice};
-use crate::send::{ATTEMPT_MAX, PING_EVERY, SendError, Sender};
+use crate::send::{ATTEMPT_MAX, SILENCE_MAX, SendError, Sender};
 use crate::target::Target;
 use futures_util::future::{Either, join_all, select};
 use std::collections::VecDeque;
@@ -24,11 +24,13 @@ pub struct Patience {
     pub attempt: Duration,
     /// The longest wait at the end of the program.
     pub end: Duration,
+    /// The longest silence of a connection that stays open.
+    pub silence: Duration,
 }
 
 impl Default for Patience {
     fn default() -> Self {
-        Self { attempt: ATTEMPT_MAX, end: END_WITHIN }
+        Self { attempt: ATTEMPT_MAX, end: END_WITHIN, silence: SILENCE_MAX }
     }
 }
 
@@ -152,9 +154,8 @@ async fn serve(
     housekeeping: Arc<Housekeeping>,
     mut closing: watch::Receiver<bool>,
 ) {
-    let tasks = lines
-        .iter()
-        .map(|line| tokio::spawn(Arc::clone(line).serve(patience.attempt, closing.clone())));
+    let tasks =
+        lines.iter().map(|line| tokio::spawn(Arc::clone(line).serve(patience, closing.clone())));
     let mut tasks: Vec<_> = tasks.collect();
     tasks.push(tokio::spawn(housekeeping.serve(closing.clone())));
     // An error means that the notifier is gone, which is an end too.
@@ -175,50 +176,67 @@ pub(crate) async fn unless_closing(
 }
 
 impl Line {
-    async fn serve(self: Arc<Self>, longest: Duration, mut closing: watch::Receiver<bool>) {
+    async fn serve(self: Arc<Self>, patience: Patience, mut closing: watch::Receiver<bool>) {
+        let longest = patience.attempt;
         let mut sender = Sender::new(&self.target);
         if let Ok(sender) = &mut sender {
-            // A broker is to know at once that palpate is there; a notice that comes meanwhile does not wait for that.
-            let (alive, news) = (pin!(sender.keep_alive(longest)), pin!(self.news.notified()));
-            if let Either::Right(_) = select(alive, news).await {
-                self.news.notify_one();
-            }
+            // A broker is to know at once that palpate is there.
+            sender.keep_alive(longest).await;
         }
         loop {
             let first = lock(&self.queue).first().cloned();
-            let Some(first) = first else {
-                if *closing.borrow() {
-                    break;
+            let is_closing = *closing.borrow();
+            match first {
+                Some(first) => {
+                    if sender.is_err() {
+                        sender = Sender::new(&self.target);
+                    }
+                    let result = match &mut sender {
+                        Ok(sender) => sender.send(&first.notice, longest).await,
+                        Err(err) => Err(err.clone()),
+                    };
+                    if let Some(wait) = self.judge(&first, result) {
+                        self.pause(first.number, wait, &mut closing).await;
+                    }
                 }
-                let mut is_quiet = true;
-                let news = async {
-                    is_quiet =
-                        tokio::time::timeout(PING_EVERY, self.news.notified()).await.is_err();
-                };
-                unless_closing(news, &mut closing).await;
-                if let (true, Ok(sender)) = (is_quiet && !*closing.borrow(), &mut sender) {
-                    sender.keep_alive(longest).await;
-                }
-                continue;
-            };
-            if sender.is_err() {
-                sender = Sender::new(&self.target);
-            }
-            let result = match &mut sender {
-                Ok(sender) => sender.send(&first.notice, longest).await,
-                Err(err) => Err(err.clone()),
-            };
-            if let Some(wait) = self.judge(&first, result) {
-                let is_ending = *closing.borrow();
-                match is_ending {
-                    true => tokio::time::sleep(wait.min(LAST_WAIT)).await,
-                    false => unless_closing(tokio::time::sleep(wait), &mut closing).await,
+                None if is_closing => break,
+                None => {
+                    let is_quiet = self.wait_for_news(patience.silence, &mut closing).await;
+                    if let (true, Ok(sender)) = (is_quiet, &mut sender) {
+                        sender.keep_alive(longest).await;
+                    }
                 }
             }
         }
         if let Ok(sender) = &mut sender {
             sender.close().await;
         }
+    }
+
+    /// Waits for a notice or the end of the program; true if neither came for so long.
+    async fn wait_for_news(&self, silence: Duration, closing: &mut watch::Receiver<bool>) -> bool {
+        let mut is_quiet = false;
+        let news = async {
+            is_quiet = tokio::time::timeout(silence, self.news.notified()).await.is_err();
+        };
+        unless_closing(news, closing).await;
+        is_quiet
+    }
+
+    /// Waits after a failed attempt; not longer than until something more important comes, nor long once the program ends.
+    async fn pause(&self, tried: u64, wait: Duration, closing: &mut watch::Receiver<bool>) {
+        if *closing.borrow() {
+            return tokio::time::sleep(wait.min(LAST_WAIT)).await;
+        }
+        let waiting = async {
+            let mut sleep = pin!(tokio::time::sleep(wait));
+            while let Either::Right(_) = select(sleep.as_mut(), pin!(self.news.notified())).await {
+                if lock(&self.queue).first().is_some_and(|first| first.number != tried) {
+                    return;
+                }
+            }
+        };
+        unless_closing(waiting, closing).await;
     }
 
     /// What an attempt means for the queue; how long to wait before the next.

@@ -69,7 +69,13 @@ impl NotificationSettings {
     /// What is sent where, a line for each target.
     #[must_use]
     pub fn text(&self) -> String {
-        let line = |target: &Target| format!("{}: {}", target.name(), target.rules_text());
+        let line = |target: &Target| {
+            let to = match target.recipients().join(", ").as_str() {
+                "" => String::new(),
+                people => format!(" to {people}"),
+            };
+            format!("{}{to}: {}", target.name(), target.rules_text())
+        };
         match self.targets.as_slice() {
             [] => format!("{SETTINGS_FILE} names no target, so nothing is sent"),
             targets => targets.iter().map(line).collect::<Vec<_>>().join("\n"),
@@ -410,7 +416,7 @@ impl Reader {
 }
 
 /// Whether a server is this computer itself.
-fn is_loopback(server: &str) -> bool {
+pub(crate) fn is_loopback(server: &str) -> bool {
     let plain = server.trim_start_matches('[').trim_end_matches(']');
     plain.eq_ignore_ascii_case("localhost")
         || plain.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())

@@ -56,7 +56,7 @@ fn a_file_has_targets_with_rules_and_usual_ports() {
         lines,
         [
             "webhook at chat.example.org: failed, alarm",
-            "e-mail to ada@example.org, bob@example.org: ended, failed, alarm, disk, calibration",
+            "e-mail by mail.example.org to ada@example.org, bob@example.org: ended, failed, alarm, disk, calibration",
             "MQTT topic laboratory/palpate at broker.example.org: disk",
             "MQTT topic palpate at ::1: ended, failed, alarm, disk, calibration",
         ]

@@ -74,22 +74,30 @@ pub struct MqttTarget {
 }
 
 impl Target {
-    /// What people call it. It shows no secret.
+    /// What it is called in logs and messages. It shows no secret and no address of a person.
     #[must_use]
     pub fn name(&self) -> String {
         let name = match &self.address {
             TargetAddress::Webhook(webhook) => {
                 format!("webhook at {}", webhook.url.host_str().unwrap_or_default())
             }
-            TargetAddress::Email(email) => {
-                let all: Vec<String> = email.to.iter().map(|one| one.email.to_string()).collect();
-                format!("e-mail to {}", all.join(", "))
-            }
+            TargetAddress::Email(email) => format!("e-mail by {}", email.server),
             TargetAddress::Mqtt(mqtt) => {
                 format!("MQTT topic {} at {}", mqtt.topic, mqtt.server)
             }
         };
         one_line(&name)
+    }
+
+    /// The addresses of people who get an e-mail.
+    #[must_use]
+    pub fn recipients(&self) -> Vec<String> {
+        match &self.address {
+            TargetAddress::Email(email) => {
+                email.to.iter().map(|one| one.email.to_string()).collect()
+            }
+            TargetAddress::Webhook(_) | TargetAddress::Mqtt(_) => Vec::new(),
+        }
     }
 
     /// `webhook`, `email` or `mqtt`, as in the settings.

@@ -17,7 +17,7 @@ use webhook::WebhookSender;
 pub const ATTEMPT_MAX: Duration = Duration::from_secs(30);
 
 /// The longest silence of an MQTT connection, after which it is tried whether the broker is still there.
-pub(crate) const PING_EVERY: Duration = Duration::from_secs(30);
+pub const SILENCE_MAX: Duration = Duration::from_secs(30);
 
 /// Why a notice did not arrive.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 use super::{SendError, with_causes};
 use crate::notice::Notice;
 use crate::secret::Secret;
+use crate::settings::is_loopback;
 use crate::target::WebhookTarget;
 use crate::tls;
 use reqwest::header::CONTENT_TYPE;
@@ -22,7 +23,12 @@ impl WebhookSender {
             "https" => tls::client_config(ca_file).map(|config| (*config).clone()),
             _ => tls::no_encryption(),
         };
-        let client = Client::builder()
+        let mut builder = Client::builder();
+        if target.url.host_str().is_some_and(is_loopback) {
+            // No proxy of the network reaches this computer itself.
+            builder = builder.no_proxy();
+        }
+        let client = builder
             .tls_backend_preconfigured(config.map_err(SendError::passing)?)
             // A token goes to the server that the settings name and to no other.
             .redirect(Policy::none())

@@ -2,8 +2,8 @@
 
 use crate::servers::{Reaction, WebServer, free_port, notice, target};
 use palpate_notifications::{
-    EmailTarget, MqttTarget, NoticeKind, Notifier, Patience, Security, Target, TargetAddress,
-    UNSENT_MAX, WAITING_MAX,
+    EmailTarget, MqttTarget, NoticeKind, Notifier, Patience, SILENCE_MAX, Security, Target,
+    TargetAddress, UNSENT_MAX, WAITING_MAX,
 };
 use std::net::TcpListener;
 use std::time::Duration;
@@ -39,8 +39,11 @@ fn targets(port: u16) -> Vec<Target> {
 }
 
 /// Short enough for a test, and no test needs an answer within it.
-const SHORT: Patience =
-    Patience { attempt: Duration::from_millis(300), end: Duration::from_secs(3) };
+const SHORT: Patience = Patience {
+    attempt: Duration::from_millis(300),
+    end: Duration::from_secs(3),
+    silence: SILENCE_MAX,
+};
 
 #[test]
 fn silent_servers_end_with_the_program_and_the_notices_are_named() {
@@ -90,7 +93,7 @@ fn a_hung_attempt_is_followed_by_another_and_no_target_waits_for_another() {
 fn a_full_queue_keeps_the_alarm_and_whoever_sends_never_waits() {
     let (_listener, port) = silent_port();
     let webhook = targets(port).swap_remove(0);
-    let patience = Patience { attempt: Duration::from_secs(600), end: Duration::ZERO };
+    let patience = Patience { attempt: Duration::from_secs(600), end: Duration::ZERO, ..SHORT };
     let notifier = Notifier::start(vec![webhook], patience).unwrap();
     notifier.send(&notice(NoticeKind::Alarm));
     // The connection is never answered: if this waited for it, the test would not end.
@@ -102,4 +105,17 @@ fn a_full_queue_keeps_the_alarm_and_whoever_sends_never_waits() {
     assert!(dropped.iter().all(|one| one.notice.kind == NoticeKind::Ended));
     let all = notifier.finish();
     assert_eq!(all.len(), UNSENT_MAX);
+}
+
+#[test]
+fn an_alarm_does_not_wait_for_the_next_attempt_of_another_notice() {
+    // The fourth wait is a minute: what comes before it is the alarm's own attempt.
+    let server = WebServer::start(&[Reaction::Answer(500)]);
+    let notifier = Notifier::start(vec![server.target()], SHORT).unwrap();
+    notifier.send(&notice(NoticeKind::Ended));
+    for _ in 0..3 {
+        assert_eq!(server.request().object["kind"], "ended");
+    }
+    notifier.send(&notice(NoticeKind::Alarm));
+    assert_eq!(server.request().object["kind"], "alarm");
 }

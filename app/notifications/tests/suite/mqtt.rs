@@ -255,3 +255,25 @@ fn a_certificate_that_is_not_trusted_gets_no_password() {
         assert!(reason.contains("certificate"), "{reason}");
     }
 }
+
+#[test]
+fn a_broker_that_restarts_hears_of_palpate_without_a_notice() {
+    if lacks_broker() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut broker = Broker::start(folder.path(), None, false);
+    let listener = broker.listener(None);
+    let target = broker.target(None, None);
+    let patience = Patience { silence: std::time::Duration::from_secs(3), ..Patience::default() };
+    let notifier = Notifier::start(vec![target], patience).unwrap();
+    assert_eq!(listener.line(), ONLINE);
+    broker.restart();
+    // Whoever listens too late to the first return hears of the next.
+    let mut listener = broker.listener(None);
+    while !listener.hears(ONLINE) {
+        broker.restart();
+        listener = broker.listener(None);
+    }
+    assert_eq!(notifier.finish(), []);
+}

@@ -69,6 +69,12 @@ impl Program {
         self.lines.recv_timeout(Duration::from_millis(300)).is_ok()
     }
 
+    /// Whether this line comes, with less than ten seconds between lines; those before it are taken.
+    pub fn hears(&self, wanted: &str) -> bool {
+        let next = || self.lines.recv_timeout(Duration::from_secs(10)).ok();
+        std::iter::from_fn(next).any(|line| line == wanted)
+    }
+
     pub fn kill(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();

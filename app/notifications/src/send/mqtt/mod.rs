@@ -2,7 +2,7 @@
 
 mod protocol;
 
-use super::{PING_EVERY, SendError};
+use super::{SILENCE_MAX, SendError};
 use crate::notice::Notice;
 use crate::target::MqttTarget;
 use crate::tls;
@@ -15,7 +15,7 @@ use tokio::net::TcpStream;
 use tokio_rustls::TlsConnector;
 
 /// The broker takes a client for lost after one and a half times so long (section 3.1.2.10).
-const KEEP_ALIVE_S: u16 = 2 * PING_EVERY.as_secs() as u16;
+const KEEP_ALIVE_S: u16 = 2 * SILENCE_MAX.as_secs() as u16;
 
 const ONLINE: &str = "online";
 const OFFLINE: &str = "offline";
