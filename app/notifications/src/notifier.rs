@@ -34,7 +34,7 @@ impl Default for Patience {
     }
 }
 
-/// Wait between attempts while the program ends.
+/// Wait between attempts, and for the last word to a broker, while the program ends.
 const LAST_WAIT: Duration = Duration::from_secs(1);
 
 /// Notices that were not sent, as a front end can show them.
@@ -181,7 +181,7 @@ impl Line {
         let mut sender = Sender::new(&self.target);
         if let Ok(sender) = &mut sender {
             // A broker is to know at once that palpate is there.
-            sender.keep_alive(longest).await;
+            unless_closing(sender.keep_alive(longest), &mut closing).await;
         }
         loop {
             let first = lock(&self.queue).first().cloned();
@@ -203,13 +203,14 @@ impl Line {
                 None => {
                     let is_quiet = self.wait_for_news(patience.silence, &mut closing).await;
                     if let (true, Ok(sender)) = (is_quiet, &mut sender) {
-                        sender.keep_alive(longest).await;
+                        unless_closing(sender.keep_alive(longest), &mut closing).await;
                     }
                 }
             }
         }
         if let Ok(sender) = &mut sender {
-            sender.close().await;
+            // Whoever has nothing to send does not wait for a broker that is gone.
+            let _ = tokio::time::timeout(LAST_WAIT, sender.close()).await;
         }
     }
 
