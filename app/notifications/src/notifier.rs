@@ -258,7 +258,7 @@ impl Line {
                 match failed {
                     Ok(wait) => Some(wait),
                     Err(given_up) => {
-                        given_up.into_iter().for_each(|one| self.record(one, &err.reason));
+                        given_up.into_iter().for_each(|one| self.record(*one, &err.reason));
                         None
                     }
                 }

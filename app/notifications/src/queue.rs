@@ -66,14 +66,18 @@ impl NoticeQueue {
     }
 
     /// Counts a failed attempt; returns how long to wait, or the notice if it is given up.
-    pub fn fail(&mut self, number: u64, reason: &str) -> Result<Duration, Option<WaitingNotice>> {
+    pub fn fail(
+        &mut self,
+        number: u64,
+        reason: &str,
+    ) -> Result<Duration, Option<Box<WaitingNotice>>> {
         let Some(one) = self.waiting.iter_mut().find(|one| one.number == number) else {
             return Err(None);
         };
         one.attempts += 1;
         reason.clone_into(&mut one.reason);
         let attempts = one.attempts;
-        wait_after(attempts).ok_or_else(|| self.take(number))
+        wait_after(attempts).ok_or_else(|| self.take(number).map(Box::new))
     }
 
     pub fn take_all(&mut self) -> Vec<WaitingNotice> {

@@ -1,4 +1,5 @@
 //! Notices against real servers on this computer.
+#![cfg(test)]
 
 mod email;
 mod faults;
