@@ -97,7 +97,7 @@ fn runs_and_programmes_send_what_became_of_them() {
     assert_eq!(early.status.code(), Some(1));
     let kinds: Vec<Value> = objects.try_iter().map(|object| object["kind"].clone()).collect();
     assert_eq!(kinds, ["failed"]);
-    let programme = "palpate-programme = 1\nname = \"two\"\n[[task]]\nname = \"press\"\nprotocol = \"ramp-hold\"\nrepeats = 2\nset = { depth = \"6 mm\", speed = \"3 mm/s\", hold = \"1 s\" }\n";
+    let programme = "palpate-programme = 1\nname = \"two\"\ntitle = \"Two\"\n[[task]]\nname = \"press\"\nprotocol = \"ramp-hold\"\nrepeats = 2\nset = { depth = \"6 mm\", speed = \"3 mm/s\", hold = \"1 s\" }\n";
     std::fs::write(at.join("two.toml"), programme).unwrap();
     let done = typed(at, "run two.toml --time-scale max --json");
     succeeded(&done);

@@ -136,7 +136,7 @@ fn no_text_of_a_session_adds_a_header_or_a_recipient() {
     let evil = Notice { rig: evil.into(), text: evil.into(), run: Some(run), ..plain.clone() };
     let target = server.target(Security::None, &files, None);
     for one in [&plain, &evil] {
-        let tests = test_targets(&[target.clone()], one).unwrap();
+        let tests = test_targets(std::slice::from_ref(&target), one).unwrap();
         assert_eq!(tests[0].result, Ok(()));
     }
     let (plain, evil) = (server.object(), server.object());
