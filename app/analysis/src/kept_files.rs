@@ -80,6 +80,20 @@ pub fn kept_files(library: &Path) -> Vec<KeptFile> {
             "delete the file; sessions keep what they copied from it",
         ),
         (
+            "notifications",
+            "notifications.toml",
+            "TOML, palpate-notifications 1".to_owned(),
+            "you",
+            "delete the file; nothing is sent then",
+        ),
+        (
+            "announced calibrations",
+            "notifications-announced.json",
+            "JSON, version 1".to_owned(),
+            "runs with notifications",
+            "delete the file; the next run announces them once more",
+        ),
+        (
             "calibrations",
             "calibrations",
             format!("JSON, format {CALIBRATION_FORMAT}"),

@@ -5,8 +5,8 @@ use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
-use palpate_runner::TimeScale;
 use palpate_runner::replay::Player;
+use palpate_runner::{RunnerSnapshot, TimeScale};
 use palpate_sessions::folder::HolderLock;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -38,6 +38,17 @@ pub struct WorkbenchRequest {
     pub station: Option<StationSettings>,
     /// Opens another rig for the same window, if that is possible.
     pub open_rig: Option<RigOpener>,
+    /// Whoever watches the runs beside the window, such as the notifications.
+    pub watcher: Option<Arc<dyn RunWatcher>>,
+}
+
+/// Watches the runs of a window.
+pub trait RunWatcher: Send + Sync {
+    /// Called on the runner's thread after every snapshot; it must not wait.
+    fn see(&self, snapshot: &RunnerSnapshot);
+
+    /// What went wrong with the watching so far, a sentence each.
+    fn problems(&self) -> Vec<String>;
 }
 
 impl WorkbenchRequest {
@@ -61,6 +72,7 @@ impl WorkbenchRequest {
             locks: Vec::new(),
             station: None,
             open_rig: None,
+            watcher: None,
         }
     }
 }

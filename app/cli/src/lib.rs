@@ -36,6 +36,9 @@ mod mask;
 mod material;
 mod new_file;
 mod note;
+mod notices;
+#[cfg(feature = "notifications")]
+mod notify;
 mod output;
 mod plan;
 mod population;
@@ -169,6 +172,7 @@ commands! { windows;
     #[cfg(feature = "haptics")] #[command(subcommand)] Haptics(haptics::HapticsCommand) => haptics::run;
     #[cfg(feature = "haptics")] #[command(subcommand)] Scene(scene::SceneCommand) => scene::run;
     #[cfg(feature = "emulators")] #[command(subcommand)] Emulate(emulate::EmulateCommand) => emulate::run;
+    #[cfg(feature = "notifications")] Notify(notify::NotifyArgs) => notify::run;
     Completions(completions::CompletionsArgs) => completions::run;
     Man(man::ManArgs) => man::run;
 }

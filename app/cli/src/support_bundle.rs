@@ -33,6 +33,7 @@ pub(super) fn features(has_window: bool) -> Vec<&'static str> {
         ("emulators", cfg!(feature = "emulators")),
         ("haptics", cfg!(feature = "haptics")),
         ("extremes", cfg!(feature = "extremes")),
+        ("notifications", cfg!(feature = "notifications")),
     ];
     let there = parts.into_iter().filter(|(_, is_there)| *is_there);
     there.map(|(name, _)| name).collect()

@@ -4,7 +4,8 @@ use super::output::Output;
 use super::rig::{OpenRig, RigArgs, open, open_in_window};
 use super::{Failure, NO_WINDOW};
 use clap::Args;
-use palpate_analysis::window_requests::{RigOpener, WindowOpener, WorkbenchRequest};
+use palpate_analysis::window_requests::{RigOpener, RunWatcher, WindowOpener, WorkbenchRequest};
+use palpate_model::calibration::Calibration;
 use palpate_protocols::plans::RampHold;
 use palpate_runner::TimeScale;
 use std::path::{Path, PathBuf, absolute};
@@ -34,17 +35,18 @@ pub(super) fn run(
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     // Doubts about a calibration that the command line does not name must be acknowledged before a run.
     let doubts = if args.rig.calibration.is_none() { bench.doubts.clone() } else { Vec::new() };
-    let request = request(bench, args.rig.time_scale)?;
+    let request = request(bench, args.rig.time_scale, output)?;
     let request = WorkbenchRequest { to_open, doubts, ..request };
     #[cfg(feature = "station")]
     let request = WorkbenchRequest { station: args.serve.settings()?, ..request };
     windows.workbench(request).map_err(Failure::Failed)
 }
 
-fn request(bench: OpenRig, scale: TimeScale) -> Result<WorkbenchRequest, Failure> {
+fn request(bench: OpenRig, scale: TimeScale, output: &Output) -> Result<WorkbenchRequest, Failure> {
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
     let OpenRig { rig, calibration, built_in, limits, locks, .. } = bench;
     Ok(WorkbenchRequest {
+        watcher: watcher(&calibration, output),
         built_in,
         to_acknowledge: gate.to_acknowledge(),
         locks,
@@ -53,12 +55,23 @@ fn request(bench: OpenRig, scale: TimeScale) -> Result<WorkbenchRequest, Failure
     })
 }
 
+#[cfg(feature = "notifications")]
+fn watcher(calibration: &Calibration, output: &Output) -> Option<Arc<dyn RunWatcher>> {
+    Some(Arc::new(super::notices::Notices::open(calibration, output)))
+}
+
+#[cfg(not(feature = "notifications"))]
+fn watcher(_: &Calibration, _: &Output) -> Option<Arc<dyn RunWatcher>> {
+    None
+}
+
 /// Opens a rig that is chosen in the window. Nobody reads the terminal then, so doubts must be acknowledged.
 fn opener() -> RigOpener {
     Arc::new(|name| {
         let opened = open_in_window(name).and_then(|mut bench| {
             let doubts = std::mem::take(&mut bench.doubts);
-            let request = request(bench, RigArgs::default().time_scale)?;
+            let output = Output::kept();
+            let request = request(bench, RigArgs::default().time_scale, &output)?;
             Ok(WorkbenchRequest { doubts, ..request })
         });
         opened.map_err(|failure| failure.sentence().to_owned())

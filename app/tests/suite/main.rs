@@ -21,6 +21,7 @@ mod master_curve;
 mod material;
 mod migrations;
 mod newer;
+mod notifications;
 mod plan;
 mod population;
 mod population_member;

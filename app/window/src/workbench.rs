@@ -1,5 +1,8 @@
 //! State that all screens share: the runner and its snapshot, the protocol in the form, the calibration in use.
 
+mod closing;
+mod station;
+
 use crate::command::{ManualMove, UiCommand};
 use crate::latest_run::LatestRun;
 use crate::screens::form::{CheckedPlan, ProtocolForm, RunSetup};
@@ -7,21 +10,22 @@ use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
 use crate::window::WindowOptions;
 use crate::workers::queue_desk::QueueDesk;
-use crate::workers::station::{StationDesk, remote_bench};
+use crate::workers::station::{StationCommand, StationDesk};
 use crate::workers::{BackgroundTask, Dialog, PathPurpose};
 use eframe::egui::{Context, Ui};
-use palpate_analysis::window_requests::{RigOpener, WorkbenchRequest};
+use palpate_analysis::window_requests::{RigOpener, RunWatcher, WorkbenchRequest};
 use palpate_drivers::serial::{PortInfo, SerialError};
 use palpate_haptics::surface::SceneCurves;
 use palpate_model::calibration::Calibration;
 use palpate_protocols::engine::Operator;
-use palpate_runner::{RunRequest, RunView, Runner, RunnerRequest, RunnerSnapshot, StartError};
+use palpate_runner::{
+    RunRequest, RunView, Runner, RunnerHandle, RunnerRequest, RunnerSnapshot, StartError,
+};
 use palpate_sessions::folder::HolderLock;
-use palpate_station::remote::RemoteBench;
 use rfd::FileDialog;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::sync::{Arc, OnceLock};
 
 /// How far the start of a run is.
 enum Start {
@@ -76,6 +80,10 @@ pub struct Workbench {
     pub next_rig: Option<WorkbenchRequest>,
     /// Dropped after the runner, which has the rig.
     _locks: Vec<HolderLock>,
+    /// Dropped after the runner, whose thread must not be the one that waits for a network.
+    watcher: Option<Arc<dyn RunWatcher>>,
+    /// Problems of the watcher that were shown.
+    watcher_problems: usize,
     pub dialog: Dialog<(PathPurpose, PathBuf)>,
     /// The screen that opened the last dialog, and why the dialog was not shown.
     dialog_of: Option<(&'static str, Option<String>)>,
@@ -112,8 +120,17 @@ impl Workbench {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let is_simulated = request.rig.is_virtual();
-        let runner = Runner::start(request.rig, request.scale, None, wake)
-            .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
+        let (seen, watcher) = (Arc::new(OnceLock::new()), request.watcher.clone());
+        let newest: Arc<OnceLock<RunnerHandle>> = Arc::clone(&seen);
+        let runner = Runner::start(request.rig, request.scale, None, move || {
+            // On the runner's thread: a hidden window draws no frames, and its runs end all the same.
+            if let (Some(watcher), Some(newest)) = (&watcher, newest.get()) {
+                watcher.see(&newest.snapshot());
+            }
+            wake();
+        })
+        .map_err(|err| format!("the thread that runs protocols cannot be started: {err}"))?;
+        let _ = seen.set(runner.handle());
         let mut form = ProtocolForm::default();
         let library = match sessions {
             Some(folder) => {
@@ -146,6 +163,8 @@ impl Workbench {
             open_rig: request.open_rig,
             next_rig: None,
             _locks: request.locks,
+            watcher: request.watcher,
+            watcher_problems: 0,
             dialog: Dialog::default(),
             dialog_of: None,
             notice: None,
@@ -158,10 +177,8 @@ impl Workbench {
             is_closing: false,
         };
         workbench.refresh_ports(ctx);
-        if request.station.is_some()
-            && let Some(bench) = workbench.remote_bench()
-        {
-            workbench.station.serve(&workbench.runner, bench);
+        if request.station.is_some() {
+            workbench.act_on_station(ctx, &StationCommand::Serve);
         }
         Ok(workbench)
     }
@@ -228,21 +245,6 @@ impl Workbench {
         }
     }
 
-    /// Whether a run over the network may begin now, or why not.
-    fn station_verdict(&self) -> Result<(), String> {
-        require(self.intent() == Intent::None && !self.has_next_run(), "the window starts a run")?;
-        match self.occupation.running.first() {
-            Some((_, words)) => Err((*words).to_owned()),
-            None => require(!self.latest_run.is_judging(), "the daily check is being judged"),
-        }
-    }
-
-    /// What runs over the network are made with; none without a library.
-    fn remote_bench(&self) -> Option<RemoteBench> {
-        let library = self.library.as_ref().ok()?.clone();
-        Some(remote_bench(&self.bench, self.is_simulated, library))
-    }
-
     /// Whether times may be measured now, or why not.
     pub fn measure_verdict(&self) -> Result<(), String> {
         let has_run = run_in_progress(&self.snapshot).is_some();
@@ -281,11 +283,7 @@ impl Workbench {
                 let sent = self.runner.request(RunnerRequest::Reconnect);
                 self.keep_refusal(sent);
             }
-            UiCommand::Station(command) => {
-                if let Some(bench) = self.remote_bench() {
-                    self.station.act(ctx, command, (&self.runner, bench));
-                }
-            }
+            UiCommand::Station(command) => self.act_on_station(ctx, command),
             UiCommand::ListPorts => self.refresh_ports(ctx),
             UiCommand::Queue(work, reason) => {
                 let by = self.form.label_text("operator").to_owned();
@@ -393,10 +391,19 @@ impl Workbench {
             self.measured = Arc::clone(&self.snapshot);
         }
         self.ports.poll();
+        self.poll_watcher();
         self.poll_start();
         self.queue.poll(ctx);
         let busy = self.station_verdict().err();
         self.station.poll(busy);
+    }
+
+    /// Shows what the watcher of the runs could not do.
+    fn poll_watcher(&mut self) {
+        let problems = self.watcher.as_ref().map(|watcher| watcher.problems()).unwrap_or_default();
+        if problems.len() != std::mem::replace(&mut self.watcher_problems, problems.len()) {
+            self.notice = problems.into_iter().next_back();
+        }
     }
 
     /// Follows the run that is shown; true when a run that has a result has just ended.
@@ -475,32 +482,5 @@ impl Workbench {
     pub fn refresh_form(&mut self) {
         let rig = &self.snapshot.rig;
         self.form.refresh(&rig.description, &self.bench, rig.is_homed);
-    }
-
-    /// Stops motion before the window closes; true if it may close now, with the axis at rest.
-    pub fn begin_to_close(&mut self) -> bool {
-        // Nothing may start in a window that is about to close.
-        self.is_closing = true;
-        let is_safe = self.is_at_rest();
-        if !is_safe {
-            self.operator(Operator::Stop);
-        }
-        is_safe && !self.is_writing()
-    }
-
-    /// Whether a window that waited for the axis to rest may close now.
-    pub fn may_close(&self) -> bool {
-        let is_safe = self.is_at_rest() || !self.runner.is_alive();
-        self.is_closing && is_safe && !self.is_writing()
-    }
-
-    /// Whether something is being written that would be lost with the window.
-    fn is_writing(&self) -> bool {
-        self.queue.is_busy() || self.latest_run.is_judging()
-    }
-
-    fn is_at_rest(&self) -> bool {
-        let snapshot = self.runner.snapshot();
-        !is_motion_possible(&snapshot) && matches!(self.start, Start::None)
     }
 }

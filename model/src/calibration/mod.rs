@@ -32,6 +32,6 @@ pub use quality::{CalibrationQuality, FlatStretch, Hysteresis, PointQuality};
 pub use settle::{SettleDetector, SettleProgress, SettleRule, SettleState, SteadySignal};
 pub use uncertainty::{ForceUncertainty, UncertaintyTerm};
 pub use validity::{
-    CHECK_LIMIT_PERCENT, CalibrationUse, KnownWeight, WeightCheck, WeightCheckError,
+    CHECK_LIMIT_PERCENT, CalibrationUse, KnownWeight, WARNING_DAYS, WeightCheck, WeightCheckError,
 };
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -7,8 +7,8 @@ use crate::units::{Newtons, Volts};
 use serde::Serialize;
 use thiserror::Error;
 
-/// A warning comes so many days before the end.
-const WARNING_DAYS: i64 = 30;
+/// A warning comes so many days before the end of a calibration's validity.
+pub const WARNING_DAYS: i64 = 30;
 /// Voltages of the excitation this near, as a share, are the same: bridge amplifiers keep to 0.1 %.
 const EXCITATION_SHARE: f64 = 1e-3;
 /// Largest error of a known weight in percent. ASTM E4 asks testing machines for 1 % of the force.

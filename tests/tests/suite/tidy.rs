@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 18] = [
+const PACKAGES: [&str; 19] = [
     "model",
     "model/rheology",
     "model/haptics",
@@ -24,6 +24,7 @@ const PACKAGES: [&str; 18] = [
     "app/analysis",
     "app/cli",
     "app/station",
+    "app/notifications",
     "app/window",
     "app",
 ];

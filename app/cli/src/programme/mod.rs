@@ -5,6 +5,7 @@ mod preflight;
 pub(super) use preflight::check;
 
 use super::Failure;
+use super::notices::Notices;
 use super::output::{Output, merged};
 use super::prompts::OperatorPrompts;
 use super::run::SessionArgs;
@@ -99,6 +100,7 @@ pub(super) fn run(
     let answers = if is_virtual { PromptResponder::Confirm } else { PromptResponder::Operator };
     #[cfg(feature = "station")]
     let bound = options.serve.bind()?;
+    let notices = Notices::open(&bench.calibration, output);
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
         // A full channel holds a wake-up already.
@@ -121,8 +123,11 @@ pub(super) fn run(
         gate: &gate,
     };
     let prompts = prompts.transpose()?;
-    let done = run_and_watch(&programme, &checksum(&text), laboratory, prompts, output)?;
+    let watching = (&notices, prompts);
+    let done = run_and_watch(&programme, &checksum(&text), laboratory, watching, output);
     drop(runner);
+    notices.finish(output);
+    let done = done?;
     write_results(&programme, &folder, &done, output)
 }
 
@@ -147,10 +152,11 @@ fn run_and_watch(
     programme: &Programme,
     crc32: &str,
     laboratory: ProgrammeSetup<'_>,
-    mut prompts: Option<OperatorPrompts>,
+    (notices, mut prompts): (&Notices, Option<OperatorPrompts>),
     output: &Output,
 ) -> Result<ProgrammeResult, Failure> {
     let bar = output.bar(1000);
+    let runner = laboratory.runner;
     let mut task_text = String::new();
     let result = carry_out(programme, crc32, laboratory, &mut |event| match event {
         ProgrammeEvent::Begun { place, count } => {
@@ -159,12 +165,14 @@ fn run_and_watch(
             bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
         }
         ProgrammeEvent::Running(view, left) => {
+            notices.see(&runner.snapshot());
             bar.set_message(format!("{task_text}  {}", progress_text(view, left.0)));
             if let Some(prompts) = &mut prompts {
                 bar.suspend(|| prompts.update(view, output));
             }
         }
-        ProgrammeEvent::Finished(..) | ProgrammeEvent::Calibrated(_) => {}
+        ProgrammeEvent::Calibrated(calibration) => notices.use_calibration(calibration),
+        ProgrammeEvent::Finished(..) => {}
     });
     drop(bar);
     result.map_err(|err| match err {

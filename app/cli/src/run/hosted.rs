@@ -1,6 +1,7 @@
 //! A run for another front end in the same process, such as the Python package: started with the options of
 //! `palpate run`, watched and ended there.
 
+use super::super::notices::Notices;
 use super::super::output::{KeptOutput, Output};
 use super::super::{Command, Failure, log, parse_options, programme};
 use super::report::report;
@@ -19,6 +20,8 @@ pub struct HostedRun {
     pub notes: Vec<String>,
     /// Lock a named rig against other programs.
     _locks: Vec<HolderLock>,
+    /// Dropped last: what is not sent yet may take a moment.
+    notices: Notices,
 }
 
 /// The report of an ended run.
@@ -62,15 +65,18 @@ impl HostedRun {
         let (request, preview, gate) = request(plan, &bench, options, labels, &output)?;
         check_start(&preview, &gate, options.acknowledge, &output)?;
         let request = RunRequest { after_stop: AfterStop::Close, ..request };
+        let notices = Notices::open(&request.calibration, &output);
         let started = StartedRun::start(bench.rig, options.rig.time_scale, request);
         let started = started.map_err(start_failure)?;
         started.wait_for_start().map_err(start_failure)?;
-        Ok(Self { started, notes: output.take().notes, _locks: bench.locks })
+        Ok(Self { started, notes: output.take().notes, _locks: bench.locks, notices })
     }
 
     /// The next snapshot, or `None` if there is none within `patience`.
     pub fn next(&self, patience: Duration) -> Result<Option<Arc<RunnerSnapshot>>, Failure> {
-        self.started.next(patience).map_err(Failure::failed)
+        let newest = self.started.next(patience).map_err(Failure::failed)?;
+        newest.iter().for_each(|snapshot| self.notices.see(snapshot));
+        Ok(newest)
     }
 
     /// Passes on the operator's choice.
@@ -83,7 +89,8 @@ impl HostedRun {
     pub fn report(&self, view: &RunView) -> HostedReport {
         let output = Output::kept();
         let failure = report(view, None, &output).err();
-        let KeptOutput { mut objects, notes } = output.take();
+        let KeptOutput { mut objects, mut notes } = output.take();
+        notes.extend(self.notices.problems());
         HostedReport { object: objects.pop().unwrap_or_default(), notes, failure }
     }
 }

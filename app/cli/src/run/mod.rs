@@ -7,6 +7,7 @@ pub use hosted::{HostedReport, HostedRun};
 
 use super::Failure;
 use super::arguments::parse_number;
+use super::notices::Notices;
 use super::output::Output;
 use super::programme;
 use super::prompts::OperatorPrompts;
@@ -328,6 +329,7 @@ pub(super) fn execute(
     output: &Output,
 ) -> Result<Arc<RunnerSnapshot>, Failure> {
     let has_operator = request.answers == PromptResponder::Operator;
+    let notices = Notices::open(&request.calibration, output);
     let started = StartedRun::start(rig, scale, request).map_err(start_failure)?;
     let is_question_open = stop_on_signals(&started.runner)?;
     started.wait_for_start().map_err(start_failure)?;
@@ -337,12 +339,17 @@ pub(super) fn execute(
     let mut prompts = prompts.transpose()?;
     let bar = output.bar(1000);
     let ended = started.wait_for_end(|view| {
+        notices.see(&started.runner.snapshot());
         bar.set_position((view.fraction * 1000.0) as u64);
         bar.set_message(progress_text(view));
         if let Some(prompts) = &mut prompts {
             bar.suspend(|| prompts.update(view, output));
         }
     });
+    drop(bar);
+    // The rig is free again before a network keeps the end waiting.
+    drop(started);
+    notices.finish(output);
     ended.map_err(Failure::failed)
 }
 

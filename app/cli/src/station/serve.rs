@@ -1,6 +1,7 @@
 //! `palpate serve`: a rig as a station, without a window. The person at the rig types at its terminal.
 
 use super::super::Failure;
+use super::super::notices::Notices;
 use super::super::output::Output;
 use super::super::rig::{RigArgs, open};
 use super::super::terminal::{ctrl_c_flag, read_lines};
@@ -15,7 +16,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::PoisonError;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::RecvTimeoutError;
+use std::sync::mpsc::{TryRecvError, sync_channel};
 use std::time::Duration;
 
 /// Serve a rig over HTTP: watch and stop it from a browser, and run what a person at the rig has armed
@@ -36,7 +37,7 @@ pub struct ServeArgs {
     rig: RigArgs,
 }
 
-/// How often the terminal and the desk are looked at.
+/// How often the terminal and the desk are looked at, where the rig says nothing.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 const WORDS: &str = "type stop, arm FILE MINUTES, disarm, or quit";
@@ -48,7 +49,13 @@ pub(crate) fn run(args: &ServeArgs, output: &Output) -> Result<(), Failure> {
     let bench = open(&args.rig)?;
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let remote = remote_bench(&bench, settings.library.clone());
-    let runner = Runner::start(bench.rig, args.rig.time_scale, None, || ()).map_err(|err| {
+    let notices = Notices::open(&bench.calibration, output);
+    let (wake, woken) = sync_channel(1);
+    let woken_by = move || {
+        // A full channel holds a wake-up already.
+        let _ = wake.try_send(());
+    };
+    let runner = Runner::start(bench.rig, args.rig.time_scale, None, woken_by).map_err(|err| {
         Failure::failed(format!("the thread that runs protocols cannot be started: {err}"))
     })?;
     let station = start(&settings, runner.handle(), Some(remote))?;
@@ -61,23 +68,21 @@ pub(crate) fn run(args: &ServeArgs, output: &Output) -> Result<(), Failure> {
     output.answer("serve", &object, || format!("the rig is served at {url}/; {WORDS}"));
     let lines = read_lines("terminal")?;
     let mut desk = DeskNews::default();
-    let mut is_open = true;
     while !is_ending.load(Ordering::Relaxed) && runner.is_alive() {
+        let _ = woken.recv_timeout(LOOK_EVERY);
+        notices.see(&runner.snapshot());
         desk.tell(&station, output);
-        if !is_open {
-            std::thread::sleep(LOOK_EVERY);
-            continue;
-        }
-        match lines.recv_timeout(LOOK_EVERY) {
+        match lines.try_recv() {
             Ok(line) if line.trim() == "quit" => break,
             Ok(line) => obey(line.trim(), &station, &runner, &settings.library, output),
-            Err(RecvTimeoutError::Timeout) => {}
             // A service has no terminal; a signal ends it.
-            Err(RecvTimeoutError::Disconnected) => is_open = false,
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => {}
         }
     }
     // The station first, so that nothing is started any more; then the rig stops.
     drop(station);
+    notices.see(&runner.snapshot());
+    notices.finish(output);
     match runner.is_alive() {
         true => Ok(()),
         false => Err(Failure::failed(
