@@ -24,7 +24,7 @@ use preflight::{
     problem_failure, require_labels, with_settings,
 };
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::sync_channel;
 
 /// Name of the page in the programme's folder.
@@ -36,6 +36,15 @@ const CALIBRATION_FILE: &str = "calibration.json";
 /// Whether a name is the file of a programme.
 pub(super) fn is_programme(name: &str) -> bool {
     read(Path::new(name)).is_ok_and(|text| Programme::is_programme_text(&text))
+}
+
+/// The folder that is named, or a new one in the library.
+fn folder_of(programme: &Programme, options: &SessionArgs) -> Result<PathBuf, Failure> {
+    if let Some(folder) = &options.out {
+        return Ok(folder.clone());
+    }
+    let library = library_folder().map_err(Failure::usage)?;
+    Ok(new_programme_folder(&library, &programme.name, wall_now().into()))
 }
 
 pub(super) fn run(
@@ -89,13 +98,7 @@ pub(super) fn run(
         }
     };
     check_gates(file, &programme, &gate)?;
-    let folder = match &options.out {
-        Some(folder) => folder.clone(),
-        None => {
-            let library = library_folder().map_err(Failure::usage)?;
-            new_programme_folder(&library, &programme.name, wall_now().into())
-        }
-    };
+    let folder = folder_of(&programme, options)?;
     bench.from_library.iter().chain(&bench.doubts).for_each(|words| output.note(words));
     let answers = if is_virtual { PromptResponder::Confirm } else { PromptResponder::Operator };
     #[cfg(feature = "station")]
