@@ -24,6 +24,7 @@ mod gui_review;
 mod gui_review_ten;
 mod gui_scene;
 mod gui_start;
+mod gui_station;
 mod gui_tape;
 mod gui_today;
 mod gui_tutorial;
