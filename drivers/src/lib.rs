@@ -22,6 +22,7 @@ pub mod rig;
 pub mod rig_file;
 pub mod rig_search;
 pub mod serial;
+pub mod sidecar;
 pub mod sim;
 pub mod split_rig;
 pub mod text;

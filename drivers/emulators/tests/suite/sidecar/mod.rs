@@ -1,0 +1,6 @@
+//! The sidecar's driver and an emulated sidecar.
+
+pub mod bench;
+mod fault_runs;
+mod faults;
+mod moves;
