@@ -5,6 +5,7 @@
 //! `sensor_rig.rs` are sensors beside any rig.
 
 mod cell;
+pub mod conform;
 pub mod connect;
 pub mod description;
 pub mod protocol;

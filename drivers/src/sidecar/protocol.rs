@@ -59,38 +59,26 @@ impl HostMessage {
         finish_line(&format!(r#"{{"n":{number},"do":{rest}}}"#), has_checksum)
     }
 
-    /// Reads a line without its end, as a sidecar does: its number and what it says, or why it is refused.
-    pub fn parse(line: &str, has_checksum: bool) -> Result<(u64, Self), String> {
-        let plain = line.contains(r#""do":"hello""#) || !has_checksum;
-        let text = if plain { Some(line) } else { checked(line) };
-        let text = text.ok_or("the checksum is wrong")?;
-        let raw: RawHostMessage = serde_json::from_str(text).map_err(|_| "not JSON")?;
-        let missing = || "a key is missing".to_owned();
-        let speed = |value: Option<f64>| value.filter(|v| *v > 0.0).ok_or_else(missing);
-        let message = match raw.word.as_str() {
-            "hello" if raw.version == Some(VERSION) => Self::Hello,
-            "hello" => return Err(format!("only version {VERSION} is spoken")),
-            "start" => Self::Start { is_binary: raw.binary.unwrap_or(false) },
-            "beat" => Self::Beat,
-            "enable" => Self::Enable,
-            "move" => Self::Move {
-                to: raw.to.ok_or_else(missing)?,
-                speed: MmPerS(speed(raw.speed)?),
-                acceleration: MmPerS2(speed(raw.acceleration)?),
-            },
-            "sine" => Self::Sine {
-                amplitude: raw.amplitude.ok_or_else(missing)?,
-                period: raw.period.ok_or_else(missing)?,
-                cycles: raw.cycles.ok_or_else(missing)?,
-                acceleration: MmPerS2(speed(raw.acceleration)?),
-            },
-            "stop" => Self::Stop,
-            "halt" => Self::Halt,
-            "bye" => Self::Bye,
-            other => return Err(format!("'{other}' is not known")),
-        };
-        Ok((raw.n, message))
+    /// Reads a line without its end, as a sidecar does: its number and what it says.
+    pub fn parse(line: &str, has_checksum: bool) -> Result<(u64, Self), HostLineError> {
+        let refused = |why: &str| HostLineError { number: None, why: why.to_owned() };
+        let is_plain = line.contains(r#""do":"hello""#) || !has_checksum;
+        let text = if is_plain { Some(line) } else { checked(line) };
+        let text = text.ok_or_else(|| refused("the checksum is wrong"))?;
+        let raw: RawHostMessage = serde_json::from_str(text).map_err(|_| refused("not JSON"))?;
+        let number = raw.n;
+        let message = raw.message();
+        let message = message.map_err(|why| HostLineError { number: Some(number), why })?;
+        Ok((number, message))
     }
+}
+
+/// Why a line of the host is not obeyed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HostLineError {
+    /// `None` where the line was not understood.
+    pub number: Option<u64>,
+    pub why: String,
 }
 
 #[derive(Deserialize)]
@@ -106,6 +94,35 @@ struct RawHostMessage {
     amplitude: Option<i64>,
     period: Option<u32>,
     cycles: Option<u32>,
+}
+
+impl RawHostMessage {
+    fn message(&self) -> Result<HostMessage, String> {
+        let missing = || "a key is missing".to_owned();
+        let positive = |value: Option<f64>| value.filter(|v| *v > 0.0).ok_or_else(missing);
+        Ok(match self.word.as_str() {
+            "hello" if self.version == Some(VERSION) => HostMessage::Hello,
+            "hello" => return Err(format!("only version {VERSION} is spoken")),
+            "start" => HostMessage::Start { is_binary: self.binary.unwrap_or(false) },
+            "beat" => HostMessage::Beat,
+            "enable" => HostMessage::Enable,
+            "move" => HostMessage::Move {
+                to: self.to.ok_or_else(missing)?,
+                speed: MmPerS(positive(self.speed)?),
+                acceleration: MmPerS2(positive(self.acceleration)?),
+            },
+            "sine" => HostMessage::Sine {
+                amplitude: self.amplitude.ok_or_else(missing)?,
+                period: self.period.ok_or_else(missing)?,
+                cycles: self.cycles.ok_or_else(missing)?,
+                acceleration: MmPerS2(positive(self.acceleration)?),
+            },
+            "stop" => HostMessage::Stop,
+            "halt" => HostMessage::Halt,
+            "bye" => HostMessage::Bye,
+            other => return Err(format!("'{other}' is not known")),
+        })
+    }
 }
 
 /// A sample as it came.

@@ -21,6 +21,11 @@ pub trait Link: Send {
     fn close_input(&mut self) -> io::Result<()> {
         Err(ErrorKind::Unsupported.into())
     }
+
+    /// Whether it is a program that was started for this link, and ends with it.
+    fn is_program(&self) -> bool {
+        false
+    }
 }
 
 /// Nothing that palpate writes is as long as what operating systems keep for a device (4 kB), so a write that waits

@@ -94,6 +94,10 @@ impl Link for ProgramLink {
     fn close_input(&mut self) -> io::Result<()> {
         self.link()?.stream().shutdown(Shutdown::Write)
     }
+
+    fn is_program(&self) -> bool {
+        true
+    }
 }
 
 impl Drop for ProgramLink {

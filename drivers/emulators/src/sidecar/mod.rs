@@ -242,9 +242,10 @@ impl EmulatedSidecar {
         let has_checksum = self.settings.has_checksum && self.has_introduced;
         let (number, message) = match HostMessage::parse(&text, has_checksum) {
             Ok(parsed) => parsed,
-            Err(why) => {
-                let why = why.replace(['"', '\\'], " ");
-                return self.send(&format!(r#"{{"no":null,"why":"{why}"}}"#));
+            Err(err) => {
+                let number = err.number.map_or("null".to_owned(), |number| number.to_string());
+                let why = err.why.replace(['"', '\\'], " ");
+                return self.send(&format!(r#"{{"no":{number},"why":"{why}"}}"#));
             }
         };
         if self.is_mute() {
