@@ -28,5 +28,5 @@ pub mod split_rig;
 pub mod text;
 pub mod wire;
 
-pub use open::{is_rig_file, open, open_wired, read_rig_file};
+pub use open::{is_rig_file, open, open_wired, read_rig_file, read_rig_text};
 pub use rig::{Rig, RigError, RigEvent, RigEventBody};

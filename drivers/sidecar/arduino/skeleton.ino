@@ -1,11 +1,11 @@
-// NAME: a stage with a load cell for palpate, for any Arduino or ESP32. As it is, stage and cell are simulated: replace the
+// my-sidecar: a stage with a load cell for palpate, for any Arduino or ESP32. As it is, stage and cell are simulated: replace the
 // lines that are marked. It uses no library but Serial, and no memory beside what is declared here.
 //
 // SPDX-License-Identifier: MIT OR Apache-2.0, as all of palpate.
 //
 // The sidecar protocol is in palpate's documents, "The sidecar protocol". Every line has a CRC-16, because it is a serial line.
 
-const char NAME_[] = "NAME";
+const char NAME[] = "my-sidecar";
 const unsigned long BAUD = 115200;
 const int RATE = 100;                    // samples a second
 const unsigned long SILENCE_MS = 200;    // the axis brakes by itself after so long without a line
@@ -171,7 +171,7 @@ void describe(uint32_t n) {
   begin("{\"ok\":");
   putUnsigned(n);
   put(",\"sidecar\":1,\"name\":\"");
-  put(NAME_);
+  put(NAME);
   put("\",\"boot\":");
   putUnsigned(boot);
   put(",\"tick_ns\":1000,\"rate\":");

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""NAME: a stage with a load cell for palpate. As it is, stage and cell are simulated: replace the marked lines."""
+"""my-sidecar: a stage with a load cell for palpate. As it is, stage and cell are simulated: replace the marked lines."""
 import math
 import random
 import time
@@ -11,7 +11,7 @@ HOME_MM = -5.0  # where the home switch closes, from where the stage was switche
 
 
 class Stage(Sidecar):
-    name = "NAME"
+    name = "my-sidecar"
     rate = 200
     axis = {"mm_per_pulse": MM_PER_PULSE, "travel_mm": 60, "speed_max": 10, "acceleration": 50, "lag_ms": 5}
     cell = {"counts_min": -8388608, "counts_max": 8388607, "volts_per_count": 5 / 2**23, "noise_v": 3e-4}

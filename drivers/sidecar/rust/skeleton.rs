@@ -1,4 +1,4 @@
-//! NAME: a stage with a load cell for palpate, one file. As it is, stage and cell are simulated: replace the lines that are
+//! my-sidecar: a stage with a load cell for palpate, one file. As it is, stage and cell are simulated: replace the lines that are
 //! marked. The sidecar protocol is in palpate's documents, "The sidecar protocol".
 //!
 //! SPDX-License-Identifier: MIT OR Apache-2.0, as all of palpate.
@@ -8,7 +8,7 @@ use std::io::{self, BufRead, Read, Write};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-const NAME: &str = "NAME";
+const NAME: &str = "my-sidecar";
 const RATE: f64 = 200.0;
 const SILENCE: Duration = Duration::from_millis(200);
 const MM_PER_PULSE: f64 = 0.0025;

@@ -243,6 +243,11 @@ impl Fields {
         found.map(|(_, value)| *value)
     }
 
+    /// The mistakes in what was read.
+    pub(super) fn into_mistakes(self) -> Vec<Mistake> {
+        self.mistakes
+    }
+
     /// All mistakes, keys that mean nothing among them, in the order of their lines.
     pub fn finish(mut self) -> Vec<Mistake> {
         for field in self.all.iter().filter(|field| !field.is_taken) {

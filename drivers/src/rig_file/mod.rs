@@ -15,6 +15,7 @@ pub(crate) use galil::galil;
 pub(crate) use grbl::grbl;
 pub(crate) use mark10::{gauge, stand};
 pub(crate) use sidecar::sidecar;
+pub use sidecar::sidecars;
 
 use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, RigDevice};

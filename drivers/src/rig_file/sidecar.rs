@@ -1,8 +1,8 @@
 //! The keys of a sidecar, and of sensors beside any rig.
 
-use super::RigFile;
 use super::address::read_address;
 use super::fields::Fields;
+use super::{RigFile, RigFileError};
 use crate::sidecar::{SensorDevice, SidecarDevice, SidecarSettings};
 use crate::wire::DeviceAddress;
 use palpate_model::rig::{RigDescription, SensorChannel};
@@ -50,4 +50,31 @@ fn read_sensor(fields: &mut Fields, name: String) -> Option<SensorDevice> {
     let place = read_address(fields, &table);
     let serial_number = fields.text(&format!("{table}serial_number"));
     Some(SensorDevice { name, place: place?, serial_number }).filter(|_| is_name)
+}
+
+/// The sidecars of a rig file: `rig`, `cell` or `sensors.NAME`, each with its address. What else is in the file is not
+/// looked at.
+pub fn sidecars(file: &str, text: &str) -> Result<Vec<(String, DeviceAddress)>, RigFileError> {
+    let error = |mistakes| RigFileError { file: file.to_owned(), mistakes };
+    let fields = Fields::read(text).map_err(|mistake| error(vec![mistake]))?;
+    let mut fields = fields.in_folder(super::folder_of(file));
+    let is_sidecar = |text: Option<String>| text.as_deref() == Some("sidecar");
+    let mut parts: Vec<(String, String)> = Vec::new();
+    if is_sidecar(fields.text("device")) {
+        parts.push(("rig".into(), String::new()));
+    }
+    if is_sidecar(fields.text("cell.device")) {
+        parts.push(("cell".into(), "cell.".into()));
+    }
+    for name in fields.tables_in("sensors") {
+        parts.push((format!("sensors.{name}"), format!("sensors.{name}.")));
+    }
+    let mut all = Vec::new();
+    for (part, table) in parts {
+        all.extend(read_address(&mut fields, &table).map(|place| (part, place)));
+    }
+    match fields.into_mistakes() {
+        mistakes if mistakes.is_empty() => Ok(all),
+        mistakes => Err(error(mistakes)),
+    }
 }

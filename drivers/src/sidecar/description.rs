@@ -80,7 +80,8 @@ pub enum SensorKind {
 pub const SENSORS_MAX: usize = 16;
 const NAME_MAX: usize = 32;
 
-fn is_name(name: &str) -> bool {
+/// Whether a sidecar or one of its sensors can be called so.
+pub(super) fn is_name(name: &str) -> bool {
     name.len() <= NAME_MAX && SensorChannel::is_name(name)
 }
 

@@ -13,6 +13,7 @@ mod sensor_line;
 mod sensor_rig;
 pub mod sensors;
 mod session;
+pub mod skeleton;
 
 pub use connect::{ConnectedSidecar, connect};
 pub use description::SidecarDescription;
