@@ -172,3 +172,24 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
     }
     Some(monitor)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_is_watched_by_its_name_and_its_values_are_plain_numbers() {
+        let channel = MonitorSource::Channel("room.temperature".into());
+        assert_eq!(find_source("sensor room.temperature"), Ok((channel, None)));
+        assert_eq!(find_source("force"), Ok((MonitorSource::Force, Some(QuantityKind::Force))));
+        for wrong in ["sensor", "sensor ", "sensor a b", "room.temperature", ""] {
+            assert!(find_source(wrong).is_err(), "{wrong}");
+        }
+        let node = |value| DocumentNode { line: 1, value };
+        assert_eq!(plain_number(&node(DocumentValue::Number("21.5".into()))), Ok(21.5));
+        assert_eq!(plain_number(&node(DocumentValue::Text("-3".into()))), Ok(-3.0));
+        for wrong in ["25 °C", "inf", "$limit"] {
+            assert!(plain_number(&node(DocumentValue::Text(wrong.into()))).is_err(), "{wrong}");
+        }
+    }
+}

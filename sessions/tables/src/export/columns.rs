@@ -427,3 +427,47 @@ impl Cells {
         }
     }
 }
+
+#[cfg(test)]
+mod sensor_tests {
+    use super::*;
+    use palpate_model::Nanos;
+    use palpate_model::rig::{RigDescription, RigSensors, SensorChannel};
+
+    #[test]
+    fn a_sensor_has_its_newest_value_at_each_sample() {
+        let channel =
+            |name: &str, unit: &str| SensorChannel { name: name.into(), unit: unit.into() };
+        let channels = vec![channel("room.temperature", "°C"), channel("camera.frame", "1")];
+        let rig: RigDescription = serde_json::from_value(serde_json::json!({
+            "name": "a", "identity": "a", "settings": {}, "mm_per_pulse": 0.01, "travel": 1.0, "tick_nanos": 1,
+            "speed_quantum": 0.01, "speed_max": 1.0, "acceleration": 1.0, "adc": null, "noise_expected": 0.0,
+        }))
+        .unwrap();
+        let sensors = RigSensors { channels, ..RigSensors::default() };
+        let manifest =
+            Manifest { rig: Some(RigDescription { sensors, ..rig }), ..Manifest::default() };
+        let entry = |after_sample, value: SensorReading| LogEntry {
+            kind: EntryKind::Input,
+            order: 0,
+            after_sample,
+            now: Nanos::ZERO,
+            body: serde_json::json!({ "input": "sensor", "value": value }),
+        };
+        let channel = |number, value| SensorReading::Channel { number, value, age: Nanos(7) };
+        let entries = [
+            entry(2, channel(1, 21.5)),
+            entry(2, SensorReading::Bath { celsius: 37.0 }),
+            entry(4, channel(2, 1.0)),
+            entry(5, channel(1, 21.6)),
+            entry(5, channel(1, 21.7)),
+        ];
+        let columns = ExtraColumns::of_sensors(&manifest, &entries).sensors;
+        assert_eq!([&*columns[0].name, &*columns[1].name], ["room.temperature_°C", "camera.frame"]);
+        let values = |column: &SensorColumn| [0, 1, 2, 4, 5, 9].map(|sample| column.value(sample));
+        let (a, b) = (Some(21.5), Some(21.7));
+        assert_eq!(values(&columns[0]), [None, None, a, a, b, b]);
+        assert_eq!(values(&columns[1]), [None, None, None, Some(1.0), Some(1.0), Some(1.0)]);
+        assert!(ExtraColumns::of_sensors(&Manifest::default(), &entries).sensors.is_empty());
+    }
+}
