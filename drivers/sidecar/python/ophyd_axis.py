@@ -8,12 +8,13 @@ motor whose readback is further from it than TOLERANCE_MM is a fault.
 SPDX-License-Identifier: MIT OR Apache-2.0, as all of palpate.
 """
 import asyncio
+import os
 import threading
 
 from ophyd_async.core import init_devices, soft_signal_r_and_setter
 from ophyd_async.sim import SimMotor
 
-from palpate_sidecar import HOME, MOTOR_ON, MOVING, STOPPING, Sidecar, Trapezoid
+from palpate_sidecar import HOME, MOTOR_ON, MOVING, STOPPING, Refused, Sidecar, Trapezoid
 
 MM_PER_PULSE = 0.001
 TOLERANCE_MM = 1.5  # the simulated motor reports ten times a second
@@ -63,6 +64,8 @@ class OphydAxis(Sidecar):
         self.on = True
 
     def move(self, to, speed, acceleration):
+        if not self.on:
+            raise Refused("the motor is off")
         self.path.move(to * MM_PER_PULSE, speed, acceleration)
         self.later(self.begin(to * MM_PER_PULSE, speed, acceleration))
 
@@ -91,3 +94,4 @@ class OphydAxis(Sidecar):
 
 if __name__ == "__main__":
     OphydAxis().run()
+    os._exit(0)  # the axis stands; what ophyd-async still has to do takes longer than palpate waits

@@ -216,6 +216,8 @@ class Sidecar:
                     raise ValueError("the checksum is wrong")
             message = json.loads(line.decode("ascii"))
             number, word = message["n"], message["do"]
+            if type(number) is not int or number < 0 or type(word) is not str:
+                raise ValueError("n is a number, and do is a word")
         except (ValueError, KeyError, TypeError) as error:
             return self._say({"no": None, "why": str(error)[:80]})
         try:

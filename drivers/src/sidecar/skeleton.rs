@@ -83,6 +83,8 @@ pub fn skeleton(name: &str, language: SkeletonLanguage) -> Vec<SkeletonFile> {
         ),
     };
     files.push(file(format!("{name}.toml"), rig_file(name, &place)));
+    let first_run = include_str!("../../sidecar/first-run.toml");
+    files.push(file("first-run.toml".into(), first_run.into()));
     files.push(file("README.md".into(), readme(name, &program, language)));
     files
 }
@@ -115,7 +117,7 @@ fn readme(name: &str, program: &str, language: SkeletonLanguage) -> String {
          As it is, stage and load cell are simulated. Replace the lines marked `REPLACE`.\n\n{first}\n\n\
          ```\npalpate rig check {name}.toml\npalpate rig monitor {name}.toml\npalpate rig conform {name}.toml --move 4\n```\n\n\
          `conform` moves the axis by up to 4 mm from where it stands and prints what the rig may be trusted with. Write that\n\
-         speed into the rig file. A rig needs an emergency stop of its own: palpate's stop keys are software.\n"
+         speed into the rig file. `first-run.toml` is a protocol for the first run,\nwith slow motions. A rig needs an emergency stop of its own: palpate's stop keys are software.\n"
     )
 }
 
