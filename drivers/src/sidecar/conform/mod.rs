@@ -200,6 +200,7 @@ fn move_axis(
     };
     (bench.progress)("motion");
     let plan = motions::MotionPlan::new(about, axis, range);
+    checks.extend(motions::refusals(&mut talk, &plan)?);
     checks.extend(motions::follow(&mut talk, &plan, about)?);
     (bench.progress)("stop");
     checks.extend(motions::stops(&mut talk, &plan, measured)?);

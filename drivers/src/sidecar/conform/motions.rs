@@ -145,12 +145,8 @@ fn go(talk: &mut Talk, plan: &MotionPlan, to: i64) -> Result<bool, ConformError>
     Ok(begin(talk, plan, to, plan.speed)? && rest(talk)? && here(talk) == to)
 }
 
-/// Refusals, and a motion that is compared with its commanded path.
-pub(super) fn follow(
-    talk: &mut Talk,
-    plan: &MotionPlan,
-    about: &SidecarDescription,
-) -> Result<Vec<Check>, ConformError> {
+/// Motions that must be refused. The motor is on after this.
+pub(super) fn refusals(talk: &mut Talk, plan: &MotionPlan) -> Result<Vec<Check>, ConformError> {
     talk.check = "motion";
     talk.until(plan.seen_by(), |_| true)?;
     let base = here(talk);
@@ -179,6 +175,16 @@ pub(super) fn follow(
     }
     let what = "twice its largest speed is refused";
     checks.push(Check::of("too-fast", what, is_refused && is_enabled).safety());
+    Ok(checks)
+}
+
+/// A motion that is compared with its commanded path.
+pub(super) fn follow(
+    talk: &mut Talk,
+    plan: &MotionPlan,
+    about: &SidecarDescription,
+) -> Result<Vec<Check>, ConformError> {
+    let mut checks = Vec::new();
     let base = here(talk);
     let mut path = PathTracker::new(&plan.description(about));
     let from = talk.samples.len().saturating_sub(1);

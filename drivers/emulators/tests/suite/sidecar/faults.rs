@@ -146,7 +146,7 @@ fn garbled_lines_are_counted_and_noise_stops_the_axis() {
     // Every 20 000th byte is changed: a garbled line now and then stops nothing.
     host.wire.lock().spoil = Box::new(move |byte| {
         count += 1;
-        vec![if count % 20_000 == 0 { byte ^ 1 } else { byte }]
+        vec![if count.is_multiple_of(20_000) { byte ^ 1 } else { byte }]
     });
     host.pass(2.0);
     assert!(host.is_moving());
