@@ -52,7 +52,7 @@ fn overtravel(text: &str) -> Result<f64, String> {
     mm.ok_or_else(|| "give 0.01 to 10".to_owned())
 }
 
-/// The sidecar that is asked for.
+/// The sidecar to be checked.
 fn find_part(args: &RigConformArgs) -> Result<(String, DeviceAddress), Failure> {
     let text = read_rig_text(&args.file).map_err(Failure::usage)?;
     let all = sidecars(&args.file, &text).map_err(Failure::usage)?;

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-/// A program that is told to end, by the end of its input, gets so long before it is killed.
+/// A program has so long to end by itself after the end of its input, before it is killed.
 const END_MAX: Duration = Duration::from_millis(500);
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Lines of its standard error that are logged, and their longest length.

@@ -254,7 +254,7 @@ pub(super) fn stops(
         for share in [1.0, 0.5] {
             let (base, speed) = (here(talk), share * plan.speed);
             is_stopped &= cruise(talk, plan, base + plan.range, speed)?;
-            let (from, asked) = (here(talk), talk.now());
+            let (from, begun) = (here(talk), talk.now());
             let Some(answer) = talk.ask(message)?.filter(|answer| answer.is_ok) else {
                 is_stopped = false;
                 continue;
@@ -267,7 +267,7 @@ pub(super) fn stops(
             if way - most > worst {
                 (worst, limit) = (way - most, most);
             }
-            longest = longest.max(talk.now().since(asked));
+            longest = longest.max(talk.now().since(begun));
             go(talk, plan, base)?;
         }
         let what = format!(

@@ -21,7 +21,7 @@ impl SidecarSession {
             SidecarMessage::Sample(sample) => self.on_sample(now, &sample),
             SidecarMessage::Ok { number, .. } => self.on_ok(now, number),
             SidecarMessage::No { number: Some(number), why } => self.on_no(now, number, &why),
-            // A line of ours was garbled on its way; what it asked for is not answered in time.
+            // A line of ours was garbled on its way; its answer does not come in time.
             SidecarMessage::No { number: None, .. } => self.stats.resynchronised += 1,
             SidecarMessage::Fault(why) => self.fail(now, &format!("the sidecar reports: {why}")),
             SidecarMessage::Boot(_) | SidecarMessage::Description(_) => self.on_restart(now),

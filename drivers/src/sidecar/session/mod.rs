@@ -23,7 +23,7 @@ const BEATS_PER_SILENCE: u64 = 4;
 /// A beat so often at least, so that a dead link is noticed.
 const BEAT_MAX: Nanos = Nanos::from_millis(200);
 
-/// What was asked for and is not answered yet.
+/// A line that has no answer yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Request {
     Start,
@@ -198,7 +198,7 @@ impl SidecarSession {
         }
     }
 
-    /// Something is wrong: the axis is stopped, and the rig's owner is told why.
+    /// Something is wrong: the axis is stopped, and the rig's owner learns why.
     fn fail(&mut self, now: Nanos, why: &str) {
         self.stop_axis(now, why);
         self.report(now, [RigEventBody::refusal(why)]);

@@ -28,7 +28,7 @@ impl SidecarSession {
             self.excuse(pause);
         }
         if pause > ATTENDED_MAX {
-            // What was asked for before may no longer be wanted.
+            // A motion from before the pause may no longer be wanted.
             let why = "the computer stood still for half a second, so the motion was not started";
             self.refuse_waiting(now, why, RigCommand::is_motion);
         }
