@@ -105,6 +105,28 @@ pub struct CellReports {
 }
 
 impl CellReports {
+    pub(crate) const fn new(now: Nanos) -> Self {
+        Self {
+            samples: VecDeque::new(),
+            troubles: VecDeque::new(),
+            newest: now,
+            is_beyond_range: false,
+        }
+    }
+
+    /// When the newest value came.
+    pub(crate) const fn newest(&self) -> Nanos {
+        self.newest
+    }
+
+    pub(crate) fn take_sample(&mut self) -> Option<CellSample> {
+        self.samples.pop_front()
+    }
+
+    pub(crate) fn take_trouble(&mut self) -> Option<String> {
+        self.troubles.pop_front()
+    }
+
     /// Adds a value that has arrived now. Without room the oldest one goes.
     pub fn push_counts(
         &mut self,
@@ -147,12 +169,7 @@ pub struct LineCell<P> {
 impl<P: CellProtocol> LineCell<P> {
     #[must_use]
     pub fn start(protocol: P, now: Nanos) -> Self {
-        let reports = CellReports {
-            samples: VecDeque::new(),
-            troubles: VecDeque::new(),
-            newest: now,
-            is_beyond_range: false,
-        };
+        let reports = CellReports::new(now);
         Self { protocol, lines: Lines::default(), reports, garbled: 0 }
     }
 }
@@ -172,11 +189,11 @@ impl<P: CellProtocol> CellDialogue for LineCell<P> {
     }
 
     fn take_sample(&mut self) -> Option<CellSample> {
-        self.reports.samples.pop_front()
+        self.reports.take_sample()
     }
 
     fn take_trouble(&mut self) -> Option<String> {
-        self.reports.troubles.pop_front()
+        self.reports.take_trouble()
     }
 
     fn garbled(&self) -> u64 {

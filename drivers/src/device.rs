@@ -6,7 +6,7 @@ use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
 use crate::wire::{HaltHandle, HostClock, LinkStats, LinkThread, TOO_MANY_COMMANDS, WireError};
 use palpate_model::Nanos;
-use palpate_model::rig::{RawBytes, RigCommand, RigDescription};
+use palpate_model::rig::{RawBytes, RigCommand, RigDescription, SensorReading};
 use std::collections::VecDeque;
 use std::time::Duration;
 use thiserror::Error;
@@ -50,6 +50,11 @@ pub trait RigDevice: Send {
     fn complete(&mut self, _now: Nanos, body: RigEventBody) -> RigEventBody {
         body
     }
+
+    /// New readings of its sensors, as [`Rig::take_sensors`] has them.
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        Vec::new()
+    }
 }
 
 /// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
@@ -58,7 +63,7 @@ const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 
 /// The caller's zero on the host's clock, and the newest time that was reported.
 #[derive(Default)]
-struct CallerTime {
+pub(crate) struct CallerTime {
     /// `None` before the first call.
     origin: Option<Nanos>,
     newest: Nanos,
@@ -66,7 +71,7 @@ struct CallerTime {
 
 impl CallerTime {
     /// The caller asks for events until a time of its own: that time on the host's clock.
-    fn host_end(&mut self, now: Nanos, until: Nanos) -> Nanos {
+    pub(crate) fn host_end(&mut self, now: Nanos, until: Nanos) -> Nanos {
         let begun = Nanos(now.0.saturating_sub(until.0));
         // A caller whose time stood still, as while the computer slept, gets a new origin.
         let origin = match self.origin {
@@ -78,14 +83,19 @@ impl CallerTime {
     }
 
     /// The caller's time of an event on the host's clock; never before an earlier event.
-    fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
+    pub(crate) fn event_time(&mut self, at: Nanos, until: Nanos) -> Nanos {
         let origin = self.origin.unwrap_or(at);
         self.newest = at.since(origin).max(self.newest).min(until);
         self.newest
     }
 
+    /// Another rig has reported at the caller's time.
+    pub(crate) fn note(&mut self, at: Nanos) {
+        self.newest = self.newest.max(at);
+    }
+
     /// The caller's time of bytes that were exchanged, in any order.
-    fn caller_time(&self, at: Nanos) -> Nanos {
+    pub(crate) fn caller_time(&self, at: Nanos) -> Nanos {
         at.since(self.origin.unwrap_or(Nanos::ZERO))
     }
 }
@@ -222,6 +232,10 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
 
     fn newtons_per_volt(&self) -> Option<f64> {
         self.opened.newtons_per_volt
+    }
+
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        self.device.take_sensors()
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {

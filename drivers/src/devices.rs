@@ -2,7 +2,7 @@
 
 use crate::cell::CellDevice;
 use crate::rig_file::{Fields, RigFile};
-use crate::{galil, grbl, hx711, mark10};
+use crate::{galil, grbl, hx711, mark10, sidecar};
 use palpate_model::Nanos;
 use palpate_model::units::Volts;
 use std::sync::Arc;
@@ -16,6 +16,8 @@ pub const DEVICES: &[DeviceKind] = &[
     hx711::KIND,
     mark10::gauge::KIND,
     crate::plain_numbers::KIND,
+    sidecar::KIND,
+    sidecar::CELL_KIND,
 ];
 
 pub struct DeviceKind {

@@ -22,10 +22,11 @@ pub mod rig;
 pub mod rig_file;
 pub mod rig_search;
 pub mod serial;
+pub mod sidecar;
 pub mod sim;
 pub mod split_rig;
 pub mod text;
 pub mod wire;
 
-pub use open::{is_rig_file, open, open_wired, read_rig_file};
+pub use open::{is_rig_file, open, open_wired, read_rig_file, read_rig_text};
 pub use rig::{Rig, RigError, RigEvent, RigEventBody};

@@ -28,6 +28,11 @@ pub fn is_rig_file(name: &str) -> bool {
 }
 
 pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
+    Ok(RigFile::parse(file, &read_rig_text(file)?)?)
+}
+
+/// The text of a rig file.
+pub fn read_rig_text(file: &str) -> Result<String, RigError> {
     let unreadable = |detail: String| RigError::File { file: file.to_owned(), detail };
     let mut bytes = Vec::new();
     std::fs::File::open(file)
@@ -36,8 +41,7 @@ pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
             open.take(rig_file::BYTES_MAX as u64 + 1).read_to_end(&mut bytes)
         })
         .map_err(|err| unreadable(err.to_string()))?;
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not a text file".into()))?;
-    Ok(RigFile::parse(file, &text)?)
+    String::from_utf8(bytes).map_err(|_| unreadable("it is not a text file".into()))
 }
 
 /// Opens the rig that a file describes and checks its devices against it. Nothing moves.

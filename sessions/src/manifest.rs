@@ -12,7 +12,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Version of the on-disk format. A reader refuses a higher one.
 ///
 /// 2: imported sessions, which have no rig and no limits, and whose samples may lack volts and pulses.
-pub const RECORD_VERSION: u32 = 2;
+///
+/// 3: rigs may have channels of sensors, whose values are inputs.
+pub const RECORD_VERSION: u32 = 3;
 
 /// Ticks per second of an imported session: fine enough for every digit of a file's times, and 63 bits span 106 days.
 pub const IMPORTED_TICKS_PER_S: f64 = 1e12;

@@ -442,5 +442,6 @@ pub fn corrected_depth_columns(
             ("depth_corrected_sigma_mm", "mm", column(|one| one.sigma_mm)),
         ],
         metadata: vec![("palpate.compliance".into(), document.to_string())],
+        ..ExtraColumns::of_sensors(&session.manifest, &session.entries)
     })
 }

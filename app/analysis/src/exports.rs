@@ -87,10 +87,11 @@ pub fn export(
     tell: &mut dyn FnMut(u64, u64),
 ) -> Result<ExportedFile, ExportFailure> {
     let passing = edited_session::stream_edited(session)?;
+    let extra = ExtraColumns::of_sensors(&passing.outline.manifest, &passing.outline.entries);
     let table = TableExport {
         manifest: &passing.outline.manifest,
         notes: &passing.outline.notes,
-        extra: &ExtraColumns::default(),
+        extra: &extra,
         selection,
     };
     let of = passing.outline.samples;
@@ -114,10 +115,11 @@ pub fn sample_table(
     selection: &SampleSelection,
 ) -> Result<SampleTable, ExportFailure> {
     let outline = &session.edited.outline;
+    let extra = ExtraColumns::of_sensors(&outline.manifest, &outline.entries);
     let table = TableExport {
         manifest: &outline.manifest,
         notes: &outline.notes,
-        extra: &ExtraColumns::default(),
+        extra: &extra,
         selection,
     };
     Ok(table.collect(&mut |visit: &mut dyn FnMut(&[_])| session.table_rows(path, visit))?)

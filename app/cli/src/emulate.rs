@@ -13,6 +13,7 @@ use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel}
 use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{EmulatorAddress, ServeError, ServeEvent, ServeOptions, serve};
+use palpate_emulators::sidecar::{EmulatedSidecar, EmulatedSidecarSettings};
 use palpate_emulators::{EmulatedDevice, ScheduledFault};
 use palpate_model::Nanos;
 use std::net::SocketAddr;
@@ -30,6 +31,8 @@ pub enum EmulateCommand {
     Grbl(GrblArgs),
     /// A Mark-10 stand ESM303 with a force gauge on it
     Mark10(Mark10Args),
+    /// A sidecar: a board with stage, load cell, thermometer and trigger line that speaks the sidecar protocol
+    Sidecar(SidecarArgs),
 }
 
 /// The wire to an emulated device.
@@ -109,6 +112,27 @@ pub struct Mark10Args {
     bench: BenchArgs,
 }
 
+/// Arguments of `palpate emulate sidecar`.
+#[derive(Debug, Args)]
+pub struct SidecarArgs {
+    #[command(flatten)]
+    wire: WireArgs,
+    /// Samples a second
+    #[arg(long, value_name = "PER_SECOND", default_value_t = 500, value_parser = clap::value_parser!(u32).range(10..=2000))]
+    samples: u32,
+    /// Lines have no checksum
+    #[arg(long)]
+    no_checksum: bool,
+    /// Samples are lines, never frames
+    #[arg(long)]
+    no_frames: bool,
+    /// Error of its crystal in ppm; positive is fast
+    #[arg(long, value_name = "PPM", default_value_t = 0.0, allow_negative_numbers = true, value_parser = ppm)]
+    clock_ppm: f64,
+    #[command(flatten)]
+    bench: BenchArgs,
+}
+
 const HOME_PINS: [Choice<HomeWiring>; 2] = [
     ("limit", HomeWiring::Limit, "Home switch on the limit pin of the axis"),
     ("probe", HomeWiring::Probe, "Home switch on the probe pin, limit switches on the limit pin"),
@@ -173,6 +197,7 @@ pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failu
         EmulateCommand::Galil(args) => galil(args, output),
         EmulateCommand::Grbl(args) => grbl(args, output),
         EmulateCommand::Mark10(args) => mark10(args, output),
+        EmulateCommand::Sidecar(args) => sidecar(args, output),
     }
 }
 
@@ -239,6 +264,20 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
     let (model, label) = ("ESM303".to_owned(), "ESM303".to_owned());
     let announcement = Announcement { device: "mark10", model, label, cell: None };
     emulate(&mut device, announcement, &args.wire, None, seed, output)
+}
+
+fn sidecar(args: &SidecarArgs, output: &Output) -> Result<(), Failure> {
+    let mut device = EmulatedSidecar::new(EmulatedSidecarSettings {
+        sim: args.bench.settings(),
+        rate: f64::from(args.samples),
+        has_checksum: !args.no_checksum,
+        has_frames: !args.no_frames,
+        clock_ppm: args.clock_ppm,
+        ..EmulatedSidecarSettings::default()
+    });
+    let (model, label) = ("sidecar".to_owned(), "sidecar".to_owned());
+    let announcement = Announcement { device: "sidecar", model, label, cell: None };
+    emulate(&mut device, announcement, &args.wire, None, args.bench.seed, output)
 }
 
 fn emulate(

@@ -54,6 +54,8 @@ mod report;
 mod reproduce;
 mod review;
 mod rig;
+mod rig_conform;
+mod rig_new;
 mod run;
 #[cfg(feature = "haptics")]
 mod scene;

@@ -10,6 +10,7 @@ use palpate_drivers::sim::{
     SimBath, SimCell, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile,
     SimRate, SimRig, SimSettings, SimSoftening, SimStiffness, SimThickness,
 };
+use palpate_drivers::wire::DeviceAddress;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position, Volts};
@@ -298,19 +299,18 @@ fn calibrated(
 /// Opens the rig of a file and locks it against other programs.
 pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, Vec<HolderLock>), Failure> {
     let file = palpate_drivers::read_rig_file(file_name).map_err(Failure::usage)?;
-    // Two programs may be connected to one controller on a network; only one may drive it.
-    let locks = file
-        .places()
-        .iter()
-        .map(|place| {
-            let name = place.to_string();
-            let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
-            rig_lock(&name.chars().map(plain).collect::<String>())
-        })
-        .collect::<Result<Vec<_>, _>>()?;
+    let locks = lock_places(file.places())?;
     let rig = palpate_drivers::open_wired(file_name, &driver_clock())
         .map_err(|err| Failure::Failed(err.to_string()))?;
     Ok((rig, locks))
+}
+
+/// Locks devices against other programs. Two programs may be connected to one controller on a network; only one may drive
+/// it.
+pub(super) fn lock_places(places: &[DeviceAddress]) -> Result<Vec<HolderLock>, Failure> {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+    let names = places.iter().map(|place| place.to_string().chars().map(plain).collect::<String>());
+    names.map(|name| rig_lock(&name)).collect()
 }
 
 /// The end of the travel: the rig's, or one before it.

@@ -1,9 +1,11 @@
-//! `palpate rig`: detects devices, checks a rig against its file, monitors it. Nothing moves.
+//! `palpate rig`: detects devices, checks a rig against its file, monitors it. Only `conform` moves, where it is allowed to.
 
 use super::Failure;
 use super::arguments::parse_number;
 use super::output::Output;
 use super::rig::open_rig_file;
+use super::rig_conform::{self, RigConformArgs};
+use super::rig_new::{self, RigNewArgs};
 use super::terminal::ctrl_c_flag;
 use clap::{Args, Subcommand};
 use palpate_drivers::rig_search::{BAUD, detect_at};
@@ -12,7 +14,7 @@ use palpate_drivers::wire::LinkStats;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_model::rig::{AxisStatus, Reading};
+use palpate_model::rig::{AxisStatus, Reading, SensorValues};
 use palpate_runner::driver_clock;
 use serde::Serialize;
 use std::sync::atomic::Ordering;
@@ -22,7 +24,7 @@ const PRINT_EVERY: Nanos = Nanos::from_millis(500);
 /// Longest wait for the rig, so that Ctrl-C is heeded.
 const WAIT_MAX: Nanos = Nanos::from_millis(20);
 
-/// Inspect wired rigs: detect devices, check a rig against its file, monitor it
+/// Connect wired rigs: detect devices, check a rig against its file, monitor it, make and check a sidecar
 #[derive(Debug, Subcommand)]
 pub enum RigSubcommand {
     /// List serial ports; with --ask, identify the device on each
@@ -31,6 +33,10 @@ pub enum RigSubcommand {
     Check(RigCheckArgs),
     /// Show what the rig of a file reports, until Ctrl-C; nothing moves
     Monitor(RigMonitorArgs),
+    /// Write a folder with a sidecar that works, to begin a rig of your own with
+    New(RigNewArgs),
+    /// Check that a sidecar keeps to its protocol, and what it may be trusted with
+    Conform(RigConformArgs),
 }
 
 /// Arguments of `palpate rig detect`.
@@ -76,6 +82,8 @@ pub(super) fn run(command: &RigSubcommand, output: &Output) -> Result<(), Failur
         RigSubcommand::Detect(args) => detect(args, output),
         RigSubcommand::Check(args) => check(args, output),
         RigSubcommand::Monitor(args) => monitor(args, output),
+        RigSubcommand::New(args) => rig_new::run(args, output),
+        RigSubcommand::Conform(args) => rig_conform::run(args, output),
     }
 }
 
@@ -251,6 +259,7 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
     let (mut whole, mut recent) = (SampleWindow::default(), SampleWindow::default());
     let (mut newest, mut printed_at): (Option<Reading>, Nanos) = (None, Nanos::ZERO);
     let mut faults = Vec::new();
+    let mut sensors = SensorValues::default();
     let end = loop {
         let now = clock();
         if is_ending.load(Ordering::Relaxed) || length.is_some_and(|length| now >= length) {
@@ -270,6 +279,7 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
                 break;
             }
         }
+        rig.take_sensors().iter().for_each(|value| sensors.update(value));
         // The raw bytes are not recorded here.
         drop(rig.take_raw());
         if let Some(fault) = faults.first() {
@@ -278,7 +288,10 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
         let now = clock();
         let since = now.since(printed_at);
         if since >= PRINT_EVERY {
-            output.text_only(|| monitor_line(rig.as_ref(), newest.as_ref(), &recent, since));
+            output.text_only(|| {
+                monitor_line(rig.as_ref(), newest.as_ref(), &recent, since)
+                    + &channel_words(rig.as_ref(), &sensors)
+            });
             whole.add(&recent);
             (recent, printed_at) = (SampleWindow::default(), now);
         }
@@ -298,6 +311,7 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
         "longest_gap_s": whole.longest_gap as f64 * tick,
         "pulses": newest.map(|reading| reading.pulses),
         "position_mm": newest.map(|reading| position_mm(rig.as_ref(), &reading)),
+        "sensors": channels(rig.as_ref(), &sensors).map(|(name, value, _)| (name, value.into())).collect::<serde_json::Map<String, serde_json::Value>>(),
         "links": link_objects(&links),
     });
     output.answer("rig monitor", &object, || {
@@ -312,6 +326,24 @@ fn monitor(args: &RigMonitorArgs, output: &Output) -> Result<(), Failure> {
         lines.join("\n")
     });
     Ok(())
+}
+
+/// The channels of a rig that have a value: name, value and unit.
+fn channels<'a>(
+    rig: &'a dyn Rig,
+    values: &'a SensorValues,
+) -> impl Iterator<Item = (String, f64, &'a str)> {
+    (1..).zip(&rig.description().sensors.channels).filter_map(|(number, channel)| {
+        Some((channel.name.clone(), values.channel(number)?, channel.unit.as_str()))
+    })
+}
+
+fn channel_words(rig: &dyn Rig, values: &SensorValues) -> String {
+    let words = channels(rig, values).map(|(name, value, unit)| match unit {
+        "1" => format!("  {name} {value}"),
+        unit => format!("  {name} {value} {unit}"),
+    });
+    words.collect()
 }
 
 fn position_mm(rig: &dyn Rig, reading: &Reading) -> f64 {

@@ -34,6 +34,7 @@ mod report;
 mod scene;
 mod select;
 mod shared_library;
+mod sidecar;
 mod stored_population;
 mod study;
 mod support;

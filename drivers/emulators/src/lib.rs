@@ -21,6 +21,7 @@ mod pty;
 #[path = "no_pty.rs"]
 mod pty;
 pub mod serve;
+pub mod sidecar;
 mod wire;
 
 pub use faults::{DeviceFault, FaultError, ScheduledFault};

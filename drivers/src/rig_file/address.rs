@@ -3,9 +3,12 @@
 use super::fields::Fields;
 use crate::wire::DeviceAddress;
 
-/// Reads `port`, `baud`, `handshake` and `address`, behind a table's name and a dot or nothing.
+/// Reads `port`, `baud`, `handshake`, `address` and `program`, behind a table's name and a dot or nothing.
 pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<DeviceAddress> {
     let key = |name: &str| format!("{table}{name}");
+    if let Some(words) = fields.texts(&key("program")) {
+        return Some(DeviceAddress::Program { words, folder: fields.folder().to_owned() });
+    }
     let port = fields.text(&key("port"));
     let address = fields.text(&key("address"));
     let baud = fields.whole_number(&key("baud"), 300, 4_000_000);
@@ -36,7 +39,11 @@ pub(super) fn read_address(fields: &mut Fields, table: &str) -> Option<DeviceAdd
             None
         }
         (None, None) => {
-            let what = if table.is_empty() { "controller" } else { "load cell" };
+            let what = match table {
+                "" => "controller",
+                "cell." => "load cell",
+                _ => "sensor",
+            };
             fields.mistake(
                 &key("port"),
                 &format!(

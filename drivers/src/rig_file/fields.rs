@@ -4,7 +4,12 @@
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{MmPerS, MmPerS2, Position};
 use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// Tables within tables: `[sensors.room]` has one.
+const TABLES_MAX: usize = 2;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
@@ -29,6 +34,7 @@ enum Value {
     Text(String),
     Number(f64),
     Flag(bool),
+    Texts(Vec<String>),
     Other,
 }
 
@@ -54,6 +60,8 @@ pub(super) const DIRECTIONS: [(&str, bool); 2] = [("forward", false), ("reverse"
 pub struct Fields {
     all: Vec<Field>,
     mistakes: Vec<Mistake>,
+    /// Folder of the file: paths in it count from there.
+    folder: PathBuf,
 }
 
 fn line_of(text: &str, span: &Range<usize>) -> usize {
@@ -78,16 +86,48 @@ impl Fields {
             is_taken: false,
         };
         let mut all = Vec::new();
-        for (key, value) in document.get_ref().iter() {
-            match value.get_ref() {
-                DeValue::Table(table) => all.extend(table.iter().map(|(inner, value)| {
-                    let name = format!("{}.{}", key.get_ref(), inner.get_ref());
-                    field(name, inner.span(), value.get_ref())
-                })),
-                other => all.push(field(key.get_ref().to_string(), key.span(), other)),
+        let mut tables = vec![(String::new(), document.get_ref(), 0)];
+        while let Some((before, table, depth)) = tables.pop() {
+            for (key, value) in table.iter() {
+                let name = format!("{before}{}", key.get_ref());
+                match value.get_ref() {
+                    // A table within a table that is empty is a key without meaning.
+                    DeValue::Table(inner)
+                        if depth == 0 || depth < TABLES_MAX && !inner.is_empty() =>
+                    {
+                        tables.push((name + ".", inner, depth + 1));
+                    }
+                    other => all.push(field(name, key.span(), other)),
+                }
             }
         }
-        Ok(Self { all, mistakes: Vec::new() })
+        all.sort_by_key(|field| field.line);
+        Ok(Self { all, mistakes: Vec::new(), folder: PathBuf::from(".") })
+    }
+
+    /// The same of a file in a folder.
+    #[must_use]
+    pub(super) fn in_folder(self, folder: PathBuf) -> Self {
+        Self { folder, ..self }
+    }
+
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Names of the tables within a table, in the order of their lines.
+    pub(super) fn tables_in(&self, table: &str) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for field in &self.all {
+            let rest = field.key.strip_prefix(table).and_then(|rest| rest.strip_prefix('.'));
+            let Some((name, _)) = rest.and_then(|rest| rest.split_once('.')) else {
+                continue;
+            };
+            if !names.iter().any(|known| known == name) {
+                names.push(name.to_owned());
+            }
+        }
+        names
     }
 
     /// Adds a mistake at a key, or at the file where the key is missing.
@@ -119,6 +159,15 @@ impl Fields {
     pub fn text(&mut self, key: &str) -> Option<String> {
         self.read_value(key, "give a text in quotes", |value| match value {
             Value::Text(text) if !text.trim().is_empty() => Some(text),
+            _ => None,
+        })
+    }
+
+    /// A list of texts, if it is there.
+    pub(super) fn texts(&mut self, key: &str) -> Option<Vec<String>> {
+        let hint = "give a list of texts, such as [\"python3\", \"my_stage.py\"]";
+        self.read_value(key, hint, |value| match value {
+            Value::Texts(texts) if !texts.is_empty() => Some(texts),
             _ => None,
         })
     }
@@ -194,6 +243,11 @@ impl Fields {
         found.map(|(_, value)| *value)
     }
 
+    /// The mistakes in what was read.
+    pub(super) fn into_mistakes(self) -> Vec<Mistake> {
+        self.mistakes
+    }
+
     /// All mistakes, keys that mean nothing among them, in the order of their lines.
     pub fn finish(mut self) -> Vec<Mistake> {
         for field in self.all.iter().filter(|field| !field.is_taken) {
@@ -216,6 +270,13 @@ fn value_of(value: &DeValue<'_>) -> Value {
         DeValue::Integer(number) => as_number(&number.to_string()),
         DeValue::Float(number) => as_number(&number.to_string()),
         DeValue::Boolean(flag) => Value::Flag(*flag),
+        DeValue::Array(items) => {
+            let text = |item: &Spanned<DeValue<'_>>| match item.get_ref() {
+                DeValue::String(text) => Some(text.to_string()),
+                _ => None,
+            };
+            items.iter().map(text).collect::<Option<_>>().map_or(Value::Other, Value::Texts)
+        }
         _ => Value::Other,
     }
 }

@@ -1,25 +1,30 @@
 //! The description of a rig as a file: what is wired to what, which no device can report.
 //!
 //! Text in, a [`RigFile`] or every mistake with its line out; [`RigFile::open`] then opens the devices. The keys are
-//! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
+//! described in `docs/guide/galil.md`, `grbl.md`, `mark10.md` and `own-rig.md`.
 
 mod address;
 pub mod fields;
 mod galil;
 mod grbl;
 mod mark10;
+mod sidecar;
 
 pub use fields::{Fields, Mistake};
 pub(crate) use galil::galil;
 pub(crate) use grbl::grbl;
 pub(crate) use mark10::{gauge, stand};
+pub(crate) use sidecar::sidecar;
+pub use sidecar::sidecars;
 
 use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, RigDevice};
 use crate::devices::{DEVICES, DeviceRole};
 use crate::rig::Rig;
+use crate::sidecar::{SensorDevice, SensorRig};
 use crate::wire::{DeviceAddress, HostClock};
 use std::fmt;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -50,8 +55,12 @@ impl RigFile {
             );
             return Err(error(vec![Mistake { line: 0, message }]));
         }
-        let mut fields = Fields::read(text).map_err(|mistake| error(vec![mistake]))?;
+        let fields = Fields::read(text).map_err(|mistake| error(vec![mistake]))?;
+        let mut fields = fields.in_folder(folder_of(file));
         let read = read(file, &mut fields);
+        // Both are read, so that the mistakes of both are reported.
+        let sensors = sidecar::read_sensors(&mut fields);
+        let read = read.zip(sensors).map(|(read, sensors)| read.with_sensors(sensors));
         match (read, fields.finish()) {
             (Some(read), mistakes) if mistakes.is_empty() => Ok(read),
             (_, mistakes) => Err(error(mistakes)),
@@ -65,6 +74,20 @@ impl RigFile {
     ) -> Self {
         let open = Box::new(move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
             Ok(Box::new(DeviceRig::open(device.clone(), clock.clone())?))
+        });
+        Self { places, open }
+    }
+
+    /// The same with sensors beside it.
+    fn with_sensors(self, sensors: Vec<SensorDevice>) -> Self {
+        if sensors.is_empty() {
+            return self;
+        }
+        let Self { mut places, open } = self;
+        places.extend(sensors.iter().map(|sensor| sensor.place.clone()));
+        let open = Box::new(move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
+            let rig = open(clock)?;
+            Ok(Box::new(SensorRig::open(rig, sensors.clone(), clock.clone())?))
         });
         Self { places, open }
     }
@@ -106,6 +129,12 @@ fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
     let read = fields.choice("device", &axes.collect::<Vec<_>>(), None)?;
     let name = fields.text("name").unwrap_or_else(|| stem(file));
     read(name, fields)
+}
+
+/// The folder of a file.
+fn folder_of(file: &str) -> PathBuf {
+    let parent = Path::new(file).parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent.unwrap_or(Path::new(".")).to_owned()
 }
 
 /// The file's name without folders and ending.

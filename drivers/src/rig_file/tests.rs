@@ -204,3 +204,45 @@ fn unseen_mm_of_the_file_limits_motion_without_samples() {
     let found = mistakes(&(THESIS.to_owned() + "unseen_mm = 5\n"));
     assert!(found[0].1.contains("unseen_mm: ") && found[0].1.contains("0.02 to 0.5"));
 }
+
+#[test]
+fn a_sidecar_is_a_program_a_port_or_an_address() {
+    let limits = "speed_max_mm_s = 5\n";
+    let read = |text: &str| {
+        RigFile::parse("rigs/stage.toml", &format!("device = \"sidecar\"\n{text}{limits}"))
+    };
+    let words = ["python3", "my_stage.py"].map(str::to_owned).to_vec();
+    let program = read("program = [\"python3\", \"my_stage.py\"]\n").unwrap();
+    let folder = std::path::PathBuf::from("rigs");
+    assert_eq!(program.places(), [DeviceAddress::Program { words, folder }]);
+    assert!(
+        read("port = \"/dev/ttyUSB0\"\n").is_ok() && read("address = \"10.0.0.5:4000\"\n").is_ok()
+    );
+    for wrong in ["", "program = []\n", "program = \"python3\"\n", "program = [\"a\", 1]\n"] {
+        let err = read(wrong).unwrap_err();
+        assert!(err.to_string().contains("p"), "{err}");
+    }
+    let err = RigFile::parse("s.toml", "device = \"sidecar\"\nport = \"a\"\n").unwrap_err();
+    assert!(err.to_string().contains("speed_max_mm_s: this key is missing"), "{err}");
+}
+
+#[test]
+fn sensors_stand_in_tables_of_their_own_beside_any_rig() {
+    let sensors =
+        "[sensors.room]\nprogram = [\"room\"]\n[sensors.camera]\nport = \"/dev/ttyACM9\"\n";
+    let file = RigFile::parse("bench.toml", &format!("{THESIS}{sensors}")).unwrap();
+    let places: Vec<String> = file.places().iter().map(ToString::to_string).collect();
+    assert_eq!(places[1..], ["room in .", "/dev/ttyACM9 at 115200 baud"]);
+    let cell = PARTS.replace("hx711", "sidecar") + sensors;
+    assert_eq!(RigFile::parse("bench.toml", &cell).unwrap().places().len(), 4);
+    for (from, to, line) in [
+        ("program = [\"room\"]", "", 0),
+        ("program", "programme", 0),
+        ("sensors.camera", "sensors.\"a b\"", 0),
+        ("port", "spelling = 1\nport", 0),
+    ] {
+        let text = format!("{THESIS}{}", sensors.replace(from, to));
+        let found = mistakes(&text);
+        assert!(!found.is_empty() && found[0].0 >= line, "{from}: {found:?}");
+    }
+}

@@ -34,6 +34,7 @@ impl Sensors {
         RigSensors {
             digital_inputs: u8::from(settings.input.positive().is_some()),
             has_bath: settings.bath.positive().is_some(),
+            channels: Vec::new(),
         }
     }
 

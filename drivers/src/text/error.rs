@@ -47,7 +47,7 @@ impl DeviceError {
 const QUOTE_MAX: usize = 60;
 
 /// Names a device that answers unexpectedly, or quotes it where it is not recognised.
-pub(super) fn describe_unknown_device(text: &str) -> String {
+pub(crate) fn describe_unknown_device(text: &str) -> String {
     let known = DeviceKind::recognise_lines(&split_lines(text)).map(|(kind, _)| kind.title);
     let known = known.or_else(|| is_prompts(text).then_some(galil::KIND.title));
     known.map_or_else(

@@ -9,4 +9,5 @@ pub use crate::cell::OpenedCell;
 pub use console::TextConsole;
 pub use decimal::FixedDecimal;
 pub use error::DeviceError;
+pub(crate) use error::describe_unknown_device;
 pub use lines::{Lines, ReceivedLine};

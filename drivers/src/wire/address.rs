@@ -6,6 +6,7 @@ use serialport::{FlowControl, SerialPort};
 use std::fmt;
 use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use thiserror::Error;
 
@@ -18,6 +19,8 @@ pub enum DeviceAddress {
     Serial { port: String, baud: u32, has_handshake: bool },
     /// `HOST:PORT`.
     Tcp(String),
+    /// A program of this computer with its arguments, started in a folder.
+    Program { words: Vec<String>, folder: PathBuf },
 }
 
 impl fmt::Display for DeviceAddress {
@@ -25,6 +28,9 @@ impl fmt::Display for DeviceAddress {
         match self {
             Self::Serial { port, baud, .. } => write!(f, "{port} at {baud} baud"),
             Self::Tcp(address) => f.write_str(address),
+            Self::Program { words, folder } => {
+                write!(f, "{} in {}", words.join(" "), folder.display())
+            }
         }
     }
 }
@@ -47,6 +53,10 @@ pub enum WireError {
         "no device answers at {address} ({detail}); check power and address of the device, and that it has a free connection"
     )]
     Unreachable { address: String, detail: String },
+    #[error(
+        "the program {program} cannot be started ({detail}); check its name and its path, which counts from the folder of the rig file"
+    )]
+    Program { program: String, detail: String },
 }
 
 impl DeviceAddress {
@@ -78,8 +88,30 @@ impl DeviceAddress {
                     })?;
                 Ok(Box::new(opened))
             }
+            Self::Program { words, folder } => start_program(words, folder),
         }
     }
+}
+
+#[cfg(unix)]
+fn start_program(words: &[String], folder: &Path) -> Result<Box<dyn Link>, WireError> {
+    let started = super::program::ProgramLink::start(words, folder);
+    let link = started.map_err(|err| WireError::Program {
+        program: words.first().cloned().unwrap_or_default(),
+        detail: err.to_string(),
+    })?;
+    Ok(Box::new(link))
+}
+
+/// Pipes of Windows cannot be waited for with a time limit.
+#[cfg(not(unix))]
+fn start_program(words: &[String], _folder: &Path) -> Result<Box<dyn Link>, WireError> {
+    Err(WireError::Program {
+        program: words.first().cloned().unwrap_or_default(),
+        detail:
+            "programs as devices need Linux or macOS; let it listen at a TCP port and give address"
+                .into(),
+    })
 }
 
 fn port_error(port: &str, err: &serialport::Error) -> WireError {

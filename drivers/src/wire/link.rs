@@ -15,6 +15,17 @@ pub trait Link: Send {
 
     /// Writes all bytes. A device that takes none for [`WRITE_MAX`] is gone.
     fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Tells the device that nothing more will be written, where the link can: the end of a program's input, half of a
+    /// TCP connection. What the device still sends can be read.
+    fn close_input(&mut self) -> io::Result<()> {
+        Err(ErrorKind::Unsupported.into())
+    }
+
+    /// Whether it is a program that was started for this link, and ends with it.
+    fn is_program(&self) -> bool {
+        false
+    }
 }
 
 /// Nothing that palpate writes is as long as what operating systems keep for a device (4 kB), so a write that waits
@@ -88,6 +99,17 @@ impl TcpLink {
 }
 
 impl<S: AsFd> SocketLink<S> {
+    /// Over a socket that does not block.
+    #[cfg(unix)]
+    pub(super) const fn new_nonblocking(stream: S) -> Self {
+        Self(stream)
+    }
+
+    #[cfg(unix)]
+    pub(super) const fn stream(&self) -> &S {
+        &self.0
+    }
+
     /// Waits for one of `flags`. `poll` counts nanoseconds where a socket's own timeout counts the kernel's ticks; on Windows it
     /// counts milliseconds.
     fn wait(&self, flags: PollFlags, wait: Duration) -> io::Result<()> {

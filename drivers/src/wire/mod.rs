@@ -8,6 +8,8 @@ mod dialogue;
 mod halt;
 mod link;
 mod link_thread;
+#[cfg(unix)]
+mod program;
 mod setup_console;
 
 pub use address::{DeviceAddress, WireError};
@@ -16,6 +18,8 @@ pub use dialogue::{AnswerQueue, Dialogue, LinkStats};
 pub use halt::{HaltHandle, run_after_link_stop};
 pub use link::{Link, MemoryLink, SerialLink, SocketLink, TcpLink, memory_link_pair};
 pub use link_thread::LinkThread;
+#[cfg(unix)]
+pub use program::ProgramLink;
 pub use setup_console::SetupConsole;
 
 use palpate_model::Nanos;

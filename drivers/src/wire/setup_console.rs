@@ -43,6 +43,11 @@ impl<'a, P: Default, T> SetupConsole<'a, P, T> {
         }
     }
 
+    /// Goes on with another parser.
+    pub fn set_parser(&mut self, parser: P) {
+        self.parser = parser;
+    }
+
     pub fn now(&self) -> Nanos {
         (self.clock)()
     }

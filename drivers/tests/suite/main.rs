@@ -2,4 +2,5 @@
 #![cfg(test)]
 
 mod messages;
+mod sidecar;
 mod sim;

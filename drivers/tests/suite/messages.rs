@@ -31,6 +31,7 @@ fn messages_of_rigs_and_ports_name_what_is_wrong() {
         WireError::Port { port: port(), detail: detail() } => ["/dev/ttyUSB0", "no such device"],
         WireError::Address { address: address(), detail: detail() } => ["192.0.2.1:23", "no such device"],
         WireError::Unreachable { address: address(), detail: detail() } => ["192.0.2.1:23", "no such device"],
+        WireError::Program { program: "my_stage".into(), detail: detail() } => ["my_stage", "no such device", "folder of the rig file"],
         SerialError::Listing { detail: detail() } => ["no such device"],
         SimSettingError { setting: "profile", value: "perfect".into(), choices: "ideal or lab" } => ["profile", "'perfect'", "ideal or lab"],
     }

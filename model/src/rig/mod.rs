@@ -32,6 +32,8 @@ pub use phase::Phase;
 pub use profile::MotionProfile;
 pub use raw::RawBytes;
 pub use reading::{AxisStatus, Reading, SampleAge};
-pub use sensor::{DIGITAL_INPUTS_MAX, RigSensors, SensorReading, SensorValues};
+pub use sensor::{
+    CHANNELS_MAX, DIGITAL_INPUTS_MAX, RigSensors, SensorChannel, SensorReading, SensorValues,
+};
 pub use signal::SignalFacts;
 pub use thickness::{Thickness, ThicknessError, TouchPosition, thickness};

@@ -28,9 +28,9 @@ pub struct SignalFacts {
 }
 
 impl RigDescription {
-    /// This rig takes one sample a controller tick.
+    /// Samples come a controller tick apart, or further where the rig says so.
     pub fn signal(&self) -> SignalFacts {
-        let rate = 1.0 / self.tick().0;
+        let rate = 1.0 / (self.tick().0 * self.ticks_per_sample.max(1.0));
         let filter = if self.settings.is_empty() {
             "not known: the rig does not state whether a filter is ahead of the converter"
         } else {
@@ -123,6 +123,12 @@ mod tests {
             text.contains("1020 Hz") && text.contains("60 Hz") && text.contains("4.6 Hz"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn a_clock_that_is_finer_than_its_samples_counts_samples() {
+        let fine = RigDescription { ticks_per_sample: 2_000.0, ..rig(1_000) };
+        assert!((fine.signal().sample_rate_hz - 500.0).abs() < 1e-9);
     }
 
     #[test]

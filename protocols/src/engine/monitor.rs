@@ -31,11 +31,15 @@ pub(super) fn judge(cx: &mut Context<'_>, reading: &Reading) {
         }
         let monitor = &cx.state.config.plan.monitors[index];
         let derived = &cx.state.derived;
-        let value = match monitor.source {
+        let value = match &monitor.source {
             MonitorSource::Force => derived.force.map(|force| force.0),
             MonitorSource::Depth => derived.depth.map(|depth| depth.0),
             MonitorSource::Volts => Some(reading.volts.0),
             MonitorSource::Position => cx.state.is_homed.then_some(derived.position.0),
+            MonitorSource::Channel(name) => {
+                let number = cx.state.config.rig.sensors.channel_number(name);
+                number.and_then(|number| cx.state.sensors.channel(number))
+            }
         };
         let Some(value) = value else { continue };
         let condition = &cx.state.monitors[index];

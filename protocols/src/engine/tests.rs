@@ -3,12 +3,15 @@
 mod hold;
 
 use super::*;
-use crate::plans::{Hold, HoldUntil, Jog, LoadTo, Plan, Ramp, SelfTest, Step, Tare};
+use crate::plans::{
+    Hold, HoldUntil, Jog, LoadTo, Monitor, MonitorAction, MonitorSource, Plan, Ramp, SelfTest,
+    Step, Tare, ThresholdSide,
+};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
     Ack, AdcDescription, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
-    SampleAge,
+    RigSensors, SampleAge, SensorChannel, SensorReading,
 };
 use palpate_model::units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use std::sync::Arc;
@@ -439,6 +442,37 @@ fn same_state_and_input_give_the_same_result() {
 }
 
 /// Self-tested and jogging 15 mm at 9 mm/s; the command was sent with the last sample.
+#[test]
+fn a_monitor_watches_a_sensor_by_its_name() {
+    let channel = |name: &str| SensorChannel { name: name.into(), unit: "°C".into() };
+    let channels = vec![channel("bench.temperature"), channel("room.temperature")];
+    let rig = RigDescription { sensors: RigSensors { channels, ..RigSensors::default() }, ..rig() };
+    let mut bench = Bench::holding_on(rig, 10.0, None);
+    let mut config = bench.state().config().clone();
+    config.plan.monitors = vec![Monitor {
+        source: MonitorSource::Channel("room.temperature".into()),
+        side: ThresholdSide::Above,
+        threshold: 25.0,
+        resume: 25.0,
+        settle: Seconds(1.0),
+        action: MonitorAction::Stop,
+        message: "the room is too warm".into(),
+    }];
+    bench.state = Some(EngineState::new(Arc::new(config)));
+    bench.start();
+    while bench.state().phase() != Phase::Hold {
+        bench.sample(volts(0.0));
+    }
+    let value = |number, value| EngineInput::Sensor {
+        value: SensorReading::Channel { number, value, age: Nanos::ZERO },
+    };
+    bench.give(value(1, 99.0));
+    bench.give(value(2, 24.9));
+    assert_eq!(commands(&bench.sample(volts(0.0))), []);
+    bench.give(value(2, 25.0));
+    assert_eq!(commands(&bench.sample(volts(0.0))), [RigCommand::Stop]);
+}
+
 fn jogging() -> Bench {
     let mut bench = Bench::new(vec![
         Step::SelfTest(SelfTest { duration: Seconds(0.1) }),

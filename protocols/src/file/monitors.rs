@@ -7,6 +7,7 @@ use super::quantity::QuantityKind;
 use super::scope::Scope;
 use super::tree::{DocumentNode, DocumentTable, DocumentValue};
 use crate::plans::{Monitor, MonitorAction, MonitorSource, PlanLimits, ThresholdSide};
+use palpate_model::rig::SensorChannel;
 use palpate_model::units::{Newtons, Position, Seconds};
 
 const LIMIT_KEYS: [Key; 2] = [
@@ -65,9 +66,8 @@ pub(super) const MONITOR_KEYS: [Key; 4] = [
     Key::needed(
         "watch",
         QuantityKind::Text,
-        "watched quantity: `force`, `depth`, `signal` or `position`",
-    )
-    .one_of(&["force", "depth", "signal", "position"]),
+        "watched quantity: `force`, `depth`, `signal`, `position`, or `sensor NAME` for a sensor of the rig, whose values are plain numbers in its unit",
+    ),
     Key::usual(
         "settle",
         QuantityKind::Time,
@@ -103,19 +103,46 @@ pub(super) fn read_monitors(
     tables.filter_map(|table| read_monitor(table, scope, problems)).collect()
 }
 
+/// What is watched, and the kind of its values; a sensor's have none.
+fn find_source(watch: &str) -> Result<(MonitorSource, Option<QuantityKind>), String> {
+    if let Some((_, source, kind)) = SOURCES.iter().find(|(name, ..)| *name == watch) {
+        return Ok((source.clone(), Some(*kind)));
+    }
+    let name = watch.strip_prefix("sensor ").map(str::trim);
+    match name.filter(|name| SensorChannel::is_name(name)) {
+        Some(name) => Ok((MonitorSource::Channel(name.to_owned()), None)),
+        None => Err(format!(
+            "'watch' of a monitor cannot be '{watch}'; write force, depth, signal, position, or sensor NAME"
+        )),
+    }
+}
+
+fn plain_number(node: &DocumentNode) -> Result<f64, String> {
+    let text = match &node.value {
+        DocumentValue::Text(text) | DocumentValue::Number(text) => text.trim(),
+        _ => "",
+    };
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "write a plain number in the unit of the sensor, like 21.5".into())
+}
+
 fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
     let other_keys = ["above", "below", "resume"];
     let args = Args::read(table, "a monitor", &[&MONITOR_KEYS], &other_keys, scope, problems);
     let watch = args.text("watch").ok()?;
-    let (_, source, kind) = *SOURCES.iter().find(|(name, ..)| *name == watch)?;
+    let line = table.get("watch").map_or(table.line, |node| node.line);
+    let (source, kind) = problems.take(line, find_source(watch))?;
     let mut value = |key: &str| {
         let node = table.get(key)?;
-        let number = scope.value(node, kind).and_then(|given| {
-            let number = given.number(kind)?;
-            check_range(kind, Range::Any, number)
-                .map_err(|reason| format!("{} is out of range; {reason}", given.text))?;
-            Ok(number)
-        });
+        let number = match kind {
+            None => plain_number(node),
+            Some(kind) => scope.value(node, kind).and_then(|given| {
+                let number = given.number(kind)?;
+                check_range(kind, Range::Any, number)
+                    .map_err(|reason| format!("{} is out of range; {reason}", given.text))?;
+                Ok(number)
+            }),
+        };
         problems.take(node.line, number.map_err(|reason| format!("'{key}' of a monitor: {reason}")))
     };
     let (above, below, resume) = (value("above"), value("below"), value("resume"));
@@ -144,4 +171,25 @@ fn read_monitor(table: &DocumentTable, scope: &Scope, problems: &mut Problems) -
         problems.error(line, reason);
     }
     Some(monitor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_is_watched_by_its_name_and_its_values_are_plain_numbers() {
+        let channel = MonitorSource::Channel("room.temperature".into());
+        assert_eq!(find_source("sensor room.temperature"), Ok((channel, None)));
+        assert_eq!(find_source("force"), Ok((MonitorSource::Force, Some(QuantityKind::Force))));
+        for wrong in ["sensor", "sensor ", "sensor a b", "room.temperature", ""] {
+            assert!(find_source(wrong).is_err(), "{wrong}");
+        }
+        let node = |value| DocumentNode { line: 1, value };
+        assert_eq!(plain_number(&node(DocumentValue::Number("21.5".into()))), Ok(21.5));
+        assert_eq!(plain_number(&node(DocumentValue::Text("-3".into()))), Ok(-3.0));
+        for wrong in ["25 °C", "inf", "$limit"] {
+            assert!(plain_number(&node(DocumentValue::Text(wrong.into()))).is_err(), "{wrong}");
+        }
+    }
 }

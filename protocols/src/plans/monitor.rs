@@ -19,7 +19,7 @@ pub struct Monitor {
     pub message: String,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MonitorSource {
     /// Force above tare, in N.
@@ -30,6 +30,8 @@ pub enum MonitorSource {
     Volts,
     /// Machine position from home, in mm.
     Position,
+    /// A channel of the rig's sensors by its name, in its own unit.
+    Channel(String),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,11 +54,12 @@ pub enum MonitorAction {
 
 impl MonitorSource {
     #[must_use]
-    pub const fn unit(self) -> &'static str {
+    pub const fn unit(&self) -> &'static str {
         match self {
             Self::Force => "N",
             Self::Depth | Self::Position => "mm",
             Self::Volts => "V",
+            Self::Channel(_) => "in the unit of the sensor",
         }
     }
 }

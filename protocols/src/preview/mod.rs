@@ -10,6 +10,7 @@ pub use expected::OutlinePoint;
 pub(crate) use moves::Reach;
 pub(crate) use walk::{CONTACT_EXPECTED_SHARE, DurationEstimate, SETTLE_SECS, Walk};
 
+use crate::plans::MonitorSource;
 use crate::plans::Plan;
 use crate::steps::Preconditions;
 use expected::ExpectedSpecimen;
@@ -112,6 +113,11 @@ fn walk(
         plan.steps.iter().enumerate().map(|(index, planned)| walk.step(index, planned)).collect();
     for monitor in &plan.monitors {
         walk.refusals.extend(monitor.check().err());
+        if let MonitorSource::Channel(name) = &monitor.source
+            && rig.sensors.channel_number(name).is_none()
+        {
+            walk.refuse(format!("rig {} has no sensor called {name}", rig.name));
+        }
     }
     let (mut refusals, mut notes) = (walk.refusals, walk.notes);
     if plan.steps.is_empty() {

@@ -142,7 +142,7 @@ impl StepKind for WaitUntil {
     fn expect(&self, walk: &mut Walk<'_>) -> DurationEstimate {
         walk.check_span(self.timeout);
         walk.refusals.extend(self.condition.check().err());
-        let sensors = walk.rig.sensors;
+        let sensors = &walk.rig.sensors;
         let is_there = match self.condition {
             WaitCondition::DigitalInput { number, .. } => number <= sensors.digital_inputs,
             WaitCondition::Bath { .. } => sensors.has_bath,

@@ -228,15 +228,16 @@ fn extra_columns(
     args: &ExportArgs,
     session: &Session,
 ) -> Result<(Option<String>, ExtraColumns), Failure> {
+    let sensors = ExtraColumns::of_sensors(&session.manifest, &session.entries);
     let Some(name) = &args.compliance else {
-        return Ok((None, ExtraColumns::default()));
+        return Ok((None, sensors));
     };
     let corrections = compliance::corrections(Some(name))?;
     let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
     let saved = corrections.of_rig(rig);
     let saved = saved.map_err(|err| source_failure(err.into()))?;
     let Some((saved, _)) = saved else {
-        return Ok((None, ExtraColumns::default()));
+        return Ok((None, sensors));
     };
     let columns = corrected_depth_columns(session, saved).map_err(source_failure)?;
     Ok((Some(saved.id.clone()), columns))

@@ -5,4 +5,5 @@ mod cells;
 mod galil;
 mod galil_driver;
 mod grbl;
+mod sidecar;
 mod stand;

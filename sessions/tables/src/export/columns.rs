@@ -1,10 +1,13 @@
 //! The columns of tables of samples: names, meanings and values.
 
+use palpate_model::rig::SensorReading;
 use palpate_sessions::manifest::Manifest;
-use palpate_sessions::record::SampleRow;
+use palpate_sessions::record::{EntryKind, LogEntry, SampleRow};
 use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, PrimitiveArray};
 use polars_core::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
 use polars_core::prelude::{Series, StringChunked};
+use serde::Deserialize;
+use std::borrow::Cow;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Field {
@@ -26,6 +29,8 @@ enum Field {
     AgeWithin,
     /// A column of [`ExtraColumns`], by index.
     Extra(usize),
+    /// A sensor of [`ExtraColumns`], by index.
+    Sensor(usize),
     /// Number of the sample in a thinned table.
     EveryNth,
 }
@@ -37,7 +42,7 @@ pub struct ColumnInfo {
     /// With the unit, if any.
     pub name: String,
     /// `1` for a count, empty for text.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     pub kind: &'static str,
     pub meaning: String,
     pub how: &'static str,
@@ -74,8 +79,64 @@ const MORE: [Field; 8] = [
 pub struct ExtraColumns {
     /// Name, unit and one value per sample, `None` where unknown.
     pub columns: Vec<(&'static str, &'static str, Vec<Option<f64>>)>,
+    /// Sensors of the rig beside load cell and axis.
+    pub sensors: Vec<SensorColumn>,
     /// Entries of the file's metadata that explain them.
     pub metadata: Vec<(String, String)>,
+}
+
+/// The values of a sensor, which change now and then.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SensorColumn {
+    pub name: String,
+    pub unit: String,
+    /// Numbers of the first samples with a value, in order, and the value.
+    changes: Vec<(u64, f64)>,
+}
+
+impl SensorColumn {
+    /// The newest value at a sample.
+    fn value(&self, sample: u64) -> Option<f64> {
+        let after = self.changes.partition_point(|(from, _)| *from <= sample);
+        Some(self.changes[after.checked_sub(1)?].1)
+    }
+}
+
+impl ExtraColumns {
+    /// A column for each channel of the rig, from the inputs of the session.
+    #[must_use]
+    pub fn of_sensors(manifest: &Manifest, entries: &[LogEntry]) -> Self {
+        let channels = manifest.rig.iter().flat_map(|rig| &rig.sensors.channels);
+        let mut sensors: Vec<SensorColumn> = channels
+            .map(|channel| SensorColumn {
+                name: match channel.unit.as_str() {
+                    "1" => channel.name.clone(),
+                    unit => format!("{}_{unit}", channel.name),
+                },
+                unit: channel.unit.clone(),
+                changes: Vec::new(),
+            })
+            .collect();
+        if sensors.is_empty() {
+            return Self::default();
+        }
+        for entry in entries.iter().filter(|entry| entry.kind == EntryKind::Input) {
+            let Some(SensorReading::Channel { number, value, .. }) = sensor_reading(entry) else {
+                continue;
+            };
+            let index = usize::from(number).checked_sub(1);
+            if let Some(sensor) = index.and_then(|index| sensors.get_mut(index)) {
+                sensor.changes.push((entry.after_sample, value));
+            }
+        }
+        Self { sensors, ..Self::default() }
+    }
+}
+
+fn sensor_reading(entry: &LogEntry) -> Option<SensorReading> {
+    let body = entry.body.as_object()?;
+    (body.get("input")? == "sensor").then_some(())?;
+    SensorReading::deserialize(body.get("value")?).ok()
 }
 
 impl Field {
@@ -130,16 +191,24 @@ impl Field {
                 "largest error of age_ns in either direction; empty if the link does not measure it",
             ),
             // `Layout::new` describes these.
-            Self::Extra(_) | Self::EveryNth => ("", "", ""),
+            Self::Extra(_) | Self::Sensor(_) | Self::EveryNth => ("", "", ""),
         };
         let (kind, how) = (self.kind(), self.origin());
-        ColumnInfo { field: self, name: name.into(), unit, kind, meaning: meaning.into(), how }
+        ColumnInfo {
+            field: self,
+            name: name.into(),
+            unit: unit.into(),
+            kind,
+            meaning: meaning.into(),
+            how,
+        }
     }
 
     fn kind(self) -> &'static str {
         match self {
             Self::SessionId | Self::Specimen | Self::Phase => "text",
-            Self::Time | Self::Depth | Self::Force | Self::Signal | Self::Extra(_) => "number",
+            Self::Time | Self::Depth | Self::Force | Self::Signal => "number",
+            Self::Extra(_) | Self::Sensor(_) => "number",
             _ => "whole number",
         }
     }
@@ -160,6 +229,7 @@ impl Field {
             Self::Phase | Self::Cycle => "decided by the engine",
             Self::Host => "the computer's monotonic clock",
             Self::Age | Self::AgeWithin => "measured by the driver, sample by sample",
+            Self::Sensor(_) => "measured by a sensor of the rig",
             Self::Extra(_) => "computed at export; the file's metadata describe the method",
         }
     }
@@ -198,7 +268,14 @@ impl<'a> Layout<'a> {
         let mut known: Vec<ColumnInfo> = USUAL.map(Field::describe).into();
         known.extend(extra.columns.iter().enumerate().map(|(number, (name, unit, _))| {
             let (name, meaning) = ((*name).into(), "extra column; empty where unknown".into());
-            ColumnInfo { name, unit, meaning, ..Field::Extra(number).describe() }
+            ColumnInfo { name, unit: (*unit).into(), meaning, ..Field::Extra(number).describe() }
+        }));
+        known.extend(extra.sensors.iter().enumerate().map(|(number, sensor)| ColumnInfo {
+            name: sensor.name.clone(),
+            unit: sensor.unit.clone().into(),
+            meaning:
+                "newest value of the sensor when the sample came; empty before the first".into(),
+            ..Field::Sensor(number).describe()
         }));
         let usual = known.len();
         known.extend(MORE.map(Field::describe));
@@ -279,7 +356,7 @@ impl Cells {
             }
             Field::Cycle | Field::Status => Self::Whole(Vec::with_capacity(room)),
             Field::Phase => Self::Words(MutableBinaryViewArray::with_capacity(room)),
-            Field::Depth | Field::Force | Field::Signal | Field::Extra(_) => {
+            Field::Depth | Field::Force | Field::Signal | Field::Extra(_) | Field::Sensor(_) => {
                 Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
             }
             Field::Pulses | Field::Age | Field::AgeWithin => {
@@ -319,6 +396,10 @@ impl Cells {
                     let of = |number: &u64| *values.get(*number as usize)?;
                     cells.extend(samples.numbers.iter().map(of));
                 }
+                Field::Sensor(one) => {
+                    let sensor = &layout.extra.sensors[one];
+                    cells.extend(samples.numbers.iter().map(|number| sensor.value(*number)));
+                }
                 _ => cells.extend(rows.map(|row| row.volts)),
             },
             Self::MaybeWide(cells) => match field {
@@ -344,5 +425,49 @@ impl Cells {
             Self::MaybeWide(cells) => Series::from_array(name, cells.freeze()),
             Self::MaybeWhole(cells) => Series::from_array(name, cells.freeze()),
         }
+    }
+}
+
+#[cfg(test)]
+mod sensor_tests {
+    use super::*;
+    use palpate_model::Nanos;
+    use palpate_model::rig::{RigDescription, RigSensors, SensorChannel};
+
+    #[test]
+    fn a_sensor_has_its_newest_value_at_each_sample() {
+        let channel =
+            |name: &str, unit: &str| SensorChannel { name: name.into(), unit: unit.into() };
+        let channels = vec![channel("room.temperature", "°C"), channel("camera.frame", "1")];
+        let rig: RigDescription = serde_json::from_value(serde_json::json!({
+            "name": "a", "identity": "a", "settings": {}, "mm_per_pulse": 0.01, "travel": 1.0, "tick_nanos": 1,
+            "speed_quantum": 0.01, "speed_max": 1.0, "acceleration": 1.0, "adc": null, "noise_expected": 0.0,
+        }))
+        .unwrap();
+        let sensors = RigSensors { channels, ..RigSensors::default() };
+        let manifest =
+            Manifest { rig: Some(RigDescription { sensors, ..rig }), ..Manifest::default() };
+        let entry = |after_sample, value: SensorReading| LogEntry {
+            kind: EntryKind::Input,
+            order: 0,
+            after_sample,
+            now: Nanos::ZERO,
+            body: serde_json::json!({ "input": "sensor", "value": value }),
+        };
+        let channel = |number, value| SensorReading::Channel { number, value, age: Nanos(7) };
+        let entries = [
+            entry(2, channel(1, 21.5)),
+            entry(2, SensorReading::Bath { celsius: 37.0 }),
+            entry(4, channel(2, 1.0)),
+            entry(5, channel(1, 21.6)),
+            entry(5, channel(1, 21.7)),
+        ];
+        let columns = ExtraColumns::of_sensors(&manifest, &entries).sensors;
+        assert_eq!([&*columns[0].name, &*columns[1].name], ["room.temperature_°C", "camera.frame"]);
+        let values = |column: &SensorColumn| [0, 1, 2, 4, 5, 9].map(|sample| column.value(sample));
+        let (a, b) = (Some(21.5), Some(21.7));
+        assert_eq!(values(&columns[0]), [None, None, a, a, b, b]);
+        assert_eq!(values(&columns[1]), [None, None, None, Some(1.0), Some(1.0), Some(1.0)]);
+        assert!(ExtraColumns::of_sensors(&Manifest::default(), &entries).sensors.is_empty());
     }
 }

@@ -13,7 +13,7 @@ mod row_group;
 mod select;
 
 pub use atomic::WriteOutcome;
-pub use columns::ExtraColumns;
+pub use columns::{ExtraColumns, SensorColumn};
 pub use dictionary::dictionary_path;
 pub use documents::LogFacts;
 pub(crate) use encode::Encoder;
@@ -156,7 +156,7 @@ impl TableExport<'_> {
 
     fn metadata(&self, layout: &Layout) -> Metadata {
         let units: serde_json::Map<String, serde_json::Value> =
-            layout.columns.iter().map(|one| (one.name.clone(), one.unit.into())).collect();
+            layout.columns.iter().map(|one| (one.name.clone(), one.unit.as_ref().into())).collect();
         let manifest = self.manifest;
         let mut pairs = vec![
             ("columns", serde_json::Value::Object(units).to_string()),

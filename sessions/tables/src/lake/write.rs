@@ -58,8 +58,8 @@ pub fn add_session(
         manifest,
         notes: &outline.notes,
         extra: &ExtraColumns {
-            columns: Vec::new(),
             metadata: vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())],
+            ..ExtraColumns::default()
         },
         selection: &SampleSelection {
             columns: SAMPLE_COLUMNS.map(String::from).into(),

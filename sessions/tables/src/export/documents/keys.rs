@@ -89,7 +89,7 @@ impl SampleKey {
             key["meaning"] = one.meaning.into();
             key["origin"] = one.how.into();
             if !one.unit.is_empty() {
-                key["units"] = one.unit.into();
+                key["units"] = one.unit.as_ref().into();
             }
         }
         if let Some(digits) = self.precision(manifest) {

@@ -1,0 +1,160 @@
+//! Sidecars that die, hang, and lie: the axis stops, and the rig's owner is told.
+
+use super::bench::{Host, Shared, to};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::EmulatedDevice;
+use palpate_emulators::sidecar::{EmulatedSidecarSettings as Emulated, SidecarLie};
+use palpate_model::rig::{Fault, RigCommand};
+
+/// Half a second into a long move at 5 mm/s.
+fn moving() -> Host {
+    let mut host = Host::new();
+    host.tell(RigCommand::EnableMotor);
+    host.tell(to(8_000, 5.0));
+    host.pass(0.5);
+    assert!(host.is_moving());
+    host
+}
+
+/// A silence of 0.2 s, braking over 0.25 mm, and a sample.
+const STOPS_WITHIN_MM: f64 = 5.0 * 0.2 + 0.25 + 0.02;
+
+fn lie(host: &mut Host, lie: SidecarLie) -> f64 {
+    let mut wire = host.wire.lock();
+    wire.emulator.set_lie(Some(lie));
+    wire.emulator.position_mm()
+}
+
+fn stands(host: &Host) -> bool {
+    !host.wire.lock().emulator.is_moving()
+}
+
+#[test]
+fn a_lost_link_stops_the_axis_by_itself() {
+    let mut host = moving();
+    let from = host.position_mm();
+    host.wire.lock().is_cut = true;
+    host.pass(2.0);
+    assert!(host.ending.is_some() && stands(&host));
+    let way = host.position_mm() - from;
+    assert!(way > 1.0 && way < STOPS_WITHIN_MM, "{way}");
+}
+
+#[test]
+fn a_deaf_sidecar_stops_by_itself_and_the_link_is_given_up() {
+    let mut host = moving();
+    host.wire.lock().is_deaf = true;
+    let from = host.position_mm();
+    host.pass(2.0);
+    assert!(stands(&host) && host.position_mm() - from < STOPS_WITHIN_MM);
+    assert!(!host.faults.is_empty());
+    assert!(host.ending.as_ref().is_some_and(|why| why.contains("stop")), "{:?}", host.ending);
+}
+
+#[test]
+fn every_lie_stops_the_axis_and_is_reported() {
+    for one in [
+        SidecarLie::Mute,
+        SidecarLie::Jump(400),
+        SidecarLie::Jump(-40),
+        SidecarLie::ClockBack(50_000),
+        SidecarLie::ClockStuck,
+        SidecarLie::WrongUnits(25),
+        SidecarLie::NotANumber,
+        SidecarLie::Flood(5),
+        SidecarLie::BeyondConverter,
+    ] {
+        let mut host = moving();
+        let from = lie(&mut host, one);
+        host.pass(2.5);
+        assert!(stands(&host), "{one:?}");
+        // Until it is noticed: a quarter of a second without samples, a second of a flood; then it brakes.
+        let far = host.position_mm() - from;
+        let most = if matches!(one, SidecarLie::Flood(_)) { 5.5 } else { 5.0 * 0.3 + 0.3 };
+        assert!(far < most, "{one:?}: {far}");
+        let is_reported = !host.faults.is_empty() || host.ending.is_some();
+        assert!(is_reported, "{one:?}");
+    }
+}
+
+#[test]
+fn a_small_jump_is_left_to_the_path() {
+    let mut host = moving();
+    lie(&mut host, SidecarLie::Jump(30));
+    host.pass(0.1);
+    assert!(!host.path_errors.is_empty());
+}
+
+#[test]
+fn a_motion_that_is_acknowledged_and_not_made_is_reported() {
+    let mut host = Host::new();
+    host.tell(RigCommand::EnableMotor);
+    lie(&mut host, SidecarLie::Lazy);
+    host.tell(to(4_000, 5.0));
+    host.pass(0.5);
+    assert!(host.faults[0].to_string().contains("does not move"), "{:?}", host.faults);
+    assert!(host.sent().contains("stop"));
+}
+
+#[test]
+fn a_restart_loses_the_position_and_refuses_motions() {
+    let mut host = moving();
+    let now = host.now();
+    host.wire.lock().emulator.apply_fault(now, DeviceFault::Reset, true);
+    host.pass(0.3);
+    assert!(stands(&host));
+    assert!(host.faults.contains(&Fault::ControllerReset), "{:?}", host.faults);
+    host.send(to(10, 1.0));
+    host.pass(0.1);
+    assert!(host.faults.last().unwrap().to_string().contains("restarted"), "{:?}", host.faults);
+    assert!(stands(&host));
+    // Samples do not come before it is introduced again: the link is given up.
+    host.pass(2.0);
+    assert!(host.ending.is_some());
+}
+
+#[test]
+fn without_an_owner_who_takes_samples_the_axis_stops() {
+    let mut host = moving();
+    host.is_attended = false;
+    let from = host.position_mm();
+    host.pass(1.5);
+    assert!(stands(&host) && host.position_mm() - from < 5.0 * 0.5 + 0.3);
+    assert_eq!(host.ending, None, "beats go on");
+    assert!(host.faults[0].to_string().contains("no samples were taken"));
+}
+
+#[test]
+fn a_stop_that_is_not_obeyed_is_stopped_by_silence_in_the_end() {
+    let mut host = moving();
+    lie(&mut host, SidecarLie::DeafToStops);
+    host.tell(RigCommand::Stop);
+    // It said yes. The engine sees that it moves on; here the owner gives the link up.
+    host.wire.lock().is_cut = true;
+    host.pass(1.0);
+    assert!(stands(&host));
+}
+
+#[test]
+fn garbled_lines_are_counted_and_noise_stops_the_axis() {
+    let settings = Emulated { has_checksum: true, ..Emulated::default() };
+    let mut host = Host::on(Shared::new(settings));
+    host.tell(RigCommand::EnableMotor);
+    host.tell(to(8_000, 5.0));
+    host.pass(0.3);
+    let mut count = 0_u32;
+    // Every 20 000th byte is changed: a garbled line now and then stops nothing.
+    host.wire.lock().spoil = Box::new(move |byte| {
+        count += 1;
+        vec![if count.is_multiple_of(20_000) { byte ^ 1 } else { byte }]
+    });
+    host.pass(2.0);
+    assert!(host.is_moving());
+    host.assert_clean();
+    // All of them are.
+    host.wire.lock().spoil = Box::new(|byte| vec![if byte == b'}' { b')' } else { byte }]);
+    host.pass(1.5);
+    assert!(stands(&host));
+    assert!(host.faults[0].to_string().contains("mean nothing"), "{:?}", host.faults);
+    assert!(host.ending.is_some());
+}

@@ -1,0 +1,172 @@
+//! The skeletons themselves: written, started and run through the conformance suite, and through a rig.
+//!
+//! Where this computer is too busy for what depends on that, such as the longest answer, the test is skipped: the emulated
+//! sidecar has it in simulated time.
+#![expect(clippy::disallowed_methods, reason = "the skeletons run in real time")]
+
+use palpate_drivers::rig_file::RigFile;
+use palpate_drivers::sidecar::conform::{
+    ConformBench, ConformOptions, ConformReport, Verdict, run,
+};
+use palpate_drivers::sidecar::skeleton::{SkeletonLanguage, skeleton};
+use palpate_drivers::wire::{DeviceAddress, HostClock};
+use palpate_drivers::{Rig, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, MoveTo, RigCommand, SensorReading};
+use palpate_model::units::{MmPerS, MmPerS2};
+use palpate_test_support::skip;
+use palpate_test_support::wait::{in_time, until};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Checks whose verdict does not depend on how busy the computer is.
+const STEADY: [&str; 9] = [
+    "introduction",
+    "start",
+    "lines-garbled",
+    "clock-drift",
+    "nonsense",
+    "unknown-word",
+    "too-fast",
+    "target",
+    "restart",
+];
+
+fn clock() -> HostClock {
+    let start = Instant::now();
+    Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
+}
+
+fn write(folder: &Path, language: SkeletonLanguage) {
+    for file in skeleton("stage", language) {
+        let to = folder.join(&file.path);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::write(to, file.text).unwrap();
+    }
+}
+
+fn conform(place: &DeviceAddress) -> ConformReport {
+    let mut bench = ConformBench {
+        open: &mut || place.open(),
+        clock: clock(),
+        wait: &|time| std::thread::sleep(Duration::from_nanos(time.0)),
+        progress: &mut |_| {},
+    };
+    let watch = Nanos::from_millis(1_500);
+    let options = ConformOptions { range_mm: Some(2.0), watch, ..ConformOptions::default() };
+    run(&mut bench, &options).expect("the link holds")
+}
+
+/// Everything passes, or only what a busy computer makes fail.
+fn check_all(place: &DeviceAddress) {
+    in_time(|| {
+        let report = conform(place);
+        for name in STEADY {
+            let check = report.checks.iter().find(|check| check.name == name);
+            let check = check.unwrap_or_else(|| panic!("no check {name}: {report:#?}"));
+            assert_eq!(check.verdict, Verdict::Pass, "{check:?}");
+        }
+        let failed = report.checks.iter().find(|check| check.verdict == Verdict::Fail);
+        failed.map_or(Ok(()), |check| Err(format!("{check:?}")))?;
+        assert!(report.trust.is_some_and(|trust| trust.speed_max_mm_s > 0.0));
+        Ok(())
+    });
+}
+
+#[test]
+fn the_python_skeleton_keeps_to_the_protocol_and_is_a_rig() {
+    if skip::lacks_program("python3") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    let file = folder.path().join("stage.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let rig_file = RigFile::parse(&file.display().to_string(), &text).unwrap();
+    check_all(&rig_file.places()[0]);
+    drive(&rig_file);
+}
+
+/// Enables the motor, moves and stops, as a runner does.
+fn drive(file: &RigFile) {
+    let time = clock();
+    let mut rig = file.open(&time).unwrap();
+    let about = rig.description().clone();
+    assert_eq!(about.speed_max, MmPerS(1.0), "the file's is less than the sidecar's");
+    assert_eq!(about.sensors.channels[0].name, "temperature");
+    let to = MoveTo { target_pulses: 400, speed: MmPerS(1.0), acceleration: MmPerS2(50.0) };
+    rig.send(RigCommand::EnableMotor);
+    rig.send(RigCommand::MoveTo(to));
+    let (mut acks, mut has_moved, mut sensors, mut faults) = (0, false, Vec::new(), Vec::new());
+    let end = time() + Nanos::from_millis(30_000);
+    let mut is_there = false;
+    while time() < end
+        && !(is_there
+            && sensors.iter().any(|one| matches!(one, SensorReading::Channel { number: 1, .. })))
+    {
+        while let Some(event) = rig.next_event(time() + Nanos::from_millis(5)) {
+            match event.body {
+                RigEventBody::Reading(reading) => {
+                    has_moved |= reading.status.has(AxisStatus::MOVING);
+                    is_there = has_moved
+                        && reading.pulses == 400
+                        && !reading.status.has(AxisStatus::MOVING);
+                }
+                RigEventBody::Ack(_) => acks += 1,
+                RigEventBody::Fault(fault) => faults.push(fault.to_string()),
+            }
+        }
+        sensors.extend(rig.take_sensors());
+    }
+    assert!(is_there && acks == 2 && faults.is_empty(), "{is_there} {acks} {faults:?}");
+    let raw: Vec<u8> = rig.take_raw().into_iter().flat_map(|piece| piece.bytes).collect();
+    let raw = String::from_utf8_lossy(&raw);
+    assert!(raw.contains(r#""do":"hello""#) && raw.contains(r#""do":"move","to":400"#));
+}
+
+/// The sketch on this computer, behind a pseudo-terminal.
+struct EmulatedBoard(std::process::Child);
+
+impl Drop for EmulatedBoard {
+    fn drop(&mut self) {
+        // It ends with its standard input.
+        drop(self.0.stdin.take());
+        self.0.wait().expect("it ends");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn the_arduino_skeleton_keeps_to_the_protocol() {
+    if skip::lacks_program("g++") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Arduino);
+    let host = Path::new(env!("CARGO_MANIFEST_DIR")).join("sidecar/arduino/host");
+    let program = folder.path().join("board");
+    let sketch = format!("-DSKETCH=\"{}\"", folder.path().join("stage.ino").display());
+    let compiled = Command::new("g++")
+        .args(["-std=c++11", "-O1", "-Wall", "-Wextra", "-Wno-unused-function", &sketch, "-I"])
+        .arg(&host)
+        .arg(host.join("main.cpp"))
+        .arg("-o")
+        .arg(&program)
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&compiled.stderr);
+    assert!(compiled.status.success() && errors.is_empty(), "{errors}");
+    let port = folder.path().join("port");
+    let child =
+        Command::new(&program).arg(&port).stdin(Stdio::piped()).stderr(Stdio::null()).spawn();
+    let _board = EmulatedBoard(child.unwrap());
+    until(|| port.exists().then_some(()), || "no port".into());
+    let place = DeviceAddress::Serial {
+        port: port.display().to_string(),
+        baud: 115_200,
+        has_handshake: false,
+    };
+    check_all(&place);
+}
