@@ -10,7 +10,7 @@ use palpate_drivers::sidecar::conform::{
 };
 use palpate_drivers::sidecar::skeleton::{SkeletonLanguage, skeleton};
 use palpate_drivers::wire::{DeviceAddress, HostClock};
-use palpate_drivers::{Rig, RigEventBody};
+use palpate_drivers::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, MoveTo, RigCommand, SensorReading};
 use palpate_model::units::{MmPerS, MmPerS2};

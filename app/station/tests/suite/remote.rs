@@ -127,7 +127,7 @@ fn bodies_that_are_no_request_are_refused() {
         "{",
         "[]",
         "{\"queue\": 3}",
-        "{\"queue\": \"speeds\", \"valuess\": {}}",
+        "{\"queue\": \"speeds\", \"value\": {}}",
         "{\"queue\": \"speeds\", \"values\": {\"speed\": 3}}",
         "{\"queue\": \"speeds\", \"values\": {\"depth\": \"2 mm\"}}",
         "{\"queue\": \"speeds\", \"values\": {\"limits.force_max\": \"900 N\"}}",
