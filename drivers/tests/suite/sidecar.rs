@@ -4,13 +4,13 @@
 //! sidecar has it in simulated time.
 #![expect(clippy::disallowed_methods, reason = "the skeletons run in real time")]
 
+use palpate_drivers::RigEventBody;
 use palpate_drivers::rig_file::RigFile;
 use palpate_drivers::sidecar::conform::{
     ConformBench, ConformOptions, ConformReport, Verdict, run,
 };
 use palpate_drivers::sidecar::skeleton::{SkeletonLanguage, skeleton};
 use palpate_drivers::wire::{DeviceAddress, HostClock};
-use palpate_drivers::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, MoveTo, RigCommand, SensorReading};
 use palpate_model::units::{MmPerS, MmPerS2};

@@ -150,7 +150,8 @@ fn any_plan(random: &mut SplitMix) -> Plan {
                     MonitorSource::Depth,
                     MonitorSource::Volts,
                     MonitorSource::Position,
-                ][random.below(4)],
+                ][random.below(4)]
+                .clone(),
                 side: ThresholdSide::Above,
                 threshold,
                 resume: 0.8 * threshold,
