@@ -100,7 +100,9 @@ fn rig_file(name: &str, place: &str) -> String {
         "# The rig {name}. The sidecar reports its travel, its acceleration and its load cell by itself.\n\
          device = \"sidecar\"\n{place}\n\
          # Largest speed; `palpate rig conform {name}.toml --move 4` measures what the rig may be trusted with.\n\
-         speed_max_mm_s = 1\n"
+         speed_max_mm_s = 1\n\
+         # How far the probe may go while no sample comes, 0.02 to 0.5: shorter pauses of this computer end no run.\n\
+         unseen_mm = 0.1\n"
     )
 }
 
