@@ -19,7 +19,8 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from typing import Any, Dict, List, Optional, Sequence
+from dataclasses import dataclass
+from typing import Any, Awaitable, Callable, Dict, List, Optional, Sequence
 
 from bluesky.protocols import Hints, Reading
 from event_model import DataKey
@@ -36,11 +37,23 @@ POLL_S = 2.0
 TEXTS = ("ending", "session", "values", "fit_error")
 
 
+@dataclass
+class Trial:
+    """One trigger. After a pause, the next may begin before the last has learned its end."""
+
+    #: Until the station has said that the run is over: where it is silent, the rig may still move.
+    may_move: bool = False
+    #: By this device, for the run engine.
+    is_stopped: bool = False
+
+
 class Choice(Device):
     """A parameter that may be chosen, in the unit of the armed queue; it begins at the smallest value. Setting it moves nothing."""
 
-    def __init__(self, rig: "Rig", low: float, high: float, unit: str) -> None:
-        self._rig, self._low, self._high, self._unit = rig, low, high, unit
+    def __init__(self, stop: Callable[[bool], Awaitable[None]], key: DataKey, low: float, high: float, unit: str) -> None:
+        # Not the rig itself: a device that is an attribute counts as a part.
+        self._stop, self._key = stop, key
+        self._low, self._high, self._unit = low, high, unit
         self._value, self._set_at = low, time.time()
         super().__init__()
 
@@ -64,14 +77,14 @@ class Choice(Device):
 
     async def stop(self, success: bool = True) -> None:
         """The run engine stops what a plan has set, which is this and not the rig."""
-        await self._rig.stop(success)
+        await self._stop(success)
 
     async def read(self) -> Dict[str, Reading[float]]:
         return {self.name: {"value": self._value, "timestamp": self._set_at}}
 
     async def describe(self) -> Dict[str, DataKey]:
         limits = {"control": {"low": self._low, "high": self._high}}
-        return {self.name: {**self._rig.key("number", self._unit), "limits": limits}}  # type: ignore[typeddict-item]
+        return {self.name: {**self._key, "limits": limits}}  # type: ignore[typeddict-item]
 
 
 class Rig(Device):
@@ -89,8 +102,7 @@ class Rig(Device):
         self._queue: Optional[Dict[str, Any]] = None
         self._run: Optional[Dict[str, Any]] = None
         self._ended_at = 0.0
-        # Until the station has said that the run is over: where it is silent, the rig may still move.
-        self._may_move = False
+        self._trial = Trial()
         super().__init__(name=name)
 
     async def connect(self, mock: Any = False, timeout: float = DEFAULT_TIMEOUT, force_reconnect: bool = False) -> None:
@@ -103,13 +115,13 @@ class Rig(Device):
         self._queue = armed
         self._choices = []
         for name, (low, high, unit) in armed["choose"].items():
-            choice = Choice(self, low, high, unit)
+            choice = Choice(self.stop, self._key("number", unit), low, high, unit)
             setattr(self, name, choice)
             self._choices.append(choice)
         self.set_name(self.name)
         await super().connect(mock, timeout, force_reconnect)
 
-    def key(self, dtype: str, unit: str = "") -> DataKey:
+    def _key(self, dtype: str, unit: str = "") -> DataKey:
         key: Dict[str, Any] = {"source": f"{self._station.url}/api/v1/remote", "dtype": dtype, "shape": []}
         return {**key, "units": unit} if unit else key  # type: ignore[return-value,typeddict-item]
 
@@ -123,17 +135,22 @@ class Rig(Device):
         if self._queue is None:
             raise StationError("the device is not connected; use init_devices")
         values = {choice.name[len(self.name) + 1:]: choice.text for choice in self._choices}
-        self._run, self._may_move = None, True
+        trial = self._trial = Trial(may_move=True)
+        self._run = None
         try:
             number = await asyncio.to_thread(self._station.ask, values, "Bluesky", self._queue["queue"])
         except StationError as err:
             # What is refused does not move; without an answer it may.
-            self._may_move = err.status is None
+            trial.may_move = err.status is None
+            if trial.is_stopped and err.status is not None:
+                return
             raise
         run: Dict[str, Any] = {"state": "waiting", "fit": None}
         while not is_over(run):
             run = await asyncio.to_thread(self._station.run, number, POLL_S)
-        self._may_move = False
+        trial.may_move = False
+        if trial.is_stopped and run["ending"] in ("stop", None):
+            return
         if run["ending"] != "finish":
             how = f"ended by {run['ending']}" if run["ending"] else f"was {run['state']}"
             raise StationError(f"run {number} {how}: {run['reason']}")
@@ -141,8 +158,10 @@ class Rig(Device):
 
     async def stop(self, success: bool = True) -> None:
         """Stops the rig during a run of this device. Between runs it does nothing, for the run engine calls it at the end of every
-        plan, and a stop takes the arming back."""
-        if self._may_move:
+        plan, and a stop takes the arming back. With `success`, as for a pause, the trigger has not failed: a plan that resumes
+        repeats it."""
+        if self._trial.may_move:
+            self._trial.is_stopped = success
             await asyncio.to_thread(self._station.stop)
 
     @AsyncStatus.wrap
@@ -190,9 +209,9 @@ class Rig(Device):
         keys: Dict[str, DataKey] = {}
         for name in self._parameters:
             for part in ("", "-std_error"):
-                keys[f"{self.name}-{name}{part}"] = self.key("number", units.get(name, ""))
+                keys[f"{self.name}-{name}{part}"] = self._key("number", units.get(name, ""))
         for name in TEXTS:
-            keys[f"{self.name}-{name}"] = self.key("string")
+            keys[f"{self.name}-{name}"] = self._key("string")
         return keys
 
     async def read_configuration(self) -> Dict[str, Reading[Any]]:
@@ -200,4 +219,4 @@ class Rig(Device):
         return {f"{self.name}-{name}": {"value": queue.get(name, ""), "timestamp": self._ended_at} for name in ("queue", "protocol")}
 
     async def describe_configuration(self) -> Dict[str, DataKey]:
-        return {f"{self.name}-{name}": self.key("string") for name in ("queue", "protocol")}
+        return {f"{self.name}-{name}": self._key("string") for name in ("queue", "protocol")}
