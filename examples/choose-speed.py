@@ -87,12 +87,15 @@ def main():
         error = found["std_error"] / abs(found["value"])
         speeds.append(speed)
         figures.append(error * math.sqrt(seconds / 60))
-        print(f"{number:3d}  {speed:10.4g}  {seconds:10.1f}  {found['value']:.4g}  {100 * error:16.3f}  {100 * figures[-1]:16.3f}", flush=True)
+        row = f"{number:3d}  {speed:10.4g}  {seconds:10.1f}  {found['value']:6.4g}  {100 * error:16.3f}  {100 * figures[-1]:16.3f}"
+        print(row, flush=True)
     means = learn(speeds, figures).predict(np.log(speeds)[:, None])
     best = int(np.argmin(means))
     print(f"best speed: {speeds[best]:.4g} {unit}, {100 * math.exp(means[best]):.3f} % after a minute of rig time")
     slowest = speeds.index(min(speeds))
-    print(f"the slowest, {speeds[slowest]:.4g} {unit}, needs {math.exp(2 * (means[slowest] - means[best])):.2g} times as long for the same error")
+    # The error falls with the root of the time.
+    longer = math.exp(2 * (means[slowest] - means[best]))
+    print(f"the slowest, {speeds[slowest]:.4g} {unit}, needs {longer:.2g} times as long for the same error")
 
 
 if __name__ == "__main__":

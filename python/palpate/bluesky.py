@@ -216,7 +216,8 @@ class Rig(Device):
 
     async def read_configuration(self) -> Dict[str, Reading[Any]]:
         queue = self._queue or {}
-        return {f"{self.name}-{name}": {"value": queue.get(name, ""), "timestamp": self._ended_at} for name in ("queue", "protocol")}
+        names = ("queue", "protocol")
+        return {f"{self.name}-{one}": {"value": queue.get(one, ""), "timestamp": self._ended_at} for one in names}
 
     async def describe_configuration(self) -> Dict[str, DataKey]:
         return {f"{self.name}-{name}": self._key("string") for name in ("queue", "protocol")}
