@@ -1,11 +1,17 @@
 """A program asks for runs of an armed queue, sees the fit of each, and learns why something is refused."""
 import http.server
+import pathlib
+import re
+import subprocess
+import sys
 import threading
 import time
 
 import pytest
 from palpate import PalpateError
 from palpate.station import Station, StationError, is_over
+
+EXAMPLE = pathlib.Path(__file__).resolve().parents[2] / "examples/choose-speed.py"
 
 # Longest wait in s for what a loaded computer does in one.
 PATIENCE = 300.0
@@ -110,3 +116,22 @@ def test_no_answer_and_wrong_addresses_are_sentences():
     for url in ("rig.lab.example:7480", "ftp://rig", "http://", "http://rig:many", "http://rig/page"):
         assert "address" in refusal(None, lambda: Station(url)), url
     assert "certificate" in refusal(None, lambda: Station("https://rig", certificate="nowhere.pem"))
+
+
+def test_the_example_chooses_speeds_that_are_allowed(serve):
+    pytest.importorskip("sklearn", reason="scikit-learn is not installed")
+    served = serve("--time-scale", "max")
+    command = [sys.executable, EXAMPLE, "--url", served.url, "--token", served.token, "--runs", "6"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    assert done.returncode == 0, done.stderr
+    runs = Station(served.url, served.token)._request("GET", "remote")["runs"]
+    speeds = [float(run["values"]["speed"].split()[0]) for run in runs]
+    assert len(speeds) == 6 and all(run["ending"] == "finish" for run in runs)
+    assert all(1.0 <= speed <= 8.0 for speed in speeds) and len(set(speeds)) >= 4, speeds
+    best = re.search(r"best speed: ([\d.]+) mm/s", done.stdout)
+    assert best and any(abs(float(best[1]) - speed) < 1e-3 * speed for speed in speeds), done.stdout
+    # The figure that it minimises, from its own table.
+    rows = [list(map(float, line.split())) for line in done.stdout.splitlines()[1:7]]
+    for _, _, seconds, _, error, figure in rows:
+        # Digits of the table.
+        assert abs(figure - error * (seconds / 60) ** 0.5) < 0.002 + 0.002 * figure, rows
