@@ -179,8 +179,15 @@ impl RemoteQueue {
         Ok(())
     }
 
-    /// The plan for chosen values; every value must be allowed, and within its range.
+    /// The plan for chosen values: one for every parameter that may be chosen, within its range. Where one is left out the
+    /// protocol's own would count, which no one at the rig has allowed.
     pub fn plan(&self, chosen: &BTreeMap<String, String>) -> Result<Plan, String> {
+        if let Some(name) = self.allowed.keys().find(|name| !chosen.contains_key(*name)) {
+            return Err(format!(
+                "'{name}' has no value; give one for every parameter that the queue '{}' lets you choose",
+                self.name
+            ));
+        }
         let mut values = self.fixed.clone();
         for (name, text) in chosen {
             let range = self.allowed.get(name).ok_or_else(|| {
@@ -259,7 +266,11 @@ mod tests {
             let refusal = queue.plan(&speeds(speed)).unwrap_err();
             assert!(refusal.contains(words), "{speed}: {refusal}");
         }
-        let refusal = queue.plan(&BTreeMap::from([("depth".into(), "2 mm".into())])).unwrap_err();
+        let refusal = queue.plan(&BTreeMap::new()).unwrap_err();
+        assert!(refusal.contains("'speed' has no value"), "{refusal}");
+        let mut other = speeds("3 mm/s");
+        other.insert("depth".into(), "2 mm".into());
+        let refusal = queue.plan(&other).unwrap_err();
         assert!(refusal.contains("choose among: speed"), "{refusal}");
     }
 

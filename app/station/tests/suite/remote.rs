@@ -128,6 +128,8 @@ fn bodies_that_are_no_request_are_refused() {
         "[]",
         "{\"queue\": 3}",
         "{\"queue\": \"speeds\", \"value\": {}}",
+        "{\"queue\": \"speeds\"}",
+        "{\"queue\": \"speeds\", \"values\": {}}",
         "{\"queue\": \"speeds\", \"values\": {\"speed\": 3}}",
         "{\"queue\": \"speeds\", \"values\": {\"depth\": \"2 mm\"}}",
         "{\"queue\": \"speeds\", \"values\": {\"limits.force_max\": \"900 N\"}}",
