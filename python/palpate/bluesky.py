@@ -192,7 +192,7 @@ class Rig(Device):
             one = found.get(name, {})
             for part, number in (("", one.get("value")), ("-std_error", one.get("std_error"))):
                 values[name + part] = math.nan if number is None else float(number)
-        # Not under the names of the choices, which a plan reads beside this.
+        # As text beside the numbers that the choices have: what was asked for, with its units.
         asked = ", ".join(f"{name} = {text}" for name, text in self._run["values"].items())
         texts = (self._run["ending"], self._run["session"], asked, self._run["fit"].get("error") or "")
         return {**values, **dict(zip(TEXTS, texts))}
@@ -201,6 +201,9 @@ class Rig(Device):
         readings: Dict[str, Reading[Any]] = {}
         for name, value in self._values().items():
             readings[f"{self.name}-{name}"] = {"value": value, "timestamp": self._ended_at}
+        # A plan that reads a device does not read its parts once more.
+        for choice in self._choices:
+            readings.update(await choice.read())
         return readings
 
     async def describe(self) -> Dict[str, DataKey]:
@@ -212,6 +215,8 @@ class Rig(Device):
                 keys[f"{self.name}-{name}{part}"] = self._key("number", units.get(name, ""))
         for name in TEXTS:
             keys[f"{self.name}-{name}"] = self._key("string")
+        for choice in self._choices:
+            keys.update(await choice.describe())
         return keys
 
     async def read_configuration(self) -> Dict[str, Reading[Any]]:

@@ -69,8 +69,8 @@ specimen = "gel 7"
 depth = "6 mm"
 hold = "20 s"
 [choose.speed]
-from = "1 mm/s"
-to = "8 mm/s"
+from = "1.2 mm/s"
+to = "7.8 mm/s"
 """
 
 # Longest wait in s for a process that is ending: ten times what the slowest took on two busy cores.

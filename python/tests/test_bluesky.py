@@ -84,7 +84,7 @@ def test_a_scan_of_speeds_runs_the_rig_and_its_documents_are_valid(engine, serve
     assert all(event["rig-ending"] == "finish" and not event["rig-fit_error"] for event in events)
     assert plan.of("stop")[0]["exit_status"] == "success"
     (descriptor,) = plan.of("descriptor")
-    assert descriptor["data_keys"]["rig-speed"]["limits"] == {"control": {"low": 1.0, "high": 8.0}}
+    assert descriptor["data_keys"]["rig-speed"]["limits"] == {"control": {"low": 1.2, "high": 7.8}}
     assert descriptor["hints"]["rig"] == {"fields": ["rig-mu1", "rig-tau_eps"]}
     assert descriptor["configuration"]["rig"]["data"] == {"rig-queue": "speeds of gel 7", "rig-protocol": "ramp-hold"}
     # The run engine stops at the end what it has set, and that must not take the arming back.
@@ -101,7 +101,6 @@ def test_a_scan_of_speeds_runs_the_rig_and_its_documents_are_valid(engine, serve
         command(*export, home=tmp_path)
         documents = [json.loads(line) for line in written.read_text().splitlines()]
         valid(documents)
-        assert documents[0][1]["palpate"]["session_id"] == event["rig-session"]
         assert documents[0][1]["sample_name"] == "gel 7"
 
 
@@ -109,7 +108,7 @@ def test_what_the_rig_cannot_do_fails_before_it_moves(engine, serve):
     plan = Plan(engine, serve("--time-scale", "max"))
     with pytest.raises(FailedStatus) as outside:
         plan.run(list_scan([plan.rig], plan.rig.speed, [9.0]))
-    assert "1 to 8 mm/s is armed" in str(outside.value.__cause__)
+    assert "1.2 to 7.8 mm/s is armed" in str(outside.value.__cause__)
     with pytest.raises(FailedStatus) as between:
         plan.run(list_scan([plan.rig], plan.rig.speed, [3.01]))
     assert "multiples of" in str(between.value.__cause__)
@@ -135,7 +134,7 @@ def test_a_pause_stops_the_rig_and_the_plan_resumes_once_the_queue_is_armed_agai
         plan.run(list_scan([plan.rig], plan.rig.speed, [6.0]))
     thread.join()
     assert plan.ended() == "stop" and plan.station.armed() is None
-    assert plan.station.run(1, 20)["reason"].startswith("stop over the network by 'search'")
+    assert plan.station.run(1, 20)["reason"] == "the operator stopped the run"
     served.type(f"arm {served.queue} 60")
     end = time.monotonic() + PATIENCE
     while plan.station.armed() is None:
