@@ -22,17 +22,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Checks whose verdict does not depend on how busy the computer is.
-const STEADY: [&str; 9] = [
-    "introduction",
-    "start",
-    "lines-garbled",
-    "clock-drift",
-    "nonsense",
-    "unknown-word",
-    "too-fast",
-    "target",
-    "restart",
-];
+const STEADY: [&str; 4] = ["introduction", "nonsense", "unknown-word", "too-fast"];
 
 fn clock() -> HostClock {
     let start = Instant::now();
@@ -86,11 +76,11 @@ fn the_python_skeleton_keeps_to_the_protocol_and_is_a_rig() {
     let text = std::fs::read_to_string(&file).unwrap();
     let rig_file = RigFile::parse(&file.display().to_string(), &text).unwrap();
     check_all(&rig_file.places()[0]);
-    drive(&rig_file);
+    in_time(|| drive(&rig_file));
 }
 
-/// Enables the motor, moves and stops, as a runner does.
-fn drive(file: &RigFile) {
+/// Enables the motor, moves and stops, as a runner does. A sidecar that gets no turn is a fault, as it must be.
+fn drive(file: &RigFile) -> Result<(), String> {
     let time = clock();
     let mut rig = file.open(&time).unwrap();
     let about = rig.description().clone();
@@ -120,10 +110,14 @@ fn drive(file: &RigFile) {
         }
         sensors.extend(rig.take_sensors());
     }
-    assert!(is_there && acks == 2 && faults.is_empty(), "{is_there} {acks} {faults:?}");
+    if !faults.is_empty() {
+        return Err(faults.join(", "));
+    }
+    assert!(is_there && acks == 2, "{is_there} {acks}");
     let raw: Vec<u8> = rig.take_raw().into_iter().flat_map(|piece| piece.bytes).collect();
     let raw = String::from_utf8_lossy(&raw);
     assert!(raw.contains(r#""do":"hello""#) && raw.contains(r#""do":"move","to":400"#));
+    Ok(())
 }
 
 /// The sketch on this computer, behind a pseudo-terminal.
