@@ -1,7 +1,7 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
-use palpate_sessions::{SampleRow, Session};
+use palpate_sessions::{RECORD_VERSION, SampleRow, Session};
 use palpate_tables::export::{
     ExtraColumns, SampleSelection, TableExport, TableFormat, dictionary_path,
 };
@@ -139,7 +139,7 @@ fn parquet_holds_the_same_with_units() {
     assert_eq!(units, expected);
     assert_eq!(value("palpate.session"), session.manifest.session_id);
     assert_eq!(value("palpate.software"), "0.1.0");
-    assert_eq!(value("palpate.record_version"), "2");
+    assert_eq!(value("palpate.record_version"), RECORD_VERSION.to_string());
     assert_eq!(value("palpate.table_version"), "1");
     assert_eq!(value("palpate.calibration_sha256"), value_of_hash(&session));
 

@@ -6,8 +6,8 @@ use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 use palpate_sessions::health::HealthContent;
 use palpate_sessions::{
-    FolderSegments, HealthMessage, LogError, LogPart, LogWriter, MachineState, ReadError,
-    RecordingPace, Session, SessionFolder, SessionWriter,
+    FolderSegments, HealthMessage, LogError, LogPart, LogWriter, MachineState, RECORD_VERSION,
+    ReadError, RecordingPace, Session, SessionFolder, SessionWriter,
 };
 
 #[test]
@@ -91,7 +91,7 @@ fn a_log_without_an_end_opens_with_a_note() {
 #[test]
 fn a_newer_session_is_refused_with_both_versions() {
     let mut newer = manifest();
-    newer.record_version = 3;
+    newer.record_version = RECORD_VERSION + 1;
     newer.software_version = "3.1.4".into();
     let sink = MemorySink::default();
     let mut log = LogWriter::begin(sink.clone(), "memory", &newer).unwrap();
@@ -102,7 +102,7 @@ fn a_newer_session_is_refused_with_both_versions() {
     let ReadError::Newer { software_version, record_version, .. } = refusal else {
         panic!("{refusal:?}");
     };
-    assert_eq!((software_version.as_str(), record_version), ("3.1.4", 3));
+    assert_eq!((software_version.as_str(), record_version), ("3.1.4", RECORD_VERSION + 1));
 }
 
 #[test]
