@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 30] = [
+const PROPER_NAMES: [&str; 32] = [
     // Programs, libraries, repositories and formats.
     "AppImage",
     "CarbonFiberData",
@@ -30,6 +30,8 @@ const PROPER_NAMES: [&str; 30] = [
     "SarahIaquinta",
     "SplitMix64",
     "StephenQiu628",
+    "WebSocket",
+    "WireGuard",
     "WorkflowHub",
     // Authors.
     "McCulloch",

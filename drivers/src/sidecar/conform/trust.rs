@@ -71,10 +71,10 @@ pub(super) fn of(
 }
 
 impl SpeedTrust {
-    /// No speed at all where the axis is unsafe.
+    /// No speed at all where the axis must not move.
     #[must_use]
-    pub(super) fn unless(self, is_unsafe: bool) -> Self {
-        if !is_unsafe {
+    pub(super) fn unless(self, is_forbidden: bool) -> Self {
+        if !is_forbidden {
             return self;
         }
         Self { speed_max_mm_s: 0.0, lost_link_mm: 0.0, ..self }

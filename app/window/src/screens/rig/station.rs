@@ -2,7 +2,8 @@
 
 use crate::command::{Commands, UiCommand};
 use crate::widgets::{
-    NamedControl, QuantityField, alarm_ui, placeholder_ui, quantity_ui, reason_button, require,
+    NamedControl, QuantityField, alarm_ui, form_label, placeholder_ui, quantity_ui, reason_button,
+    require,
 };
 use crate::workbench::Workbench;
 use crate::workers::PathPurpose;
@@ -66,8 +67,9 @@ impl StationForm {
             return;
         }
         ui.horizontal(|ui| {
-            ui.label("remote queue");
-            ui.add(TextEdit::singleline(&mut self.file).desired_width(260.0)).named("remote queue");
+            let label = form_label(ui, "remote queue");
+            let field = ui.add(TextEdit::singleline(&mut self.file).desired_width(260.0));
+            field.labelled_by(label.id).named("remote queue");
             if ui.add(Button::new("Choose...")).clicked() {
                 commands.push(UiCommand::Choose(PathPurpose::RemoteQueue));
             }
