@@ -102,7 +102,10 @@ fn a_newer_session_is_refused_with_both_versions() {
     let ReadError::Newer { software_version, record_version, .. } = refusal else {
         panic!("{refusal:?}");
     };
-    assert_eq!((software_version.as_str(), record_version), ("3.1.4", RECORD_VERSION + 1));
+    assert_eq!(
+        (software_version.as_str(), record_version),
+        ("3.1.4", u64::from(RECORD_VERSION) + 1)
+    );
 }
 
 #[test]
