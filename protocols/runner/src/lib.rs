@@ -11,6 +11,7 @@ mod board;
 mod clock;
 pub mod demonstration;
 pub mod fidelity;
+mod handle;
 #[cfg(feature = "haptics")]
 pub mod haptics;
 mod leading;
@@ -31,9 +32,10 @@ mod watch;
 use active_run::to_json;
 use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
+pub use handle::RunnerHandle;
 pub use leading::{LeadSource, SharedLeadSource, SlaveSample};
 use live_feed::LiveFeed;
-pub use main_loop::{Runner, RunnerHandle, RunnerRequest};
+pub use main_loop::{Runner, RunnerRequest};
 pub use snapshot::{
     ContactTrigger, Lateness, LogLine, PlannedWeight, PromptView, RigView, RunView, RunnerSnapshot,
 };

@@ -7,6 +7,7 @@
 
 use super::active_run::{ActiveRun, RigAction};
 use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
+use super::handle::{RunnerHandle, send};
 use super::panic_stop::RigRegistration;
 use super::run_log::FaultLog;
 use super::snapshot::{RigView, RunnerSnapshot};
@@ -67,37 +68,6 @@ pub struct Runner {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Snapshots of a runner and requests to it for another thread. It keeps no runner alive.
-#[derive(Clone)]
-pub struct RunnerHandle {
-    requests: SyncSender<RunnerRequest>,
-    snapshot: Arc<ArcSwap<RunnerSnapshot>>,
-    life: Weak<()>,
-}
-
-impl RunnerHandle {
-    /// The newest snapshot; the last one once the runner has ended.
-    pub fn snapshot(&self) -> Arc<RunnerSnapshot> {
-        self.snapshot.load_full()
-    }
-
-    pub fn is_alive(&self) -> bool {
-        self.life.strong_count() > 0
-    }
-
-    /// Asks for something. Fails only when the runner has ended or is swamped.
-    pub fn request(&self, request: RunnerRequest) -> Result<(), String> {
-        send(&self.requests, request)
-    }
-}
-
-fn send(requests: &SyncSender<RunnerRequest>, request: RunnerRequest) -> Result<(), String> {
-    requests.try_send(request).map_err(|_| {
-        "the thread that controls the rig does not answer; close palpate and check the rig"
-            .to_string()
-    })
-}
-
 impl Runner {
     /// Takes a rig and starts the runner's thread. `wake` is called after each snapshot.
     ///
@@ -136,11 +106,8 @@ impl Runner {
 
     /// For a thread that watches, and may ask for a stop.
     pub fn handle(&self) -> RunnerHandle {
-        RunnerHandle {
-            requests: self.requests.clone(),
-            snapshot: Arc::clone(&self.snapshot),
-            life: self.life.clone(),
-        }
+        let (requests, snapshot) = (self.requests.clone(), Arc::clone(&self.snapshot));
+        RunnerHandle { requests, snapshot, life: self.life.clone() }
     }
 
     /// Passes on the operator's choice.
