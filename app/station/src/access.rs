@@ -16,7 +16,7 @@ use std::time::Duration;
 /// Requests of an address: a page asks for some ten when it opens.
 const REQUESTS: Rate = Rate { burst: 200.0, per_second: 50.0 };
 
-/// Wrong tokens of an address. Nobody guesses one anyway; this keeps the log short.
+/// Wrong tokens of an address. No one guesses one anyway; this keeps the log short.
 const WRONG_TOKENS: Rate = Rate { burst: 10.0, per_second: 0.2 };
 
 /// Stops of an address that are passed on. The first is enough; the rig's queue of requests must stay free for the
@@ -95,7 +95,7 @@ impl Access {
         }
     }
 
-    /// The tokens, at most a second old. A file that cannot be read lets nobody in.
+    /// The tokens, at most a second old. A file that cannot be read lets no one in.
     fn tokens(&self, now: Duration) -> Arc<Tokens> {
         let mut known = self.tokens.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((at, tokens)) = &*known

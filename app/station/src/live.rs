@@ -108,9 +108,9 @@ pub(crate) struct LiveQuery {
 }
 
 /// Counts a watcher for as long as it lives.
-struct Place(Arc<Shared>);
+struct WatcherPlace(Arc<Shared>);
 
-impl Place {
+impl WatcherPlace {
     fn take(shared: &Arc<Shared>) -> Result<Self, Problem> {
         let taken = shared.watchers.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |count| {
             (count < WATCHERS_MAX).then_some(count + 1)
@@ -125,7 +125,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for WatcherPlace {
     fn drop(&mut self) {
         self.0.watchers.fetch_sub(1, Ordering::Relaxed);
     }
@@ -144,7 +144,7 @@ pub(crate) async fn live(
         return Err(Problem::wrong(format!("per_second is from 1 to {PER_SECOND_MAX}")));
     }
     let upgrade = upgrade.map_err(|err| Problem::wrong(err.body_text()))?;
-    let place = Place::take(&shared)?;
+    let place = WatcherPlace::take(&shared)?;
     let upgrade = upgrade
         .protocols([PROTOCOL])
         .read_buffer_size(4096)

@@ -46,7 +46,7 @@ const BEST_EFFORT: &str =
     "a stop over a network is best effort; the emergency stop at the rig is the one to rely on";
 
 type Answer = Result<Json<Value>, Problem>;
-type Asked<T> = Result<Query<T>, QueryRejection>;
+type ReadQuery<T> = Result<Query<T>, QueryRejection>;
 
 pub(crate) fn router(shared: Arc<Shared>) -> Router {
     let api = Router::new()
@@ -149,14 +149,14 @@ struct EventsQuery {
 async fn event_lines(
     State(shared): State<Arc<Shared>>,
     Extension(caller): Extension<Caller>,
-    query: Asked<EventsQuery>,
+    query: ReadQuery<EventsQuery>,
 ) -> Answer {
     caller.require(Scope::Watch)?;
-    let limit = asked(query)?.limit.unwrap_or(RunView::EVENTS_MAX).min(RunView::EVENTS_MAX);
+    let limit = read_query(query)?.limit.unwrap_or(RunView::EVENTS_MAX).min(RunView::EVENTS_MAX);
     object(&json!({ "events": events(&shared.runner.snapshot(), limit) }))
 }
 
-fn asked<T>(query: Asked<T>) -> Result<T, Problem> {
+fn read_query<T>(query: ReadQuery<T>) -> Result<T, Problem> {
     query.map(|Query(query)| query).map_err(|err| Problem::wrong(err.body_text()))
 }
 
@@ -187,10 +187,10 @@ fn listed(entry: &CatalogEntry) -> Value {
 async fn sessions(
     State(shared): State<Arc<Shared>>,
     Extension(caller): Extension<Caller>,
-    query: Asked<SessionsQuery>,
+    query: ReadQuery<SessionsQuery>,
 ) -> Answer {
     caller.require(Scope::Watch)?;
-    let query = asked(query)?;
+    let query = read_query(query)?;
     let limit = query.limit.unwrap_or(SESSIONS_USUAL);
     if !(1..=SESSIONS_MAX).contains(&limit) {
         return Err(Problem::wrong(format!("limit is from 1 to {SESSIONS_MAX}")));
@@ -316,11 +316,11 @@ async fn remote_run(
     State(shared): State<Arc<Shared>>,
     Extension(caller): Extension<Caller>,
     id: Result<Path<u64>, PathRejection>,
-    query: Asked<WaitQuery>,
+    query: ReadQuery<WaitQuery>,
 ) -> Answer {
     caller.require(Scope::Watch)?;
     let id = number(id)?;
-    let wait = asked(query)?.wait_s.unwrap_or(0.0);
+    let wait = read_query(query)?.wait_s.unwrap_or(0.0);
     if !(0.0..=WAIT_MAX_S).contains(&wait) {
         return Err(Problem::wrong(format!("wait_s is from 0 to {WAIT_MAX_S}")));
     }

@@ -12,7 +12,7 @@ use thiserror::Error;
 /// A file of more is not one of ours: a laboratory has some tens of tokens.
 const BYTES_MAX: u64 = 256 * 1024;
 
-/// Bytes of a token: nobody guesses 256 bits.
+/// Bytes of a token: no one guesses 256 bits.
 const SECRET_BYTES: usize = 32;
 
 /// What a token allows.

@@ -60,7 +60,7 @@ fn a_program_asks_and_gets_the_fit() {
     assert_eq!(refusal.status, 409);
     assert!(refusal.error().contains("a person at the rig must arm one"));
     arm(&lab, QUEUE);
-    // Without a token nobody starts anything, not even on this computer.
+    // Without a token no one starts anything, not even on this computer.
     assert_eq!(ask(&lab, "X-Nothing: 1", "3 mm/s").status, 403);
     // The last is between two speeds of the motor.
     for wrong in ["9 mm/s", "0 mm/s", "fast", "3.01 mm/s"] {

@@ -1,4 +1,4 @@
-//! Sidecars that die, hang, and lie: the axis stops, and the rig's owner is told.
+//! Sidecars that die, hang, and lie: the axis stops, and the owner of the rig gets a fault.
 
 use super::bench::{Host, Shared, to};
 use palpate_emulators::DeviceFault;
