@@ -110,6 +110,8 @@ pub enum RemoteRefusal {
     Unknown(u64),
     #[error("run {0} does not wait any more, so it cannot be withdrawn; stop the rig to end it")]
     NotWaiting(u64),
+    #[error("{queue}: {values} cannot be run: {reason}; change the file of the queue")]
+    Corner { queue: String, values: String, reason: String },
     #[error("an arming lasts from a minute to 24 hours; give a time in between")]
     Time,
 }
@@ -147,15 +149,24 @@ pub struct ArmedState {
 }
 
 impl RemoteDesk {
-    /// Arms a queue, in place of any other.
-    pub fn arm(
+    /// Arms a queue, in place of any other; `check` says whether the rig can run a plan, and every combination of the ends of its
+    /// ranges must be one: at the rig is someone who can mend it.
+    pub(crate) fn arm(
         &mut self,
         queue: RemoteQueue,
         now: SystemTime,
         time: Duration,
+        check: impl Fn(&Plan) -> Result<(), String>,
     ) -> Result<(), RemoteRefusal> {
         if !(Duration::from_mins(1)..=ARMED_MAX).contains(&time) {
             return Err(RemoteRefusal::Time);
+        }
+        for (values, plan) in queue.corner_plans() {
+            plan.and_then(|plan| check(&plan)).map_err(|reason| RemoteRefusal::Corner {
+                queue: queue.name.clone(),
+                values: if values.is_empty() { "its protocol".into() } else { values },
+                reason,
+            })?;
         }
         self.disarm("another queue was armed");
         self.disarmed = None;

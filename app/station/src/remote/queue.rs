@@ -21,6 +21,9 @@ const BYTES_MAX: u64 = 64 * 1024;
 /// Runs of one arming. Whoever wants more arms again, and looks at the specimen before.
 const RUNS_MAX: u32 = 1000;
 
+/// Parameters that may be chosen: a plan is made for every combination of their ends.
+const CHOSEN_MAX: usize = 6;
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -73,7 +76,7 @@ pub struct RemoteQueue {
 }
 
 impl RemoteQueue {
-    /// Reads a file and checks that both ends of every range make a plan.
+    /// Reads a file and checks that every combination of the ends of its ranges makes a plan.
     pub fn read(file: &Path, library: Option<&Path>) -> Result<Self, RemoteQueueError> {
         let error = |reason: String| RemoteQueueError { file: file.display().to_string(), reason };
         let size = file
@@ -146,11 +149,30 @@ impl RemoteQueue {
         for (name, range) in document.choose {
             queue.allow(&name, range)?;
         }
-        for end in 0..2 {
-            let chosen = queue.ends.iter().map(|(name, ends)| (name.clone(), ends[end].clone()));
-            queue.plan(&chosen.collect())?;
+        if queue.allowed.len() > CHOSEN_MAX {
+            return Err(format!("choose: let at most {CHOSEN_MAX} parameters be chosen"));
+        }
+        for chosen in queue.corners() {
+            queue.plan(&chosen)?;
         }
         Ok(queue)
+    }
+
+    /// The plan of every combination of ends of the ranges, with the values that were chosen for it.
+    pub fn corner_plans(&self) -> impl Iterator<Item = (String, Result<Plan, String>)> {
+        self.corners().map(|chosen| {
+            let values: Vec<String> =
+                chosen.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+            (values.join(", "), self.plan(&chosen))
+        })
+    }
+
+    fn corners(&self) -> impl Iterator<Item = BTreeMap<String, String>> {
+        (0..1_usize << self.ends.len()).map(|corner| {
+            let ends = self.ends.iter().enumerate();
+            ends.map(|(index, (name, ends))| (name.clone(), ends[corner >> index & 1].clone()))
+                .collect()
+        })
     }
 
     fn allow(&mut self, name: &str, range: RangeDocument) -> Result<(), String> {

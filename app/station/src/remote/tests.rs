@@ -11,7 +11,7 @@ fn desk(runs: u32) -> (RemoteDesk, SystemTime) {
     std::fs::write(&file, text).unwrap();
     let queue = RemoteQueue::read(&file, None).unwrap();
     let (mut desk, now) = (RemoteDesk::default(), wall_now());
-    desk.arm(queue, now, Duration::from_mins(10)).unwrap();
+    desk.arm(queue, now, Duration::from_mins(10), any).unwrap();
     (desk, now)
 }
 
@@ -46,6 +46,24 @@ fn nothing_runs_that_is_not_armed() {
     assert!(desk.armed().is_none());
     let refusal = desk.ask(request("2 mm/s"), "a", later, any).unwrap_err();
     assert!(refusal.to_string().contains("its time is over"), "{refusal}");
+}
+
+#[test]
+fn a_range_with_an_end_that_the_rig_cannot_run_is_not_armed() {
+    let (mut desk, now) = desk(3);
+    let queue = Arc::clone(&desk.arming.as_ref().unwrap().queue);
+    for end in ["1 mm/s", "8 mm/s"] {
+        let check = |plan: &Plan| match plan.source.as_ref().unwrap().values["speed"] == end {
+            true => Err("the motor cannot do this speed".to_owned()),
+            false => Ok(()),
+        };
+        let time = Duration::from_mins(10);
+        let refusal = desk.arm(RemoteQueue::clone(&queue), now, time, check).unwrap_err();
+        let words = format!("speed = {end} cannot be run: the motor cannot do this speed");
+        assert!(refusal.to_string().contains(&words), "{refusal}");
+        // What was armed before stays.
+        assert!(desk.armed().is_some());
+    }
 }
 
 #[test]
