@@ -109,7 +109,7 @@ impl BoundStation {
         let desk = Arc::new(Mutex::new(RemoteDesk::default()));
         let bench = Arc::new(Mutex::new(bench));
         let shared = Shared::new(&settings, runner.clone(), Arc::clone(&desk), Arc::clone(&bench));
-        let shared = Arc::new(shared);
+        let shared = Arc::new(shared.map_err(StationError::Thread)?);
         let starter = Starter::new(Arc::clone(&desk), runner.clone());
         let (end, ended) = oneshot::channel();
         let is_tls = tls.is_some();
@@ -177,7 +177,8 @@ impl Station {
             Some(bench) => bench.check(plan, rig),
             None => Err("the rig has no calibration yet".into()),
         };
-        lock(&self.desk).arm(queue, wall_now(), time, check)
+        queue.check(check)?;
+        lock(&self.desk).arm(queue, wall_now(), time)
     }
 
     /// Takes another calibration and other limits for runs over the network.

@@ -211,11 +211,13 @@ pub struct LogLine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_drivers::Rig;
+    use palpate_drivers::sim::{SimRig, SimSettings};
     use palpate_model::rig::{SensorChannel, SensorReading};
 
     #[test]
     fn what_sensors_reported_last_has_names_and_units() {
-        let mut about = palpate_drivers::sim::SimRig::new(Default::default()).description().clone();
+        let mut about = SimRig::new(SimSettings::default()).description().clone();
         let channel =
             |name: &str, unit: &str| SensorChannel { name: name.into(), unit: unit.into() };
         about.sensors.digital_inputs = 2;

@@ -101,10 +101,14 @@ fn obey(line: &str, station: &Station, runner: &Runner, library: &Path, output: 
     let mut words = line.split_whitespace();
     match (words.next(), words.next(), words.next(), words.next()) {
         (Some("stop"), None, ..) => {
-            if let Err(reason) = runner.request(RunnerRequest::Operator(Operator::Stop)) {
+            let stop = || runner.request(RunnerRequest::Operator(Operator::Stop));
+            let mut passed = stop();
+            if desk().disarm_for_stop("a person at the rig stopped it") {
+                passed = stop();
+            }
+            if let Err(reason) = passed {
                 output.note(&reason);
             }
-            desk().disarm("a person at the rig stopped it");
         }
         (Some("disarm"), None, ..) => desk().disarm("a person at the rig took it back"),
         (Some("arm"), Some(file), Some(minutes), None) => {

@@ -1,6 +1,7 @@
 //! What may be asked from outside: a remote queue, a file written by a person at the rig. It names one protocol and says
 //! which of its parameters may be chosen, and between which values.
 
+use super::RemoteRefusal;
 use palpate_analysis::protocol_sources::find_protocol;
 use palpate_model::metadata::{SessionLabels, SessionMetadata};
 use palpate_protocols::file::{
@@ -158,13 +159,21 @@ impl RemoteQueue {
         Ok(queue)
     }
 
-    /// The plan of every combination of ends of the ranges, with the values that were chosen for it.
-    pub fn corner_plans(&self) -> impl Iterator<Item = (String, Result<Plan, String>)> {
-        self.corners().map(|chosen| {
-            let values: Vec<String> =
-                chosen.iter().map(|(name, value)| format!("{name} = {value}")).collect();
-            (values.join(", "), self.plan(&chosen))
-        })
+    /// Whether the rig can run every combination of the ends of the ranges: at the rig is someone who can mend the file.
+    pub(crate) fn check(
+        &self,
+        check: impl Fn(&Plan) -> Result<(), String>,
+    ) -> Result<(), RemoteRefusal> {
+        for chosen in self.corners() {
+            self.plan(&chosen).and_then(|plan| check(&plan)).map_err(|reason| {
+                let values: Vec<String> =
+                    chosen.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+                let values =
+                    if values.is_empty() { "its protocol".into() } else { values.join(", ") };
+                RemoteRefusal::Corner { queue: self.name.clone(), values, reason }
+            })?;
+        }
+        Ok(())
     }
 
     fn corners(&self) -> impl Iterator<Item = BTreeMap<String, String>> {

@@ -152,7 +152,7 @@ impl eframe::App for PlaybackApp {
             .show(ui, |ui| {
                 let area = ScrollArea::vertical().id_salt("results");
                 area.auto_shrink(false).show(ui, |ui| {
-                    let RunnerSnapshot { rig, run, .. } = &self.snapshot;
+                    let RunnerSnapshot { rig, run, .. } = &*self.snapshot;
                     findings_ui(ui, rig, run.as_ref(), self.plots.cycles());
                 });
             });

@@ -90,6 +90,12 @@ impl StationDesk {
         }
     }
 
+    /// As [`RemoteDesk::disarm_for_stop`].
+    #[must_use]
+    pub fn disarm_for_stop(&self, reason: &str) -> bool {
+        self.desk().is_some_and(|mut desk| desk.disarm_for_stop(reason))
+    }
+
     pub fn act(&mut self, ctx: &Context, command: &StationCommand, rig: (&Runner, RemoteBench)) {
         self.refusal = None;
         match command {
