@@ -245,20 +245,20 @@ mod tests {
 
     #[test]
     fn turns_are_about_the_axes_of_the_scene() {
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let quarter = std::f64::consts::FRAC_PI_2;
+        // A turn by 1 rad: at a quarter turn of pitch, yaw and roll are one.
+        let (cos, sin) = (0.5_f64.cos(), 0.5_f64.sin());
         let identity = WorkspaceFit::default();
         let turn = |fit: &WorkspaceFit, quaternion| fit.pose([0.0; 3], quaternion, [0.0; 3]).turn;
         let close = |turn: [f64; 3], expected: [f64; 3]| {
-            // The arcsine loses half the digits near a quarter turn.
-            turn.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7)
+            // Some roundings of sines and their inverses.
+            turn.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-14)
         };
-        assert!(close(turn(&identity, [half, 0.0, 0.0, half]), [quarter, 0.0, 0.0]));
-        assert!(close(turn(&identity, [half, half, 0.0, 0.0]), [0.0, 0.0, quarter]));
-        assert!(close(turn(&identity, [half, 0.0, half, 0.0]), [0.0, quarter, 0.0]));
+        assert!(close(turn(&identity, [cos, 0.0, 0.0, sin]), [1.0, 0.0, 0.0]));
+        assert!(close(turn(&identity, [cos, sin, 0.0, 0.0]), [0.0, 0.0, 1.0]));
+        assert!(close(turn(&identity, [cos, 0.0, sin, 0.0]), [0.0, 1.0, 0.0]));
         // The scene's x is the device's y: a turn about that is a roll.
         let turned = WorkspaceFit { axes: [PlusY, MinusX, PlusZ], ..identity };
-        assert!(close(turn(&turned, [half, 0.0, half, 0.0]), [0.0, 0.0, quarter]));
+        assert!(close(turn(&turned, [cos, 0.0, sin, 0.0]), [0.0, 0.0, 1.0]));
     }
 
     #[test]

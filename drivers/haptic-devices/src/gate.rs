@@ -95,6 +95,8 @@ pub struct ForceGate {
     order: Option<(Nanos, [f64; 3])>,
     is_ended: bool,
     ramp_since: Option<Nanos>,
+    /// Whether the last force was not zero.
+    is_pushing: bool,
     stop: ForceStop,
 }
 
@@ -109,6 +111,7 @@ impl ForceGate {
             order: None,
             is_ended: false,
             ramp_since: None,
+            is_pushing: false,
             stop: ForceStop::NotStarted,
         }
     }
@@ -157,21 +160,31 @@ impl ForceGate {
     /// The force to send at `now`, in N along the device's axes.
     pub fn force(&mut self, now: Nanos) -> [f64; 3] {
         self.stop = self.reason(now);
-        let order = match self.order {
-            Some((_, order)) if self.stop == ForceStop::None => order,
+        let force = match self.order {
+            Some((_, order)) if self.stop == ForceStop::None => self.ramped(now, order),
             _ => {
                 self.ramp_since = None;
-                return [0.0; 3];
+                [0.0; 3]
             }
         };
+        self.is_pushing = force != [0.0; 3];
+        force
+    }
+
+    fn ramped(&mut self, now: Nanos, order: [f64; 3]) -> [f64; 3] {
         let since = *self.ramp_since.get_or_insert(now);
         let share = now.since(since).0 as f64 / self.limits.ramp.0.max(1) as f64;
         limited(order.map(|part| part * share.min(1.0)), self.limits.force_max_n)
     }
 
-    /// Whether something has just gone wrong that must be sent at once: the last force sent was not zero.
+    /// Whether a zero must be sent at once: the last force was not zero, and something has gone wrong since.
     pub fn is_overdue(&self, now: Nanos) -> bool {
-        self.ramp_since.is_some() && self.reason(now) != ForceStop::None
+        self.is_pushing && (self.ramp_since.is_none() || self.reason(now) != ForceStop::None)
+    }
+
+    /// A speed at no number is not slow.
+    fn is_slow(&self, speed_mm_per_s: f64) -> bool {
+        speed_mm_per_s <= self.limits.speed_max_mm_per_s
     }
 
     fn reason(&self, now: Nanos) -> ForceStop {
@@ -194,8 +207,7 @@ impl ForceGate {
             None => ForceStop::NotStarted,
             Some((since, _)) if is_late(since, self.limits.scene_silence) => ForceStop::SceneSilent,
             Some((_, force)) if !force.iter().all(|part| part.is_finite()) => ForceStop::NotANumber,
-            // A comparison that a speed at no number fails, too.
-            Some(_) if !(speed <= self.limits.speed_max_mm_per_s) => ForceStop::TooFast,
+            Some(_) if !self.is_slow(speed) => ForceStop::TooFast,
             Some(_) if is_held == Some(false) => ForceStop::NotHeld,
             Some(_) => ForceStop::None,
         }

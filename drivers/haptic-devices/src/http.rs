@@ -25,8 +25,7 @@ pub enum HttpError {
 
 /// What a GET of `path` answers, as text.
 pub fn get(address: SocketAddr, path: &str) -> Result<String, HttpError> {
-    let mut stream =
-        TcpStream::connect_timeout(&address, PATIENCE).map_err(HttpError::Connect)?;
+    let mut stream = TcpStream::connect_timeout(&address, PATIENCE).map_err(HttpError::Connect)?;
     let request = format!(
         "GET {path} HTTP/1.1\r\nHost: {address}\r\nAccept: application/json\r\nConnection: close\r\n\r\n"
     );
@@ -110,8 +109,7 @@ fn body(answer: &[u8]) -> Result<String, HttpError> {
 fn unchunked(mut bytes: &[u8]) -> Option<Vec<u8>> {
     let mut whole = Vec::new();
     loop {
-        let httparse::Status::Complete((begin, length)) =
-            httparse::parse_chunk_size(bytes).ok()?
+        let httparse::Status::Complete((begin, length)) = httparse::parse_chunk_size(bytes).ok()?
         else {
             return None;
         };

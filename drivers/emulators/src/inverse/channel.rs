@@ -77,6 +77,9 @@ impl Channel {
         channel: usize,
         service: &mut InverseService,
     ) {
+        if self.is_over {
+            return;
+        }
         match &mut self.socket {
             Some(socket) => socket.get_mut().input.extend(bytes),
             None => self.head.extend_from_slice(bytes),

@@ -16,8 +16,8 @@ pub use fault::{InverseFault, InverseLie};
 pub use panel::InversePanel;
 pub use service::{InverseService, InverseServiceSettings};
 
-use crate::faults::DeviceFault;
 use crate::EmulatedDevice;
+use crate::faults::DeviceFault;
 use channel::Channel;
 use palpate_drivers::sim::{Random, RandomStream};
 use palpate_haptics::SettingError;

@@ -1,8 +1,8 @@
 //! The service without its sockets: messages in, reports out, and the force on the hand.
 
+use super::InverseFault;
 use super::arm::{ArmSettings, EmulatedArm, MIDDLE_FROM_BASE_MM};
 use super::report::{DEVICE, Facts, lying, report, version};
-use super::InverseFault;
 use palpate_haptics::SettingError;
 use palpate_model::Nanos;
 use serde_json::Value;
@@ -161,7 +161,9 @@ impl InverseService {
             let arms = message["inverse3"].as_array();
             let arm = arms.and_then(|arms| arms.iter().find(|arm| arm["device_id"] == DEVICE));
             if let Some(arm) = arm {
-                if arm.pointer("/configure/preset/preset").is_some_and(|one| one == "arm_front_centered")
+                if arm
+                    .pointer("/configure/preset/preset")
+                    .is_some_and(|one| one == "arm_front_centered")
                 {
                     self.is_centred = true;
                 }

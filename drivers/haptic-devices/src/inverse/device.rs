@@ -321,7 +321,7 @@ impl Service {
                 link.send(self.exchange.message(now)).ok()?;
                 self.publish(true);
             }
-            if self.exchange.is_hopeless() {
+            if self.exchange.is_hopeless(now) {
                 return None;
             }
             let rest = if self.exchange.is_waiting() { REST_WAITING } else { REST };
@@ -349,8 +349,7 @@ impl Service {
         }
         let (fault, faults) = self.exchange.faults();
         let reports = self.exchange.reports();
-        let report =
-            LinkReport { is_connected, stop, fault, faults, reports, losses: self.losses };
+        let report = LinkReport { is_connected, stop, fault, faults, reports, losses: self.losses };
         *self.monitor.0.lock().unwrap_or_else(PoisonError::into_inner) = report;
     }
 

@@ -148,9 +148,10 @@ fn chosen(
     let known = || all.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let found = match (name, &all[..]) {
         (_, []) => return Err(InverseError::NoDevice),
-        (Some(name), _) => all.iter().find(|(known, _)| *known == name).ok_or_else(|| {
-            InverseError::UnknownDevice { name: name.to_owned(), known: known() }
-        })?,
+        (Some(name), _) => all
+            .iter()
+            .find(|(known, _)| *known == name)
+            .ok_or_else(|| InverseError::UnknownDevice { name: name.to_owned(), known: known() })?,
         (None, [only]) => only,
         (None, _) => return Err(InverseError::Ambiguous { known: known() }),
     };

@@ -9,8 +9,11 @@ use std::collections::VecDeque;
 
 /// A message at least this often: the service answers only messages, and a command is forgotten when no other follows.
 pub const BEAT: Nanos = Nanos::from_millis(1);
-/// Messages without an answer at which the connection is given up: 0.1 s.
-const WAITING_MAX: usize = 100;
+/// Time of late answers after which the connection is given up. The service numbers no answer, so one that is lost makes all later
+/// ones look late, and only a new session brings them together.
+const LATE_MAX: Nanos = Nanos::from_millis(100);
+/// Messages that may wait for an answer, far more than in that time.
+const WAITING_MAX: usize = 1000;
 /// Reports after a new connection in which the origin may move, as the first message asks for another one.
 const SETTLING: u64 = 10;
 /// A place may be this far from the last in addition to four times the largest speed, in mm: some steps of the sensors.
@@ -40,6 +43,8 @@ pub struct Exchange {
     /// When the messages were sent that wait for an answer.
     waiting: VecDeque<Nanos>,
     sent_at: Option<Nanos>,
+    /// Since when answers are late.
+    late_since: Option<Nanos>,
     has_news: bool,
     reports: u64,
     since_link: u64,
@@ -67,6 +72,7 @@ impl Exchange {
             session: None,
             waiting: VecDeque::with_capacity(WAITING_MAX + 1),
             sent_at: None,
+            late_since: None,
             has_news: false,
             reports: 0,
             since_link: 0,
@@ -91,6 +97,7 @@ impl Exchange {
         self.waiting.clear();
         self.session = None;
         self.sent_at = None;
+        self.late_since = None;
         self.since_link = 0;
         self.last = None;
     }
@@ -163,6 +170,11 @@ impl Exchange {
     /// The message to send now; its force is that of the gate.
     pub fn message(&mut self, now: Nanos) -> &str {
         let force = self.gate.force(now);
+        if self.gate.stop() == ForceStop::NoReply {
+            self.late_since.get_or_insert(now);
+        } else {
+            self.late_since = None;
+        }
         write_force(&mut self.message, &self.device, force, self.sent_at.is_none());
         self.sent_at = Some(now);
         self.has_news = false;
@@ -171,10 +183,11 @@ impl Exchange {
         &self.message
     }
 
-    /// Whether so many messages are without an answer that the connection is to be given up.
+    /// Whether answers have been late for so long that the connection is to be given up.
     #[must_use]
-    pub fn is_hopeless(&self) -> bool {
-        self.waiting.len() > WAITING_MAX
+    pub fn is_hopeless(&self, now: Nanos) -> bool {
+        let is_late = self.late_since.is_some_and(|since| now.since(since) > LATE_MAX);
+        is_late || self.waiting.len() > WAITING_MAX
     }
 
     /// Whether an answer is due.

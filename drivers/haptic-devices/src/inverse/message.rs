@@ -193,10 +193,7 @@ impl ArmReport {
             return ReportState::NotReady;
         }
         let [x, y, z] = self.velocity_m_per_s;
-        ReportState::Good {
-            speed_mm_per_s: 1000.0 * x.hypot(y).hypot(z),
-            is_held: self.is_held,
-        }
+        ReportState::Good { speed_mm_per_s: 1000.0 * x.hypot(y).hypot(z), is_held: self.is_held }
     }
 }
 
@@ -270,11 +267,8 @@ pub fn write_force(text: &mut String, device: &str, force: [f64; 3], is_first: b
     } else {
         ""
     };
-    let configure = if is_first {
-        r#""configure":{"preset":{"preset":"arm_front_centered"}},"#
-    } else {
-        ""
-    };
+    let configure =
+        if is_first { r#""configure":{"preset":{"preset":"arm_front_centered"}},"# } else { "" };
     // A name is checked when a device is chosen; writing to a string cannot fail.
     let _ = write!(
         text,
