@@ -16,7 +16,7 @@ palpate_model::named! {
         /// The scene has not yet ticked.
         #[default]
         NotStarted = "the scene has not started",
-        /// The device was told to end.
+        /// The device is closed.
         Ended = "the device is closed",
         /// No connection.
         LinkLost = "the connection to the service is lost",
@@ -54,15 +54,15 @@ pub struct ForceLimits {
 }
 
 impl Default for ForceLimits {
-    /// Silences of 3 ms: with a loop that looks every half a millisecond, a tick of 1 ms before a silence is seen and a
-    /// message's way, the force is zero within 5 ms. 3 N is below what a hand holds without effort. A hand that is led
-    /// reaches about 1 m/s; an arm that runs away with 3 N is faster within 0.1 s.
+    /// A silence of 2.5 ms, a tick or a beat of 1 ms before it, a turn of the thread and a message's way are 4 to 4.5 ms, below the
+    /// 5 ms in which the force must be zero. A tick that is 1.5 ms late is rare where real-time priority is granted. A hand that
+    /// is led reaches about 1 m/s; an arm of 0.1 kg that runs away with 3 N is faster than the limit within 0.05 s.
     fn default() -> Self {
         Self {
             force_max_n: 3.0,
             speed_max_mm_per_s: 1500.0,
-            scene_silence: Nanos::from_millis(3),
-            reply_silence: Nanos::from_millis(3),
+            scene_silence: Nanos(2_500_000),
+            reply_silence: Nanos(2_500_000),
             ramp: Nanos::from_millis(200),
         }
     }
@@ -285,16 +285,16 @@ mod tests {
     #[test]
     fn silence_of_scene_or_service_ends_the_force_after_its_limit() {
         let mut gate = open_gate();
-        assert_ne!(gate.force(ms(1003)), [0.0; 3]);
-        assert_eq!(gate.force(Nanos(1_003_000_001)), [0.0; 3]);
+        assert_ne!(gate.force(Nanos(1_002_500_000)), [0.0; 3]);
+        assert_eq!(gate.force(Nanos(1_002_500_001)), [0.0; 3]);
         assert_eq!(gate.stop(), ForceStop::SceneSilent);
         let mut gate = open_gate();
         gate.note_sent(ms(1000));
-        gate.set_order(ms(1003), [0.0, 0.0, 2.0]);
+        gate.set_order(ms(1002), [0.0, 0.0, 2.0]);
         // Later messages do not put off the answer that is due.
         gate.note_sent(ms(1002));
-        assert_ne!(gate.force(ms(1003)), [0.0; 3]);
-        assert_eq!(gate.force(Nanos(1_003_000_001)), [0.0; 3]);
+        assert_ne!(gate.force(Nanos(1_002_500_000)), [0.0; 3]);
+        assert_eq!(gate.force(Nanos(1_002_500_001)), [0.0; 3]);
         assert_eq!(gate.stop(), ForceStop::NoReply);
     }
 

@@ -10,6 +10,7 @@ struct PanelState {
     is_held: bool,
     fault_at: Option<Nanos>,
     zero_since: Option<Nanos>,
+    zero_in_fault: Option<Nanos>,
     force: [f64; 3],
     messages: u64,
 }
@@ -25,6 +26,7 @@ impl Default for InversePanel {
             is_held: true,
             fault_at: None,
             zero_since: Some(Nanos::ZERO),
+            zero_in_fault: None,
             force: [0.0; 3],
             messages: 0,
         })))
@@ -58,6 +60,12 @@ impl InversePanel {
         self.state().zero_since
     }
 
+    /// When the force was first zero after the fault began, on the emulator's clock.
+    #[must_use]
+    pub fn zero_in_fault(&self) -> Option<Nanos> {
+        self.state().zero_in_fault
+    }
+
     /// The force on the hand in N.
     #[must_use]
     pub fn force(&self) -> [f64; 3] {
@@ -79,6 +87,7 @@ impl InversePanel {
         let mut state = self.state();
         state.fault_at = service.fault_at();
         state.zero_since = service.zero_since();
+        state.zero_in_fault = service.zero_in_fault();
         state.force = service.force();
         state.messages = service.messages();
     }

@@ -58,6 +58,8 @@ pub struct InverseService {
     fault: Option<InverseFault>,
     fault_at: Option<Nanos>,
     zero_since: Option<Nanos>,
+    /// When the force was first zero in the fault.
+    zero_in_fault: Option<Nanos>,
     messages: u64,
 }
 
@@ -74,6 +76,7 @@ impl InverseService {
             fault: None,
             fault_at: None,
             zero_since: Some(Nanos::ZERO),
+            zero_in_fault: None,
             messages: 0,
         })
     }
@@ -90,6 +93,8 @@ impl InverseService {
     pub fn set_fault(&mut self, now: Nanos, fault: Option<InverseFault>) {
         self.fault = fault;
         self.fault_at = fault.map(|_| now);
+        self.zero_in_fault = None;
+        self.note_force(now);
     }
 
     pub fn fault(&self) -> Option<InverseFault> {
@@ -120,6 +125,11 @@ impl InverseService {
     /// Since when there is no force; `None` while there is one.
     pub fn zero_since(&self) -> Option<Nanos> {
         self.zero_since
+    }
+
+    /// When the force was first zero after the fault began; `None` while it was not.
+    pub fn zero_in_fault(&self) -> Option<Nanos> {
+        self.zero_in_fault
     }
 
     /// Messages received.
@@ -214,6 +224,9 @@ impl InverseService {
     fn note_force(&mut self, now: Nanos) {
         if self.force() == [0.0; 3] {
             self.zero_since.get_or_insert(now);
+            if self.fault.is_some() {
+                self.zero_in_fault.get_or_insert(now);
+            }
         } else {
             self.zero_since = None;
         }

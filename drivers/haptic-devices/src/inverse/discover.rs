@@ -58,7 +58,9 @@ pub enum InverseError {
     Format,
     #[error("the connection to the Inverse service cannot be opened ({0})")]
     Connect(String),
-    #[error("the Inverse service ended its answers while its delay was measured ({0})")]
+    #[error(
+        "the Inverse service fails while its delay is measured ({0}); restart the service, or connect the device again"
+    )]
     Silent(String),
     #[error("the thread of the haptic device cannot be started ({0}); close other programs")]
     Thread(std::io::Error),

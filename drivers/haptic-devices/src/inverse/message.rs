@@ -257,7 +257,7 @@ impl ServiceReport {
     }
 }
 
-/// Writes the command for a force in N. The first message of a session also names it and asks for places around the middle of
+/// Writes the command for a force in N. The first message of a session also names it and requests places around the middle of
 /// the arm's reach (preset `arm_front_centered`).
 pub fn write_force(text: &mut String, device: &str, force: [f64; 3], is_first: bool) {
     text.clear();

@@ -2,6 +2,7 @@
 #![cfg(test)]
 
 mod margin;
+mod reports;
 mod served;
 mod simulated;
 mod wires;
