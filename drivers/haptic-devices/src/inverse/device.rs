@@ -13,6 +13,7 @@ use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::scene::{DeviceSettings, Pose};
 use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
+use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -29,6 +30,8 @@ const REST_WAITING: Duration = Duration::from_micros(100);
 const REST: Duration = Duration::from_micros(250);
 /// Reports that are read before the next message: a service that sends without end must not keep a zero from being sent.
 const RECEIVED_MAX: usize = 16;
+/// Beats in which the answer to the last zero is waited for.
+const GOODBYE_TURNS: u32 = 50;
 /// From one attempt to connect again to the next.
 const RETRY: Duration = Duration::from_millis(200);
 /// Time in which a pose must be new: a thread that does not run reports no fault of its own.
@@ -99,11 +102,12 @@ impl InverseMonitor {
 #[derive(Clone, Copy, Debug, Default)]
 struct Order {
     number: u64,
+    /// When the scene gave it: a thread that runs late must not take it for new.
+    at: Nanos,
     force: [f64; 3],
 }
 
 /// An Inverse3 in use. Dropping it sends zero force and ends the session.
-#[derive(Debug)]
 pub struct InverseDevice {
     settings: DeviceSettings,
     found: FoundDevice,
@@ -111,6 +115,7 @@ pub struct InverseDevice {
     loop_device: LoopDevice,
     sensed: Output<SensedPose>,
     orders: Input<Order>,
+    clock: HostClock,
     number: u64,
     /// The newest report seen, and ticks since.
     seen: u64,
@@ -141,7 +146,7 @@ impl InverseDevice {
         let service = Service {
             address: options.address,
             exchange,
-            clock,
+            clock: Arc::clone(&clock),
             poses: pose_input,
             orders: order_output,
             last_order: 0,
@@ -161,6 +166,7 @@ impl InverseDevice {
             round_trip,
             sensed,
             orders,
+            clock,
             number: 0,
             seen: 0,
             ticks_without: 0,
@@ -196,6 +202,12 @@ impl InverseDevice {
     }
 }
 
+impl fmt::Debug for InverseDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("InverseDevice").field("found", &self.found).finish_non_exhaustive()
+    }
+}
+
 impl HapticDevice for InverseDevice {
     fn settings(&self) -> &DeviceSettings {
         &self.settings
@@ -214,7 +226,7 @@ impl HapticDevice for InverseDevice {
 
     fn give(&mut self, force: [f64; 3]) {
         self.number += 1;
-        self.orders.write(Order { number: self.number, force });
+        self.orders.write(Order { number: self.number, at: (self.clock)(), force });
         if let Some(thread) = &self.thread {
             thread.thread().unpark();
         }
@@ -345,7 +357,7 @@ impl Service {
             let order = *self.orders.output_buffer();
             if order.number != self.last_order {
                 self.last_order = order.number;
-                self.exchange.set_order((self.clock)(), order.force);
+                self.exchange.set_order(order.at, order.force);
             }
         }
     }
@@ -385,6 +397,16 @@ impl Service {
         let now = (self.clock)();
         let _ = link.send(self.exchange.message(now));
         self.publish(true);
+        // Closing with reports unread sends a reset, which may overtake the zero; so its answer is waited for a little.
+        for _ in 0..GOODBYE_TURNS {
+            while let Ok(Some(text)) = link.receive() {
+                self.exchange.receive((self.clock)(), &text);
+            }
+            if !self.exchange.is_waiting() {
+                break;
+            }
+            sleep(Duration::from_nanos(BEAT.0));
+        }
         link.close();
     }
 }

@@ -102,9 +102,9 @@ impl Exchange {
         self.last = None;
     }
 
-    /// A tick of the scene, with its force in N along its axes.
-    pub fn set_order(&mut self, now: Nanos, force: [f64; 3]) {
-        self.gate.set_order(now, self.fit.device_force(force));
+    /// A tick of the scene at `at`, with its force in N along its axes.
+    pub fn set_order(&mut self, at: Nanos, force: [f64; 3]) {
+        self.gate.set_order(at, self.fit.device_force(force));
         self.has_news = true;
     }
 
