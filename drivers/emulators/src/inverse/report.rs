@@ -44,6 +44,8 @@ fn arm(facts: &Facts) -> Value {
             "current_cursor_position": vector([0.0; 3]),
             "current_angular_torques": zero,
             "current_angular_position": zero,
+            // Not in Haply's pages, but its client requires it.
+            "mode": "idle",
             "control_domain": "cartesian",
             "control_mode": "force",
             "transform": {},
