@@ -269,10 +269,10 @@ pub fn write_force(text: &mut String, device: &str, force: [f64; 3], is_first: b
     };
     let configure =
         if is_first { r#""configure":{"preset":{"preset":"arm_front_centered"}},"# } else { "" };
-    // A name is checked when a device is chosen; writing to a string cannot fail.
+    // A name is checked when a device is chosen; writing to a string cannot fail. `?` keeps the point in 1.0.
     let _ = write!(
         text,
-        r#"{{{session}"inverse3":[{{"device_id":"{device}",{configure}"commands":{{"set_cursor_force":{{"vector":{{"x":{x},"y":{y},"z":{z}}}}}}}}}]}}"#
+        r#"{{{session}"inverse3":[{{"device_id":"{device}",{configure}"commands":{{"set_cursor_force":{{"vector":{{"x":{x:?},"y":{y:?},"z":{z:?}}}}}}}}}]}}"#
     );
 }
 
