@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 19] = [
+const PACKAGES: [&str; 20] = [
     "model",
     "model/rheology",
     "model/haptics",
@@ -15,6 +15,7 @@ const PACKAGES: [&str; 19] = [
     "model/population",
     "drivers",
     "drivers/emulators",
+    "drivers/haptic-devices",
     "sessions",
     "sessions/store",
     "sessions/tables",
