@@ -72,13 +72,18 @@ fn largest(parts: Vector) -> f64 {
 fn check_areas(points: &[Vector], faces: &[[u32; 3]], tolerance_mm: f64) -> Result<(), Error> {
     let is_flat = |face: &[u32; 3]| {
         let [a, b, c] = face.map(|vertex| points[vertex as usize]);
-        let longest = [minus(b, a), minus(c, b), minus(a, c)].map(length).into_iter().fold(0.0, f64::max);
+        let longest = edge_lengths(points, face).into_iter().fold(0.0, f64::max);
         length(cross(minus(b, a), minus(c, a))) <= longest * tolerance_mm
     };
     match faces.iter().position(is_flat) {
         Some(face) => Err(Error::NoArea { face, tolerance_mm }),
         None => Ok(()),
     }
+}
+
+fn edge_lengths(points: &[Vector], face: &[u32; 3]) -> [f64; 3] {
+    let [a, b, c] = face.map(|vertex| points[vertex as usize]);
+    [minus(b, a), minus(c, b), minus(a, c)].map(length)
 }
 
 fn neighbours(points: &[Vector], faces: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, Error> {
@@ -248,7 +253,7 @@ fn finish(
 }
 
 /// Angle of a face at one of its corners in rad.
-pub(super) fn corner_angle(points: &[Vector], face: [u32; 3], corner: usize) -> f64 {
+fn corner_angle(points: &[Vector], face: [u32; 3], corner: usize) -> f64 {
     let at = |step: usize| points[face[(corner + step) % 3] as usize];
     angle(minus(at(1), at(0)), minus(at(2), at(0)))
 }

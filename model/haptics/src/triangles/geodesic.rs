@@ -14,6 +14,9 @@ use super::vector::{Vector, dot, length, minus};
 /// A vertex whose distance falls by less than this share after it was passed is not passed again: far below the error of the method.
 const PASS_AGAIN: f64 = 1e-9;
 
+/// Vertices in a row beyond the reach that are passed, too: a straight way to a vertex within crosses edges with an end beyond.
+const BEYOND: u8 = 2;
+
 /// Storage of a search, made once for a mesh.
 #[derive(Clone, Debug)]
 pub struct GeodesicDistance {
@@ -22,6 +25,8 @@ pub struct GeodesicDistance {
     seen: Box<[u32]>,
     passed: Box<[u32]>,
     pass: u32,
+    reach: f64,
+    beyond: Box<[u8]>,
     found: Vec<u32>,
     heap: VertexHeap,
 }
@@ -35,6 +40,8 @@ impl GeodesicDistance {
             seen: vec![0; vertices].into(),
             passed: vec![0; vertices].into(),
             pass: 0,
+            reach: 0.0,
+            beyond: vec![0; vertices].into(),
             found: Vec::with_capacity(vertices),
             heap: VertexHeap::new(vertices),
         }
@@ -43,10 +50,11 @@ impl GeodesicDistance {
     /// Finds every vertex no further than `reach` mm from a point of the mesh that this was made for.
     pub fn search(&mut self, mesh: &TriangleMesh, from: &SurfacePoint, reach: f64) {
         self.begin();
+        self.reach = reach;
         let corners = mesh.faces[from.face as usize];
         for vertex in corners {
             let distance = length(minus(mesh.points[vertex as usize], from.point));
-            self.offer(vertex, distance, reach);
+            self.offer(vertex, distance, 0);
         }
         // Vertices that are passed again are few; this only bounds the time whatever the mesh.
         let mut left = 4 * mesh.points.len();
@@ -56,14 +64,15 @@ impl GeodesicDistance {
             left -= 1;
             self.passed[vertex as usize] = self.pass;
             for &face in mesh.faces_around(vertex) {
-                self.cross(mesh, vertex, face, reach);
+                self.cross(mesh, vertex, face);
             }
         }
     }
 
     /// Vertices of the last search and their distances in mm, in the order in which they were first reached.
     pub fn found(&self) -> impl Iterator<Item = (u32, f64)> {
-        self.found.iter().map(|&vertex| (vertex, self.distance[vertex as usize]))
+        let all = self.found.iter().map(|&vertex| (vertex, self.distance[vertex as usize]));
+        all.filter(|(_, distance)| *distance <= self.reach)
     }
 
     fn begin(&mut self) {
@@ -79,12 +88,13 @@ impl GeodesicDistance {
     }
 
     /// What a passed vertex gives the two others of a face.
-    fn cross(&mut self, mesh: &TriangleMesh, vertex: u32, face: u32, reach: f64) {
+    fn cross(&mut self, mesh: &TriangleMesh, vertex: u32, face: u32) {
         let corners = mesh.faces[face as usize];
         let Some(corner) = super::shading::corner_of(corners, vertex) else { return };
         let [one, other] = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
         let at = |vertex: u32| mesh.points[vertex as usize];
         let distance = self.distance[vertex as usize];
+        let beyond = if distance > self.reach { self.beyond[vertex as usize] + 1 } else { 1 };
         for (to, with) in [(one, other), (other, one)] {
             let mut best = distance + length(minus(at(to), at(vertex)));
             if self.passed[with as usize] == self.pass {
@@ -93,12 +103,13 @@ impl GeodesicDistance {
                     best = best.min(across);
                 }
             }
-            self.offer(to, best, reach);
+            self.offer(to, best, beyond);
         }
     }
 
-    fn offer(&mut self, vertex: u32, distance: f64, reach: f64) {
-        if distance.is_nan() || distance > reach {
+    /// `beyond`: the how manieth it is outside the reach, if it is.
+    fn offer(&mut self, vertex: u32, distance: f64, beyond: u8) {
+        if distance.is_nan() || (distance > self.reach && beyond > BEYOND) {
             return;
         }
         let index = vertex as usize;
@@ -114,6 +125,7 @@ impl GeodesicDistance {
             self.passed[index] = 0;
         }
         self.distance[index] = distance;
+        self.beyond[index] = beyond;
         self.heap.raise(vertex, &self.distance);
     }
 }

@@ -288,7 +288,7 @@ fn shaded(mesh: &TriangleMesh, from: SurfacePoint, side: f64, device: Vector) ->
         (normal, plus(way, -dot(way, normal), normal))
     };
     let mut at = from;
-    let (mut normal, mut off) = miss(&at);
+    let (normal, mut off) = miss(&at);
     let mut best = (at, normal, length(off));
     let mut gain = 1.0;
     for _ in 0..SHADING_STEPS {
@@ -298,19 +298,20 @@ fn shaded(mesh: &TriangleMesh, from: SurfacePoint, side: f64, device: Vector) ->
         let next = descend(mesh, at.face, plus(at.point, gain, off));
         let (next_normal, next_off) = miss(&next);
         let change = minus(off, next_off);
-        let (along, squared) = (dot(off, change), dot(change, change));
-        // Where nothing is learned the step is the plain one.
-        gain = if along > 0.0 && squared > 0.0 {
-            (gain * dot(off, off) / along).clamp(0.1, 4.0)
-        } else {
-            0.5 * gain.min(1.0)
-        };
-        (at, normal, off) = (next, next_normal, next_off);
+        let along = dot(off, change);
+        // A step that takes most of the way off is kept: over edges the next estimate would be of two triangles.
+        if dot(next_off, next_off) > 0.25 * dot(off, off) {
+            gain = if along > 0.0 {
+                (gain * dot(off, off) / along).clamp(0.1, 4.0)
+            } else {
+                0.5 * gain.min(1.0)
+            };
+        }
+        (at, off) = (next, next_off);
         if length(off) < best.2 {
-            best = (at, normal, length(off));
+            best = (at, next_normal, length(off));
         }
     }
-    let _ = normal;
     // It may not be led away over a fold, nor to where the device is above the plane.
     let depth = length(minus(from.point, device));
     let is_near = length(minus(best.0.point, from.point)) <= depth;

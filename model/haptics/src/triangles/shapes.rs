@@ -61,7 +61,8 @@ pub fn ball(radius_mm: f64, times: u32) -> TriangleSoup {
                     (0..3).map(|axis| (p[axis] - q[axis]).powi(2)).sum::<f64>() < 5.0
                 };
                 if near(p, q) && near(q, r) && near(p, r) {
-                    faces.push([a, b, c]);
+                    let is_outward = super::vector::dot(p, cross(q, r)) > 0.0;
+                    faces.push(if is_outward { [a, b, c] } else { [a, c, b] });
                 }
             }
         }
