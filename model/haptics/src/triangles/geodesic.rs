@@ -88,6 +88,7 @@ impl GeodesicDistance {
     }
 
     /// What a passed vertex gives the two others of a face.
+    #[inline(always)]
     fn cross(&mut self, mesh: &TriangleMesh, vertex: u32, face: u32) {
         let corners = mesh.faces[face as usize];
         let Some(corner) = super::shading::corner_of(corners, vertex) else { return };
@@ -96,10 +97,16 @@ impl GeodesicDistance {
         let distance = self.distance[vertex as usize];
         let beyond = if distance > self.reach { self.beyond[vertex as usize] + 1 } else { 1 };
         for (to, with) in [(one, other), (other, one)] {
-            let mut best = distance + length(minus(at(to), at(vertex)));
+            let (here, there) = (minus(at(vertex), at(to)), minus(at(with), at(to)));
+            let is_passed = self.passed[to as usize] == self.pass;
+            // A front meets the nearest corner first, unless the triangle is obtuse there.
+            if is_passed && self.distance[to as usize] <= distance && dot(here, there) >= 0.0 {
+                continue;
+            }
+            let mut best = distance + length(here);
             if self.passed[with as usize] == self.pass {
                 let known = [distance, self.distance[with as usize]];
-                if let Some(across) = unfold([at(vertex), at(with), at(to)], known) {
+                if let Some(across) = unfold(here, there, known) {
                     best = best.min(across);
                 }
             }
@@ -130,22 +137,28 @@ impl GeodesicDistance {
     }
 }
 
-/// The distance of the third corner where the straight way from the source to it crosses the edge of the first two, whose distances
-/// are known.
-fn unfold([a, b, c]: [Vector; 3], [to_a, to_b]: [f64; 2]) -> Option<f64> {
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let edge = length(ab);
-    // The source below the edge, which is from (0, 0) to (edge, 0); the corner above.
-    let x = (edge * edge + to_a * to_a - to_b * to_b) / (2.0 * edge);
-    let y = to_a * to_a - x * x;
+/// The distance of the third corner where the straight way from the source to it crosses the edge of the first two, whose ways from the
+/// third and distances from the source are known.
+#[inline(always)]
+fn unfold(a: Vector, b: Vector, [to_a, to_b]: [f64; 2]) -> Option<f64> {
+    let ab = minus(b, a);
+    let squared = dot(ab, ab);
+    // All in shares of the edge, which is from (0, 0) to (1, 0): the source below it, the corner above.
+    let x = 0.5 + (to_a * to_a - to_b * to_b) / (2.0 * squared);
+    let y_squared = to_a * to_a / squared - x * x;
     // A source on the line of the edge is one at which roundings decide.
-    if y < -1e-9 * to_a * to_a {
+    if y_squared < -1e-9 * to_a * to_a / squared {
         return None;
     }
-    let y = y.max(0.0).sqrt();
-    let corner_x = dot(ac, ab) / edge;
-    let corner_y = (dot(ac, ac) - corner_x * corner_x).max(0.0).sqrt();
+    let y = y_squared.max(0.0).sqrt();
+    let corner_x = -dot(a, ab) / squared;
+    let corner_y = (dot(a, a) / squared - corner_x * corner_x).max(0.0).sqrt();
     let high = y + corner_y;
-    let crossing = x + (corner_x - x) * y / high;
-    (high > 0.0 && (0.0..=edge).contains(&crossing)).then(|| (corner_x - x).hypot(high))
+    // Where the way crosses the edge, times its height.
+    let crossing = x * high + (corner_x - x) * y;
+    if !(0.0..=high).contains(&crossing) || high <= 0.0 {
+        return None;
+    }
+    let wide = corner_x - x;
+    Some(((wide * wide + high * high) * squared).sqrt())
 }

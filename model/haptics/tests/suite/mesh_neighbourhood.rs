@@ -26,7 +26,8 @@ fn rough_plate(seed: u64) -> TriangleMesh {
     mesh(soup)
 }
 
-/// Exact on a plane, whatever its triangles; roundings of 40 mm over some 40 triangles.
+/// Exact on a plane, whatever its triangles. Where a source is near the line of an edge its height is the root of a difference of
+/// roundings, 1e-8 of the distance, a hundred times over.
 #[test]
 fn distances_on_a_plane_are_straight() {
     for seed in 0..5 {
@@ -41,9 +42,9 @@ fn distances_on_a_plane_are_straight() {
             let found: Vec<_> = distances.found().collect();
             for (vertex, distance) in &found {
                 let straight = apart(mesh.points()[*vertex as usize], place);
-                assert!((distance - straight).abs() < 1e-6, "{distance} {straight}");
+                assert!((distance - straight).abs() < 2e-5, "{distance} {straight}");
             }
-            let inside = mesh.points().iter().filter(|point| apart(**point, place) <= reach - 1e-6);
+            let inside = mesh.points().iter().filter(|point| apart(**point, place) <= reach - 2e-5);
             assert!(inside.count() <= found.len());
         }
     }
