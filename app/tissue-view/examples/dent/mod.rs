@@ -1,5 +1,7 @@
 //! The dent that the examples draw: 60 mm of tissue on 201 by 201 nodes under a ball of 6 mm radius.
 
+#![allow(dead_code, reason = "each example takes its part")]
+
 use palpate_haptics::scene::SceneSettings;
 use palpate_haptics::surface::{
     ContactSide, Grid, HeightField, Surface, SurfaceContact, SurfaceRecovery,
@@ -7,7 +9,7 @@ use palpate_haptics::surface::{
 use palpate_tissue_view::{Camera, FieldData, Probe};
 use std::error::Error;
 
-const NODES: usize = 201;
+pub const NODES: usize = 201;
 const SIDE_MM: f64 = 60.0;
 const RADIUS_MM: f64 = 6.0;
 const DEPTH_MM: f64 = 6.5;
@@ -15,6 +17,8 @@ const DEPTH_MM: f64 = 6.5;
 pub struct Dent {
     pub field: FieldData,
     pub probe: Probe,
+    /// Heights in mm, row by row.
+    pub heights: Vec<f64>,
     pub depth_mm: f64,
 }
 
@@ -73,14 +77,19 @@ impl Dent {
         Ok(Self {
             field: FieldData::new(NODES, spacing, heights)?.with_rest(rest)?,
             probe: Probe::new(centre, RADIUS_MM)?.with_axis([0.22, 0.10, 1.0])?,
+            heights: heights.to_vec(),
             depth_mm,
         })
     }
 
+    pub fn spacing_mm(&self) -> f64 {
+        SIDE_MM / (NODES - 1) as f64
+    }
+
     pub fn camera(&self) -> Camera {
-        let mut camera = Camera::of([SIDE_MM; 2]).looking_at([30.0, 30.0, 1.0]);
-        camera.orbit(0.0, -0.08);
-        camera.zoom(1.15);
+        let mut camera = Camera::of([SIDE_MM; 2]).looking_at([29.0, 29.0, 2.0]);
+        camera.orbit(0.0, -0.06);
+        camera.zoom(1.75);
         camera
     }
 }

@@ -1,35 +1,36 @@
 //! The numbers of a scene as the shaders read them: `Scene` in `shaders/scene.wgsl`.
 
-use crate::camera::{Eye, FIELD_OF_VIEW, Vec3};
+use crate::camera::{Eye, FIELD_OF_VIEW, Vec3, dot};
 use crate::look::{SurfaceColours, linear};
 use crate::picture::Picture;
 use crate::probe::ProbeKind;
 use crate::surface::SurfaceData;
 
 /// Four numbers each.
-pub(super) const ROWS: usize = 14;
+pub(super) const ROWS: usize = 15;
 pub(super) const BYTES: u64 = (ROWS * 16) as u64;
 
-/// To the lamp: left of the picture, high, and a little towards the eye. It turns with the camera, so that relief always
-/// has its light side on the left, as in drawings.
-const LAMP: Vec3 = [-0.52, 0.62, -0.30];
+/// To the lamp and to the window: shares of right, up and away from the eye. They turn with the camera, so that relief
+/// always has its light side on the left, as in drawings, and the film of water always shines.
+const LAMP: Vec3 = [-0.52, 0.62, 0.30];
+const WINDOW: Vec3 = [0.22, 0.62, 0.90];
 /// Opacity of lines of equal depth.
-const INK: f32 = 0.55;
+const INK: f64 = 0.55;
 
 fn row(parts: Vec3, last: f64) -> [f32; 4] {
     [parts[0], parts[1], parts[2], last].map(|part| part as f32)
 }
 
-/// Unit vector to the lamp, in the scene.
-fn lamp(picture: &Picture) -> Vec3 {
+/// Unit vector in the scene of a direction as the camera has it, with up as the scene has it.
+fn turned(picture: &Picture, [to_right, up, ahead]: Vec3) -> Vec3 {
     let [right, _, away] = picture.camera.axes();
-    let flat = (away[0].powi(2) + away[1].powi(2)).sqrt().max(1e-9);
-    let ahead = [away[0] / flat, away[1] / flat, 0.0];
-    let way = [0, 1, 2].map(|axis| {
-        let up = if axis == 2 { LAMP[1] } else { 0.0 };
-        LAMP[0] * right[axis] + up - LAMP[2] * ahead[axis]
-    });
-    let length = way.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let flat = away[0].hypot(away[1]).max(1e-9);
+    let way = [
+        to_right * right[0] + ahead * away[0] / flat,
+        to_right * right[1] + ahead * away[1] / flat,
+        up,
+    ];
+    let length = dot(way, way).sqrt();
     way.map(|part| part / length)
 }
 
@@ -41,7 +42,7 @@ pub(super) fn of(picture: &Picture, eye: Eye, [wide, high]: [u32; 2]) -> [[f32; 
     let mut rows = [[0.0; 4]; ROWS];
     rows[..4].copy_from_slice(&picture.camera.view_projection(wide / high, eye));
     rows[4] = row(picture.camera.eye(eye), high / 2.0 / (FIELD_OF_VIEW / 2.0).tan());
-    rows[5] = row(lamp(picture), 0.0);
+    rows[5] = row(turned(picture, LAMP), 0.0);
     let is_field = matches!(*picture.surface, SurfaceData::Field(_));
     if let SurfaceData::Field(field) = &*picture.surface {
         let sides = [f64::from(field.columns), f64::from(field.rows), field.spacing_mm];
@@ -66,6 +67,7 @@ pub(super) fn of(picture: &Picture, eye: Eye, [wide, high]: [u32; 2]) -> [[f32; 
     let texture = f64::from(u8::from(has_texture));
     rows[11] = row([every, texture, size], f64::from(u8::from(is_field)));
     rows[12] = row(linear(look.background), 1.0);
-    rows[13] = row(linear(look.ink), f64::from(INK));
+    rows[13] = row(linear(look.ink), INK);
+    rows[14] = row(turned(picture, WINDOW), 0.0);
     rows
 }

@@ -7,20 +7,43 @@ const LAMP: vec3f = vec3f(1.0, 0.965, 0.92) * 2.6;
 const SKY: vec3f = vec3f(0.62, 0.68, 0.76);
 const GROUND: vec3f = vec3f(0.30, 0.24, 0.22);
 
-// Radiance offset a direction, blurred as a surface of a roughness sees it: a sky, a round lamp as over an operating
-// table, a bright band behind.
-fn sky(way: vec3f, roughness: f32) -> vec3f {
-    let blur = 0.02 + roughness * 0.6;
-    var light = mix(GROUND, SKY, smoothstep(-0.35 - blur, 0.55 + blur, way.z));
+// Radiance of the room from a direction, blurred as a surface of a roughness sees it: darker near the horizon, a round
+// lamp as over an operating table, a window across from the eye.
+fn room(way: vec3f, roughness: f32) -> vec3f {
+    let blur = 0.02 + roughness * 0.5;
+    var light = mix(GROUND * 0.8, SKY * 1.15, smoothstep(-0.25 - blur, 0.9 + blur, way.z));
     let lamp = dot(way, scene.light.xyz);
-    let edge = 0.965;
-    light += LAMP * 1.5 * smoothstep(edge - blur, edge + 0.25 * blur, lamp) / (1.0 + 6.0 * roughness);
-    let band = dot(way, normalize(vec3f(-scene.light.xy, 0.32)));
-    light += vec3f(0.75, 0.85, 1.0) * 1.1 * smoothstep(0.86 - blur, 0.93 + blur, band) / (1.0 + 4.0 * roughness);
-    return light;
+    light += LAMP * 1.6 * smoothstep(0.95 - blur, 0.97 + 0.3 * blur, lamp) / (1.0 + 5.0 * roughness);
+    return light + vec3f(0.86, 0.93, 1.0) * 2.2 * window_share(way, blur) / (1.0 + 3.0 * roughness);
 }
 
-// Light offset the whole sky on a surface that faces a direction.
+// A window of two panes, as seen in a direction.
+fn window_share(way: vec3f, blur: f32) -> f32 {
+    let middle = scene.window.xyz;
+    let side = normalize(vec3f(middle.y, -middle.x, 0.0));
+    let ahead = dot(way, middle);
+    let at = vec2f(dot(way, side), dot(way, cross(side, middle))) / max(ahead, 0.05);
+    let off = abs(at) - vec2f(0.15, 0.085);
+    let inside = smoothstep(vec2f(0.04 + blur), vec2f(-0.04 - blur), off);
+    let bar = smoothstep(0.0, 0.02 + blur, abs(at.x)) * 0.7 + 0.3;
+    return select(0.0, inside.x * inside.y * bar, ahead > 0.0);
+}
+
+// What polished steel mirrors of the room: between the lights it is dark, and strips of light stand around it.
+fn studio(way: vec3f, roughness: f32) -> vec3f {
+    let flat_way = way.xy / max(length(way.xy), 1e-3);
+    let lamp = dot(flat_way, normalize(scene.light.xy));
+    let window = dot(flat_way, normalize(scene.window.xy));
+    let blur = 0.015 + 0.4 * roughness;
+    let level = smoothstep(0.97, 0.6, abs(way.z));
+    var light = mix(vec3f(0.10, 0.11, 0.13), vec3f(0.62, 0.66, 0.72), smoothstep(-0.15, 0.95, way.z));
+    light += vec3f(1.0, 0.97, 0.93) * 1.35 * level * smoothstep(0.80 - blur, 0.86 + blur, lamp);
+    light += vec3f(0.84, 0.92, 1.0) * 0.8 * level * smoothstep(0.90 - blur, 0.94 + blur, window);
+    light += vec3f(0.9) * 0.35 * level * smoothstep(0.84 - blur, 0.9 + blur, -lamp);
+    return light + LAMP * 1.3 * smoothstep(0.94 - blur, 0.965 + blur, dot(way, scene.light.xyz));
+}
+
+// Light from the whole sky on a surface that faces a direction.
 fn sky_on(normal: vec3f) -> vec3f {
     return mix(GROUND, SKY, 0.5 + 0.5 * normal.z) + vec3f(0.16, 0.17, 0.19);
 }
@@ -34,8 +57,7 @@ fn fresnel(base: vec3f, cosine: f32) -> vec3f {
 
 // Highlight of the lamp: distribution and shadowing of GGX (Walter et al., "Microfacet models for refraction through
 // rough surfaces", EGSR 2007), times the cosine.
-fn highlight(normal: vec3f, to_eye: vec3f, roughness: f32, base: vec3f) -> vec3f {
-    let way = scene.light.xyz;
+fn highlight(way: vec3f, normal: vec3f, to_eye: vec3f, roughness: f32, base: vec3f) -> vec3f {
     let middle = normalize(way + to_eye);
     let nl = max(dot(normal, way), 0.0);
     let nv = max(dot(normal, to_eye), 1e-3);
@@ -43,10 +65,10 @@ fn highlight(normal: vec3f, to_eye: vec3f, roughness: f32, base: vec3f) -> vec3f
     let alpha = roughness * roughness;
     let square = alpha * alpha;
     let turn = nh * nh * (square - 1.0) + 1.0;
-    let spread = square / (PI * turn * turn);
+    let distribution = square / (PI * turn * turn);
     let shade = nl * sqrt(nv * nv * (1.0 - square) + square) + nv * sqrt(nl * nl * (1.0 - square) + square);
     // The lamp is wide: its highlight has no pole.
-    return fresnel(base, dot(middle, to_eye)) * min(spread * 0.5 * nl / max(shade, 1e-4), 6.0);
+    return fresnel(base, dot(middle, to_eye)) * min(distribution * 0.5 * nl / max(shade, 1e-4), 60.0);
 }
 
 // Share of a surface's sky, weighted by the cosine, that a sphere takes: the view factor of a plane element and a
@@ -68,7 +90,7 @@ fn sphere_share(place: vec3f, normal: vec3f, centre: vec3f, radius: f32) -> f32 
     return clamp((part / hh + atan(sqrt(below) / rim)) / PI, 0.0, 1.0);
 }
 
-// The same for the shaft, as the sphere on it that is nearest: a bound offset below, smooth along it.
+// The same for the shaft, as the sphere on it that is nearest: a bound from below, smooth along it.
 fn shaft_share(place: vec3f, normal: vec3f) -> f32 {
     let offset = place - scene.probe.xyz;
     let along = clamp(dot(offset, scene.axis.xyz), 0.0, scene.axis.w);

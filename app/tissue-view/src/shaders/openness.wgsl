@@ -5,7 +5,7 @@
 override DIRECTIONS: u32 = 8u;
 override STEPS: u32 = 8u;
 
-@group(0) @binding(0) var<uniform> scene: array<vec4f, 14>;
+@group(0) @binding(0) var<uniform> scene: array<vec4f, 15>;
 @group(0) @binding(1) var heights: texture_2d<f32>;
 
 @vertex

@@ -22,6 +22,8 @@ struct Scene {
     background: vec4f,
     // Of contour lines, linear, with their opacity.
     ink: vec4f,
+    // Unit vector to a window.
+    window: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;

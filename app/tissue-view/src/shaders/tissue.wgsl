@@ -1,7 +1,7 @@
 // The look of tissue, of the sides of its block and of the probe.
 
 // Colour of the mucosa of a stomach, linear.
-const TISSUE: vec3f = vec3f(0.66, 0.205, 0.165);
+const TISSUE: vec3f = vec3f(0.56, 0.135, 0.105);
 // How far light goes round into the shade, for red, green and blue: red goes furthest under skin (d'Eon and Luebke,
 // "Advanced techniques for realistic real-time skin rendering", GPU Gems 3, 2007).
 const ROUND: vec3f = vec3f(0.42, 0.16, 0.12);
@@ -50,14 +50,17 @@ fn wet_texture(place: vec2f, pixel: f32) -> Texture {
     let fine = noise(at * 1.9 + 0.8 * middle.yz);
     let pores = noise(at * 5.2);
     let visible = clamp(1.0 - pixel / size * 2.2, 0.0, 1.0);
-    found.slope = 0.030 * middle.yz + 0.040 * fine.yz * visible + 0.022 * pores.yz * visible * visible;
-    // Vessels run where two kinds of noise are equal.
-    let bent = at + 2.2 * vec2f(middle.x, large.x);
-    let ridge = abs(noise(bent * 0.20 + 7.0).x - noise(bent * 0.17 + 29.0).x);
-    let twig = abs(noise(bent * 0.52 + 41.0).x - noise(bent * 0.47 + 3.0).x);
-    let vessel = smoothstep(0.045, 0.0, ridge) * 0.30 + smoothstep(0.05, 0.0, twig) * 0.13;
-    let blush = mix(vec3f(1.10, 1.22, 1.22), vec3f(0.93, 0.76, 0.78), large.x * 0.6 + middle.x * 0.4);
-    found.colour = blush * mix(vec3f(1.0), vec3f(0.72, 0.42, 0.58), vessel) * (0.94 + 0.12 * fine.x);
+    found.slope = 0.055 * large.yz * 0.35 + 0.050 * middle.yz + 0.055 * fine.yz * visible
+        + 0.030 * pores.yz * visible * visible;
+    // Vessels run where two kinds of noise are equal; they come and go.
+    let bent = at + 2.6 * vec2f(middle.x, large.x) + 0.5 * fine.yz;
+    let ridge = abs(noise(bent * 0.16 + 7.0).x - noise(bent * 0.13 + 29.0).x);
+    let twig = abs(noise(bent * 0.45 + 41.0).x - noise(bent * 0.39 + 3.0).x);
+    let thick = smoothstep(0.25, 0.75, noise(at * 0.3 + 17.0).x);
+    let vessel = smoothstep(0.075, 0.0, ridge) * 0.42 * thick + smoothstep(0.09, 0.0, twig) * 0.20 * (1.0 - thick);
+    let pale = clamp(large.x * 0.7 + middle.x * 0.45 - 0.08, 0.0, 1.0);
+    let blush = mix(vec3f(0.86, 0.68, 0.66), vec3f(1.10, 1.62, 1.55), pale);
+    found.colour = blush * mix(vec3f(1.0), vec3f(0.62, 0.30, 0.42), vessel) * (0.92 + 0.16 * fine.x);
     return found;
 }
 
@@ -139,25 +142,25 @@ fn tissue_colour(point: SurfacePoint) -> @location(0) vec4f {
     return vec4f(mix(tone(light), scene.ink.rgb, line), 1.0);
 }
 
-// What the film of water returns: the lamp in it, the sky, and the probe.
+// What the film of water returns: the lamp in it, the room, and the probe.
 fn wet_light(place: vec3f, normal: vec3f, to_eye: vec3f, lamp: f32, fold: f32, near_share: f32) -> vec3f {
-    let shine = highlight(normal, to_eye, 0.38, WATER) * 0.9;
-    let cosine = max(dot(normal, to_eye), 0.0);
-    let mirrored = fresnel(WATER, cosine);
+    let shine = highlight(scene.light.xyz, normal, to_eye, 0.40, WATER);
+    let mirrored = fresnel(WATER, max(dot(normal, to_eye), 0.0));
     if (!IS_FULL) {
-        return LAMP * lamp * (shine + highlight(normal, to_eye, 0.22, WATER)) + mirrored * 0.5 * SKY * fold;
+        let gloss = highlight(scene.light.xyz, normal, to_eye, 0.25, WATER);
+        return LAMP * lamp * (shine + gloss) + mirrored * 0.6 * SKY * fold;
     }
-    var light = LAMP * lamp * (shine + highlight(normal, to_eye, 0.17, WATER) * 0.8);
+    var light = LAMP * lamp * (shine + highlight(scene.light.xyz, normal, to_eye, 0.2, WATER) * 1.5);
     var way = reflect(-to_eye, normal);
-    way.z = max(way.z, 0.02);
-    var seen = sky(normalize(way), 0.12) * mix(1.0, lamp, 0.4);
+    way = normalize(vec3f(way.xy, max(way.z, 0.02)));
+    var seen = room(way, 0.05) + vec3f(0.9, 0.95, 1.0) * 9.0 * window_share(way, 0.04);
     if (scene.shaft.y > 0.5) {
         let met = meet_probe(place + normal * 0.01, way);
         if (met.w > 0.0) {
             let base = select(STEEL, GLOVE * 0.3, scene.shaft.z > 0.5);
-            seen = base * sky(reflect(way, met.xyz), 0.25) * 0.55;
+            seen = base * studio(reflect(way, met.xyz), 0.2);
         } else {
-            seen *= 1.0 - 0.6 * near_share;
+            seen *= 1.0 - 0.8 * near_share;
         }
     }
     return light + mirrored * seen * fold * fold;
@@ -167,29 +170,33 @@ fn wet_light(place: vec3f, normal: vec3f, to_eye: vec3f, lamp: f32, fold: f32, n
 fn side_colour(point: SurfacePoint) -> @location(0) vec4f {
     let low = clamp(-point.place.z / max(scene.grid.w, 1e-3), 0.0, 1.0);
     if (scene.colour.z > 0.5) {
-        return vec4f(mix(vec3f(0.20), scene.background.rgb, 0.25 + 0.5 * low), 1.0);
+        let grey = mix(vec3f(0.16), scene.background.rgb, 0.35 + 0.25 * low);
+        return vec4f(grey, 1.0);
     }
-    let colour = mix(TISSUE * vec3f(0.80, 0.62, 0.60), TISSUE * vec3f(0.42, 0.22, 0.22), sqrt(low));
-    let light = soft_light(normalize(point.normal), 1.0, 0.85 - 0.45 * low, colour);
+    let normal = normalize(point.normal);
+    let colour = TISSUE * mix(vec3f(1.05, 1.35, 1.30), vec3f(0.80, 0.72, 0.74), sqrt(low));
+    let light = soft_light(normal, 1.0, 0.95 - 0.35 * low, colour) * 0.85;
     return vec4f(tone(light), 1.0);
 }
 
-// The tissue as the probe's surface mirrors it, or the sky.
+// The tissue as the probe's surface mirrors it, or the room.
 fn around_probe(place: vec3f, way: vec3f, roughness: f32) -> vec3f {
-    let high = sky(way, roughness);
-    if (way.z > -0.02 || scene.switches.w < 0.5) {
+    let high = studio(way, roughness);
+    if (way.z > 0.0 || scene.switches.w < 0.5) {
         return high;
     }
+    let down = max(-way.z, 0.02);
     let last = (scene.grid.xy - 1.0) * scene.grid.z;
-    var hit = place.xy + way.xy * (place.z / -way.z);
+    var hit = place.xy + way.xy * (max(place.z, 0.0) / down);
     let node = vec2i(clamp(hit / scene.grid.z, vec2f(0.0), scene.grid.xy - 1.0));
-    let fall = max(place.z - height_at(node), 0.0) / -way.z;
+    let fall = max(place.z - height_at(node), 0.0) / down;
     hit = place.xy + way.xy * fall;
-    let inside = smoothstep(vec2f(-0.5), vec2f(0.5), min(hit, last - hit));
+    let edge = 0.03 * scene.switches.z + 0.25 * fall;
+    let inside = smoothstep(vec2f(-edge), vec2f(edge), min(hit, last - hit));
     // In the contact's own shade the tissue is dark and red.
-    let lit = smoothstep(0.0, 1.6 * scene.probe.w, fall);
-    let tissue = TISSUE * mix(vec3f(0.10, 0.05, 0.04), vec3f(1.25), lit);
-    return mix(scene.background.rgb * 0.6, tissue, inside.x * inside.y * smoothstep(0.02, 0.2, -way.z));
+    let lit = smoothstep(0.0, 1.8 * scene.probe.w, fall);
+    let tissue = TISSUE * mix(vec3f(0.16, 0.07, 0.06), vec3f(1.15, 1.3, 1.3), lit);
+    return mix(high, tissue, inside.x * inside.y * smoothstep(0.0, 0.12, -way.z));
 }
 
 @fragment
@@ -199,21 +206,20 @@ fn probe_colour(point: ProbePoint) -> @location(0) vec4f {
     let cosine = max(dot(normal, to_eye), 0.0);
     var open = 1.0;
     if (scene.switches.w > 0.5) {
-        // Low on the tip the tissue is near: what it hides is a half space seen over the gap.
+        // Low on the tip the tissue is near and hides the room.
         let node = vec2i(clamp(point.place.xy / scene.grid.z + 0.5, vec2f(0.0), scene.grid.xy - 1.0));
         let gap = max(point.place.z - height_at(node), 0.0) / max(scene.probe.w, 1e-3);
-        open = mix(0.25, 1.0, clamp(gap * 1.1 + 0.25 * max(normal.z, 0.0), 0.0, 1.0));
+        open = mix(0.3, 1.0, clamp(gap * 1.3 + 0.25 * max(normal.z, 0.0), 0.0, 1.0));
     }
     let way = reflect(-to_eye, normal);
     if (scene.shaft.z > 0.5) {
         let facing = dot(normal, scene.light.xyz);
         let wrapped = clamp((facing + 0.25) / 1.25, 0.0, 1.0);
+        let gloss = highlight(scene.light.xyz, normal, to_eye, 0.42, vec3f(0.04));
         var light = GLOVE * (LAMP * 0.36 * wrapped + sky_on(normal) * 0.62 * open);
-        light += LAMP * highlight(normal, to_eye, 0.42, vec3f(0.04)) + fresnel(vec3f(0.04), cosine) * sky(way, 0.5) * 0.5 * open;
+        light += LAMP * gloss + fresnel(vec3f(0.04), cosine) * room(way, 0.5) * 0.6 * open;
         return vec4f(tone(light), 1.0);
     }
-    let seen = around_probe(point.place, way, 0.10);
-    var light = fresnel(STEEL, cosine) * seen * mix(open, 1.0, 0.3);
-    light += LAMP * highlight(normal, to_eye, 0.25, STEEL) * 0.35;
+    let light = fresnel(STEEL, cosine) * around_probe(point.place, way, 0.08) * open * 1.25;
     return vec4f(tone(light), 1.0);
 }
