@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const SIZE: [u32; 2] = [1280, 800];
-const FRAMES: usize = 15;
+const FRAMES: usize = 40;
 
 struct Bench {
     off_screen: OffScreen,
@@ -37,7 +37,7 @@ impl Bench {
         let rest = vec![0.0; heights.len()];
         let start = Instant::now();
         let field = FieldData::new(dent::NODES, self.dent.spacing_mm(), &heights)?;
-        let field = field.with_rest(&rest)?.with_depth_as_values();
+        let field = field.with_rest(&rest)?;
         self.picture.surface = Arc::new(SurfaceData::Field(field));
         self.picture.level = level;
         self.off_screen.submit(&self.picture, &self.screen);
@@ -75,7 +75,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         // The first frame compiles.
         bench.frame(level)?;
         let times = (0..FRAMES).map(|_| bench.frame(level)).collect::<Result<Vec<_>, _>>()?;
-        let [handed, all] = [0, 1].map(|of| milliseconds(times.iter().map(|one| one[of]).collect()));
+        let [handed, all] =
+            [0, 1].map(|of| milliseconds(times.iter().map(|one| one[of]).collect()));
         println!(
             "draw {:6.1} {:6.1}   hand over {:5.2} {:5.2}   {}",
             all[0],
@@ -85,7 +86,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             bench.off_screen.renderer().possible(level)
         );
     }
-    let mut chooser = LevelChooser::default();
+    let first = bench.off_screen.abilities().first_level;
+    let mut chooser = LevelChooser::starting_at(first);
     let mut last = Vec::new();
     for frame in 0..200 {
         let [_, all] = bench.frame(chooser.level())?;

@@ -251,7 +251,6 @@ mod tests {
         let mut camera = Camera::of([60.0, 60.0]);
         camera.pan(0.25, 0.1);
         let seen = camera.see([30.0, 30.0, 0.0], Eye::Single).unwrap();
-        // The target stays as far away as it was only to first order of the pan along the surface.
         assert!((seen.at[0] - 0.25).abs() < 1e-9 && (seen.at[1] - 0.1).abs() < 1e-9);
     }
 

@@ -27,10 +27,10 @@ pub enum Shading {
 pub const LEVELS: [DetailLevel; 6] = [
     DetailLevel { divisor: 1, samples: 4, every: 1, shading: Shading::Full },
     DetailLevel { divisor: 1, samples: 1, every: 1, shading: Shading::Full },
-    DetailLevel { divisor: 1, samples: 1, every: 1, shading: Shading::Simple },
-    DetailLevel { divisor: 2, samples: 1, every: 1, shading: Shading::Simple },
+    DetailLevel { divisor: 1, samples: 1, every: 2, shading: Shading::Simple },
     DetailLevel { divisor: 2, samples: 1, every: 2, shading: Shading::Simple },
-    DetailLevel { divisor: 3, samples: 1, every: 3, shading: Shading::Simple },
+    DetailLevel { divisor: 2, samples: 1, every: 3, shading: Shading::Simple },
+    DetailLevel { divisor: 3, samples: 1, every: 4, shading: Shading::Simple },
 ];
 
 impl fmt::Display for DetailLevel {
@@ -58,6 +58,8 @@ impl fmt::Display for DetailLevel {
 const FRAMES: usize = 9;
 /// A median above this in ms is too slow: 25 frames/s are 40 ms, less a margin of a fifth.
 const SLOW_MS: f64 = 32.0;
+/// Two frames in a row above this in ms need no median: nine of them would take a second and more.
+const FAR_TOO_SLOW_MS: f64 = 120.0;
 /// A median below this in ms allows a try of the next better level. A display at 60 Hz never shows frames below 16.7 ms,
 /// so the limit is above.
 const FAST_MS: f64 = 20.0;
@@ -111,6 +113,13 @@ impl LevelChooser {
             return self.level();
         }
         self.recent.push(frame_ms);
+        if let [.., before, now] = self.recent[..]
+            && before.min(now) > FAR_TOO_SLOW_MS
+            && self.level + 1 < LEVELS.len()
+        {
+            self.step_down(before.min(now));
+            return self.level();
+        }
         if self.recent.len() < FRAMES {
             return self.level();
         }
@@ -180,8 +189,8 @@ mod tests {
     #[test]
     fn a_slow_adapter_comes_to_the_best_level_that_is_fast_enough() {
         let levels = levels_of([160.0, 90.0, 50.0, 25.0, 17.0, 9.0], 400);
-        assert_eq!(levels[8], 2, "two levels at once where frames take far too long");
-        assert_eq!(levels[17..], [3; 383], "25 ms are neither slow nor fast");
+        assert_eq!(levels[1], 2, "two frames that take far too long are enough");
+        assert_eq!(levels[10..], [3; 390], "25 ms are neither slow nor fast");
     }
 
     #[test]
@@ -243,7 +252,7 @@ mod tests {
         assert_eq!(LEVELS[0].to_string(), "full resolution, 4 samples");
         assert_eq!(
             LEVELS[5].to_string(),
-            "1/3 resolution, one of every 3 nodes along each side, simple shading"
+            "1/3 resolution, one of every 4 nodes along each side, simple shading"
         );
     }
 }

@@ -1,6 +1,6 @@
 //! Pictures without a window.
 
-use crate::gpu::{Output, TissueRenderer, samples_of};
+use crate::gpu::{AdapterAbilities, Output, TissueRenderer};
 use crate::picture::Picture;
 use egui_wgpu::wgpu;
 use thiserror::Error;
@@ -22,14 +22,14 @@ pub struct OffScreen {
     device: wgpu::Device,
     queue: wgpu::Queue,
     renderer: TissueRenderer,
+    abilities: AdapterAbilities,
     adapter: String,
 }
 
 impl OffScreen {
     /// On the adapter that the system gives first. `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` choose nothing here.
     pub fn new() -> Result<Self, OffScreenError> {
-        let instance =
-            wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let options = wgpu::RequestAdapterOptions::default();
         let adapter = pollster::block_on(instance.request_adapter(&options))
             .map_err(|err| OffScreenError::NoAdapter(err.to_string()))?;
@@ -43,14 +43,20 @@ impl OffScreen {
                 OffScreenError::NoDevice { adapter: name.clone(), reason: err.to_string() }
             })?;
         let window = wgpu::TextureFormat::Rgba8Unorm;
-        let renderer = TissueRenderer::new(&device, window, samples_of(&adapter));
-        Ok(Self { device, queue, renderer, adapter: name })
+        let abilities = AdapterAbilities::of(&adapter);
+        let renderer = TissueRenderer::new(&device, window, abilities);
+        Ok(Self { device, queue, renderer, abilities, adapter: name })
     }
 
     /// Name and interface of the adapter.
     #[must_use]
     pub fn adapter(&self) -> &str {
         &self.adapter
+    }
+
+    #[must_use]
+    pub fn abilities(&self) -> AdapterAbilities {
+        self.abilities
     }
 
     #[must_use]
@@ -78,24 +84,45 @@ impl OffScreen {
         self.read(picture, size_px, Output::Normals)
     }
 
+    /// The picture as it comes into a window of so many pixels, enlarged where its level has fewer.
+    pub fn window(
+        &mut self,
+        picture: &Picture,
+        screen: &Screen,
+    ) -> Result<Image<[u8; 4]>, OffScreenError> {
+        let mut encoder = self.encode(picture, screen);
+        let read = self.copy_out(&mut encoder, &screen.texture, 4);
+        self.queue.submit([encoder.finish()]);
+        self.pixels(&read)
+    }
+
     /// Hands a picture to the adapter as the window does, its copy to the screen included, and does not wait.
     pub fn submit(&mut self, picture: &Picture, screen: &Screen) {
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.renderer.prepare(&self.device, &self.queue, &mut encoder, picture, screen.size);
-        {
-            let attachment = wgpu::RenderPassColorAttachment {
-                view: &screen.view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(attachment)],
-                ..wgpu::RenderPassDescriptor::default()
-            });
-            self.renderer.paint(&mut pass);
-        }
+        let encoder = self.encode(picture, screen);
         self.queue.submit([encoder.finish()]);
+    }
+
+    fn encode(&mut self, picture: &Picture, screen: &Screen) -> wgpu::CommandEncoder {
+        let size = [screen.texture.width(), screen.texture.height()];
+        let mut encoder = self.encoder();
+        self.renderer.prepare(&self.device, &self.queue, &mut encoder, picture, size);
+        let attachment = wgpu::RenderPassColorAttachment {
+            view: &screen.view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations::default(),
+        };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(attachment)],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        self.renderer.paint(&mut pass);
+        drop(pass);
+        encoder
+    }
+
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
     /// Waits until all that was handed over is drawn.
@@ -114,10 +141,11 @@ impl OffScreen {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format: wgpu::TextureFormat::Rgba8Unorm,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
-        Screen { view: texture.create_view(&wgpu::TextureViewDescriptor::default()), size }
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Screen { texture, view }
     }
 
     fn read<T: bytemuck::Pod>(
@@ -126,23 +154,35 @@ impl OffScreen {
         size_px: [u32; 2],
         output: Output,
     ) -> Result<Image<T>, OffScreenError> {
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.encoder();
         self.renderer.draw(&self.device, &self.queue, &mut encoder, picture, (size_px, output));
         let lost = || OffScreenError::Read("there is no texture".to_owned());
         let texture = self.renderer.targets().ok_or_else(lost)?;
+        let read = self.copy_out(&mut encoder, texture, size_of::<T>() as u32);
+        self.queue.submit([encoder.finish()]);
+        self.pixels(&read)
+    }
+
+    /// A copy of a texture to where it can be read, of so many bytes to a pixel.
+    fn copy_out(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        texture: &wgpu::Texture,
+        pixel_bytes: u32,
+    ) -> ReadBuffer {
         let size = [texture.width(), texture.height()];
-        let pixel = size_of::<T>() as u32;
-        // Rows of a copy begin at multiples of 256 bytes (WebGPU, "bytesPerRow").
-        let row = (size[0] * pixel).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        // Rows of a copy begin at multiples of 256 bytes (W3C, "WebGPU", bytesPerRow).
+        let alignment = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+        let row_bytes = (size[0] * pixel_bytes).next_multiple_of(alignment);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read"),
-            size: u64::from(row) * u64::from(size[1]),
+            size: u64::from(row_bytes) * u64::from(size[1]),
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
-            bytes_per_row: Some(row),
+            bytes_per_row: Some(row_bytes),
             rows_per_image: None,
         };
         encoder.copy_texture_to_buffer(
@@ -150,9 +190,12 @@ impl OffScreen {
             wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
             texture.size(),
         );
-        self.queue.submit([encoder.finish()]);
+        ReadBuffer { buffer, size, row_bytes }
+    }
+
+    fn pixels<T: bytemuck::Pod>(&self, read: &ReadBuffer) -> Result<Image<T>, OffScreenError> {
         let (sender, receiver) = std::sync::mpsc::sync_channel(1);
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        read.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver waits below.
             let _ = sender.send(result);
         });
@@ -160,21 +203,29 @@ impl OffScreen {
         let failed = |err: String| OffScreenError::Read(err);
         let mapped = receiver.recv().map_err(|err| failed(err.to_string()))?;
         mapped.map_err(|err| failed(err.to_string()))?;
-        let view = buffer.get_mapped_range(..).map_err(|err| failed(err.to_string()))?;
-        let mut pixels = Vec::with_capacity((size[0] * size[1]) as usize);
-        for line in view.chunks_exact(row as usize) {
-            let line = &line[..(size[0] * pixel) as usize];
-            pixels.extend(line.chunks_exact(pixel as usize).map(bytemuck::pod_read_unaligned::<T>));
+        let view = read.buffer.get_mapped_range(..).map_err(|err| failed(err.to_string()))?;
+        let line_bytes = read.size[0] as usize * size_of::<T>();
+        let mut pixels = Vec::with_capacity(read.size[0] as usize * read.size[1] as usize);
+        for line in view.chunks_exact(read.row_bytes as usize) {
+            let line = line[..line_bytes].chunks_exact(size_of::<T>());
+            pixels.extend(line.map(bytemuck::pod_read_unaligned::<T>));
         }
-        Ok(Image { size, pixels })
+        Ok(Image { size: read.size, pixels })
     }
+}
+
+/// A texture on its way to where it can be read.
+struct ReadBuffer {
+    buffer: wgpu::Buffer,
+    size: [u32; 2],
+    row_bytes: u32,
 }
 
 /// A texture in place of a window.
 #[derive(Debug)]
 pub struct Screen {
+    texture: wgpu::Texture,
     view: wgpu::TextureView,
-    size: [u32; 2],
 }
 
 /// Pixels row by row from the top.

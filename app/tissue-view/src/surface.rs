@@ -6,7 +6,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SurfaceError {
     /// Fewer than two nodes along a side, or more than graphics processors take.
-    #[error("a surface of {columns} by {rows} nodes cannot be drawn: from 2 to {most} are possible")]
+    #[error(
+        "a surface of {columns} by {rows} nodes cannot be drawn: from 2 to {most} are possible"
+    )]
     Size { columns: usize, rows: usize, most: usize },
     #[error("there are {given} {what} for {wanted} nodes")]
     Count { what: &'static str, given: usize, wanted: usize },
@@ -38,12 +40,15 @@ pub struct FieldData {
 /// Whether all numbers are finite; the first that is not otherwise.
 fn check_finite(
     what: &'static str,
-    mut numbers: impl Iterator<Item = f64>,
+    numbers: impl Iterator<Item = f64> + Clone,
 ) -> Result<(), SurfaceError> {
-    match numbers.position(|number| !number.is_finite()) {
-        Some(node) => Err(SurfaceError::NotFinite { what, node }),
-        None => Ok(()),
+    // Without a branch for each: a surface is checked in every frame.
+    if numbers.clone().fold(true, |all, number| all & number.is_finite()) {
+        return Ok(());
     }
+    let mut numbers = numbers;
+    let node = numbers.position(|number| !number.is_finite()).unwrap_or_default();
+    Err(SurfaceError::NotFinite { what, node })
 }
 
 fn check_count(what: &'static str, given: usize, wanted: usize) -> Result<(), SurfaceError> {

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 19] = [
+const PACKAGES: [&str; 20] = [
     "model",
     "model/rheology",
     "model/haptics",
@@ -25,6 +25,7 @@ const PACKAGES: [&str; 19] = [
     "app/cli",
     "app/station",
     "app/notifications",
+    "app/tissue-view",
     "app/window",
     "app",
 ];

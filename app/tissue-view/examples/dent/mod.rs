@@ -29,8 +29,7 @@ impl Dent {
         let spacing = SIDE_MM / (NODES - 1) as f64;
         let grid = Grid::new(NODES, NODES, spacing)?;
         let field = HeightField::flat(grid, settings.max_shear_mm)?;
-        let mut surface =
-            Surface::new(field, settings.method, SurfaceRecovery::NONE, settings.cut);
+        let mut surface = Surface::new(field, settings.method, SurfaceRecovery::NONE, settings.cut);
         let middle = SIDE_MM / 2.0;
         let mut contacts = Vec::new();
         for index in 0..grid.nodes() {

@@ -87,8 +87,7 @@ fn write_rows(
         bytes_per_row: Some(row_bytes),
         rows_per_image: None,
     };
-    let size =
-        wgpu::Extent3d { width: texture.width(), height: rows, depth_or_array_layers: 1 };
+    let size = wgpu::Extent3d { width: texture.width(), height: rows, depth_or_array_layers: 1 };
     queue.write_texture(target, bytes, data, size);
 }
 
@@ -122,8 +121,7 @@ impl SceneBuffers {
             min_filter: wgpu::FilterMode::Linear,
             ..wgpu::SamplerDescriptor::default()
         });
-        let ramp =
-            new_texture(device, [RAMP as u32, 1], wgpu::TextureFormat::Rgba8UnormSrgb, READ);
+        let ramp = new_texture(device, [RAMP as u32, 1], wgpu::TextureFormat::Rgba8UnormSrgb, READ);
         let sized = SizedParts::new(device, pipelines, [2; 2], &numbers, &ramp, &sampler);
         Self {
             groups: sized.groups,
@@ -205,14 +203,26 @@ impl SceneBuffers {
         let heights = changed_rows(old, &now.heights, columns);
         if let Some([first, end]) = heights {
             let rows = &now.heights[first * columns..end * columns];
-            write_rows(queue, &self.heights, first as u32, bytemuck::cast_slice(rows), 8 * now.columns);
+            write_rows(
+                queue,
+                &self.heights,
+                first as u32,
+                bytemuck::cast_slice(rows),
+                8 * now.columns,
+            );
         }
         let old = before.map_or(&[][..], |field| &field.values);
         if !now.values.is_empty()
             && let Some([first, end]) = changed_rows(old, &now.values, columns)
         {
             let rows = &now.values[first * columns..end * columns];
-            write_rows(queue, &self.values, first as u32, bytemuck::cast_slice(rows), 4 * now.columns);
+            write_rows(
+                queue,
+                &self.values,
+                first as u32,
+                bytemuck::cast_slice(rows),
+                4 * now.columns,
+            );
         }
         heights.is_some()
     }
@@ -269,10 +279,10 @@ impl SizedParts {
     ) -> Self {
         let heights = new_texture(device, sides, wgpu::TextureFormat::Rg32Float, READ);
         let values = new_texture(device, sides, wgpu::TextureFormat::R32Float, READ);
-        let usage =
-            wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::RENDER_ATTACHMENT;
         let openness = new_texture(device, sides.map(|side| side.div_ceil(2)), OPENNESS, usage);
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let view =
+            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let [heights_view, values_view, openness_view, ramp_view] =
             [&heights, &values, &openness, ramp].map(view);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
@@ -341,7 +351,14 @@ fn field_triangles(device: &wgpu::Device, lines: FieldLines) -> Triangles {
         let [row, next] = [pair[0], pair[1]].map(|row| row * columns);
         for cell in along_x.windows(2) {
             let (low, high) = (cell[0], cell[1]);
-            indices.extend([row + low, row + high, next + high, row + low, next + high, next + low]);
+            indices.extend([
+                row + low,
+                row + high,
+                next + high,
+                row + low,
+                next + high,
+                next + low,
+            ]);
         }
     }
     let contents = bytemuck::cast_slice(&indices);

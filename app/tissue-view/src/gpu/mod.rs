@@ -26,37 +26,61 @@ pub struct TissueRenderer {
     buffers: SceneBuffers,
     targets: Option<Targets>,
     copy: CopyPipeline,
-    /// Samples per pixel that the adapter allows.
     samples: u32,
     /// How the share of the sky was computed last; `None` before.
     openness: Option<Shading>,
 }
 
-/// Samples per pixel that an adapter allows for pictures: 4 or 1.
-#[must_use]
-pub fn samples_of(adapter: &wgpu::Adapter) -> u32 {
-    let allows = |format| {
-        let flags = adapter.get_texture_format_features(format).flags;
-        flags.sample_count_supported(4)
-    };
-    let resolves = adapter
-        .get_texture_format_features(pipelines::COLOUR)
-        .flags
-        .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
-    if resolves && allows(pipelines::COLOUR) && allows(pipelines::DEPTH) { 4 } else { 1 }
+/// What an adapter can do that not all can.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AdapterAbilities {
+    /// Samples per pixel: 4 or 1.
+    samples: u32,
+    /// Whether a texture may be read in another format than it is drawn in, which spares the copy its arithmetic.
+    has_views: bool,
+    /// Where [`LevelChooser`](crate::LevelChooser) should begin, counted in [`LEVELS`](crate::LEVELS).
+    pub first_level: usize,
 }
 
-impl TissueRenderer {
-    /// For copies into a window of a format, with the samples that [`samples_of`] gives.
+impl AdapterAbilities {
     #[must_use]
-    pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat, samples: u32) -> Self {
+    pub fn of(adapter: &wgpu::Adapter) -> Self {
+        let allows =
+            |format, flag| adapter.get_texture_format_features(format).flags.contains(flag);
+        let has_samples =
+            allows(pipelines::COLOUR, wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4)
+                && allows(pipelines::COLOUR, wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE)
+                && allows(pipelines::DEPTH, wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4);
+        let flags = adapter.get_downlevel_capabilities().flags;
+        Self {
+            samples: if has_samples { 4 } else { 1 },
+            has_views: flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS),
+            first_level: match adapter.get_info().device_type {
+                wgpu::DeviceType::Cpu => FIRST_OF_SOFTWARE,
+                _ => 0,
+            },
+        }
+    }
+}
+
+/// A software renderer takes a second for a picture of the best level.
+const FIRST_OF_SOFTWARE: usize = 3;
+
+impl TissueRenderer {
+    /// For copies into a window of a format.
+    #[must_use]
+    pub fn new(
+        device: &wgpu::Device,
+        window: wgpu::TextureFormat,
+        abilities: AdapterAbilities,
+    ) -> Self {
         let pipelines = Pipelines::new(device);
         Self {
             buffers: SceneBuffers::new(device, &pipelines),
             pipelines,
             targets: None,
-            copy: CopyPipeline::new(device, window),
-            samples,
+            copy: CopyPipeline::new(device, window, abilities.has_views),
+            samples: abilities.samples,
             openness: None,
         }
     }

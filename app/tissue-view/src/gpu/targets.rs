@@ -28,7 +28,7 @@ pub(super) struct Targets {
 impl Targets {
     pub fn new(device: &wgpu::Device, copy: &CopyPipeline, shape: TargetShape) -> Self {
         let [width, height] = shape.size;
-        let new = |format, sample_count, usage| {
+        let new = |format, sample_count, usage, view_formats: &[wgpu::TextureFormat]| {
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
                 size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
@@ -37,23 +37,28 @@ impl Targets {
                 dimension: wgpu::TextureDimension::D2,
                 format,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
+                view_formats,
             })
         };
-        let view = |texture: &wgpu::Texture| {
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
+        let view =
+            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let format = if shape.output == Output::Colours { COLOUR } else { NORMAL };
         let none = wgpu::TextureUsages::empty();
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let picture = new(format, 1, read);
+        let is_picture = shape.output == Output::Colours;
+        let raw = copy.reads.filter(|_| is_picture);
+        let picture = new(format, 1, read, raw.as_slice());
         let picture_view = view(&picture);
-        let has_group = shape.output == Output::Colours;
+        let read_view = picture.create_view(&wgpu::TextureViewDescriptor {
+            format: raw,
+            usage: raw.map(|_| wgpu::TextureUsages::TEXTURE_BINDING),
+            ..wgpu::TextureViewDescriptor::default()
+        });
         Self {
             shape,
-            depth: view(&new(DEPTH, shape.samples, none)),
-            samples: (shape.samples > 1).then(|| view(&new(format, shape.samples, none))),
-            group: has_group.then(|| copy.group(device, &picture_view)),
+            depth: view(&new(DEPTH, shape.samples, none, &[])),
+            samples: (shape.samples > 1).then(|| view(&new(format, shape.samples, none, &[]))),
+            group: is_picture.then(|| copy.group(device, &read_view)),
             view: picture_view,
             picture,
         }
@@ -99,13 +104,17 @@ pub(super) struct CopyPipeline {
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
     sampler: wgpu::Sampler,
+    /// The format in which the picture is read, where it is another than that in which it is drawn: a window that takes
+    /// values as a display does gets them as they are.
+    reads: Option<wgpu::TextureFormat>,
 }
 
 impl CopyPipeline {
-    pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat) -> Self {
+    pub fn new(device: &wgpu::Device, window: wgpu::TextureFormat, has_views: bool) -> Self {
+        let reads = (has_views && !window.is_srgb()).then_some(COLOUR.remove_srgb_suffix());
         let layout = layout(device, &[binding(0, texture(true)), binding(1, SAMPLER)]);
         let shader = shader(device, "copy", &[include_str!("../shaders/copy.wgsl")]);
-        let is_encoded = f64::from(u8::from(!window.is_srgb()));
+        let is_encoded = f64::from(u8::from(!window.is_srgb() && reads.is_none()));
         let parts = PipelineParts {
             layout: &layout,
             shader: &shader,
@@ -123,7 +132,7 @@ impl CopyPipeline {
             min_filter: wgpu::FilterMode::Linear,
             ..wgpu::SamplerDescriptor::default()
         });
-        Self { layout, pipeline, sampler }
+        Self { layout, pipeline, sampler, reads }
     }
 
     fn group(&self, device: &wgpu::Device, picture: &wgpu::TextureView) -> wgpu::BindGroup {

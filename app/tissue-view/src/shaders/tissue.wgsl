@@ -104,7 +104,7 @@ fn soft_light(normal: vec3f, lamp: f32, open: f32, colour: vec3f) -> vec3f {
     let facing = dot(normal, scene.light.xyz);
     let bent = clamp((facing + ROUND) / (1.0 + ROUND), vec3f(0.0), vec3f(1.0));
     // A shadow's edge is red for the same reason.
-    let shadow = pow(vec3f(lamp), vec3f(0.75, 1.05, 1.1));
+    let shadow = vec3f(lamp) + vec3f(0.25, -0.04, -0.08) * lamp * (1.0 - lamp);
     return colour * (LAMP * 0.36 * bent * shadow + sky_on(normal) * 0.62 * coloured(open, colour));
 }
 
@@ -144,12 +144,15 @@ fn tissue_colour(point: SurfacePoint) -> @location(0) vec4f {
 
 // What the film of water returns: the lamp in it, the room, and the probe.
 fn wet_light(place: vec3f, normal: vec3f, to_eye: vec3f, lamp: f32, fold: f32, near_share: f32) -> vec3f {
-    let shine = highlight(scene.light.xyz, normal, to_eye, 0.40, WATER);
     let mirrored = fresnel(WATER, max(dot(normal, to_eye), 0.0));
     if (!IS_FULL) {
-        let gloss = highlight(scene.light.xyz, normal, to_eye, 0.25, WATER);
-        return LAMP * lamp * (shine + gloss) + mirrored * 0.6 * SKY * fold;
+        // The window alone, wider than it is.
+        let middle = normalize(scene.window.xyz + to_eye);
+        let turn = max(dot(middle, normal), 0.0);
+        let eight = turn * turn * turn * turn * turn * turn * turn * turn;
+        return mirrored * (0.6 * SKY + vec3f(3.4, 3.6, 3.8) * eight * eight * eight * eight * eight * eight * lamp) * fold;
     }
+    let shine = highlight(scene.light.xyz, normal, to_eye, 0.40, WATER);
     var light = LAMP * lamp * (shine + highlight(scene.light.xyz, normal, to_eye, 0.2, WATER) * 1.5);
     var way = reflect(-to_eye, normal);
     way = normalize(vec3f(way.xy, max(way.z, 0.02)));
@@ -195,7 +198,11 @@ fn around_probe(place: vec3f, way: vec3f, roughness: f32) -> vec3f {
     let inside = smoothstep(vec2f(-edge), vec2f(edge), min(hit, last - hit));
     // In the contact's own shade the tissue is dark and red.
     let lit = smoothstep(0.0, 1.8 * scene.probe.w, fall);
-    let tissue = TISSUE * mix(vec3f(0.16, 0.07, 0.06), vec3f(1.15, 1.3, 1.3), lit);
+    var tissue = TISSUE * mix(vec3f(0.16, 0.07, 0.06), vec3f(1.15, 1.3, 1.3), lit);
+    if (scene.colour.z > 0.5) {
+        let seen = vec2i(clamp(hit / scene.grid.z + 0.5, vec2f(0.0), scene.grid.xy - 1.0));
+        tissue = ramp_at(textureLoad(scalars, seen, 0).x) * (0.15 + 0.6 * lit);
+    }
     return mix(high, tissue, inside.x * inside.y * smoothstep(0.0, 0.12, -way.z));
 }
 
