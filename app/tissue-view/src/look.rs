@@ -66,7 +66,7 @@ impl Default for ColourRamp {
 pub enum SurfaceColours {
     /// Moist tissue. Its texture of moisture and vessels is no data.
     Tissue { has_texture: bool },
-    /// The values of the nodes, from the least to the greatest colour.
+    /// The values of the nodes, from the least to the greatest colour. A field without values is drawn as tissue.
     Values { range: [f64; 2] },
 }
 

@@ -9,6 +9,14 @@ use crate::surface::{FieldData, SurfaceData};
 use egui_wgpu::wgpu::{self, util::DeviceExt as _};
 use std::sync::Arc;
 
+/// What an upload changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct UploadedChanges {
+    pub heights: bool,
+    /// Anything that the picture shows, heights among it.
+    pub any: bool,
+}
+
 /// Triangles with their count of indices.
 #[derive(Debug)]
 pub(super) struct Triangles {
@@ -141,39 +149,42 @@ impl SceneBuffers {
         }
     }
 
-    /// Uploads what differs from what is there. Whether heights changed.
+    /// Uploads what differs from what is there.
     pub fn update(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         pipelines: &Pipelines,
         picture: &Picture,
-    ) -> bool {
+    ) -> UploadedChanges {
+        let mut changes = UploadedChanges::default();
         if self.shown_ramp.as_ref() != Some(&picture.look.ramp) {
             write_rows(queue, &self.ramp, 0, &picture.look.ramp.texels(), 4 * RAMP as u32);
             self.shown_ramp = Some(picture.look.ramp.clone());
+            changes.any = true;
         }
-        self.update_probe(device, picture);
+        changes.any |= self.update_probe(device, picture);
         let before = self.shown.replace(Arc::clone(&picture.surface));
         let is_same = before.as_ref().is_some_and(|one| Arc::ptr_eq(one, &picture.surface));
         match &*picture.surface {
             SurfaceData::Field(field) => {
-                self.update_lines(device, field, picture);
+                changes.any |= self.update_lines(device, field, picture);
                 if is_same {
-                    return false;
+                    return changes;
                 }
                 let before = before.as_deref().and_then(|one| match one {
                     SurfaceData::Field(field) => Some(field),
                     SurfaceData::Mesh(_) => None,
                 });
-                self.update_field(device, queue, pipelines, before, field)
+                let field = self.update_field(device, queue, pipelines, before, field);
+                UploadedChanges { heights: field.heights, any: changes.any | field.any }
             }
             SurfaceData::Mesh(mesh) => {
                 if !is_same {
                     self.lines = None;
                     self.surface = triangles(device, &mesh.nodes, &mesh.indices);
                 }
-                false
+                UploadedChanges { heights: false, any: changes.any | !is_same }
             }
         }
     }
@@ -185,7 +196,7 @@ impl SceneBuffers {
         pipelines: &Pipelines,
         before: Option<&FieldData>,
         now: &FieldData,
-    ) -> bool {
+    ) -> UploadedChanges {
         let sides = [now.columns, now.rows];
         let mut before = before;
         if [self.heights.width(), self.heights.height()] != sides {
@@ -212,9 +223,8 @@ impl SceneBuffers {
             );
         }
         let old = before.map_or(&[][..], |field| &field.values);
-        if !now.values.is_empty()
-            && let Some([first, end]) = changed_rows(old, &now.values, columns)
-        {
+        let values = changed_rows(old, &now.values, columns).filter(|_| !now.values.is_empty());
+        if let Some([first, end]) = values {
             let rows = &now.values[first * columns..end * columns];
             write_rows(
                 queue,
@@ -224,10 +234,18 @@ impl SceneBuffers {
                 4 * now.columns,
             );
         }
-        heights.is_some()
+        UploadedChanges {
+            heights: heights.is_some(),
+            any: heights.is_some() || values.is_some() || old.len() != now.values.len(),
+        }
     }
 
-    fn update_lines(&mut self, device: &wgpu::Device, field: &FieldData, picture: &Picture) {
+    fn update_lines(
+        &mut self,
+        device: &wgpu::Device,
+        field: &FieldData,
+        picture: &Picture,
+    ) -> bool {
         let sides = [field.columns, field.rows];
         let every = picture.level.every.max(1);
         let kept = match &picture.probe {
@@ -238,24 +256,27 @@ impl SceneBuffers {
             _ => [0; 2],
         };
         let lines = FieldLines { sides, every, kept };
-        if self.lines == Some(lines) {
-            return;
+        let is_new = self.lines != Some(lines);
+        if is_new {
+            self.lines = Some(lines);
+            self.surface = Some(field_triangles(device, lines));
         }
-        self.lines = Some(lines);
-        self.surface = Some(field_triangles(device, lines));
+        is_new
     }
 
-    fn update_probe(&mut self, device: &wgpu::Device, picture: &Picture) {
+    fn update_probe(&mut self, device: &wgpu::Device, picture: &Picture) -> bool {
         let size = picture.surface.size_mm();
         let shape = |probe: &Probe| (probe.radius, probe.kind, size);
         let now = picture.probe.as_ref().map(shape);
-        if now.is_some() && now != self.probe_shape {
+        let is_new = now.is_some() && now != self.probe_shape;
+        if is_new {
             self.probe_shape = now;
             self.probe = picture.probe.as_ref().and_then(|probe| {
                 let (nodes, indices) = probe.triangles(size);
                 triangles(device, &nodes, &indices)
             });
         }
+        is_new
     }
 }
 

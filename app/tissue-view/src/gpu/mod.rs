@@ -29,6 +29,16 @@ pub struct TissueRenderer {
     samples: u32,
     /// How the share of the sky was computed last; `None` before.
     openness: Option<Shading>,
+    drawn: Option<DrawnPicture>,
+}
+
+/// What the picture in the targets was drawn of, but for what the buffers have.
+#[derive(Clone, Debug, PartialEq)]
+struct DrawnPicture {
+    numbers: Vec<[[f32; 4]; uniforms::ROWS]>,
+    parts: Vec<Part>,
+    shape: targets::TargetShape,
+    shading: Shading,
 }
 
 /// What an adapter can do that not all can.
@@ -82,6 +92,7 @@ impl TissueRenderer {
             copy: CopyPipeline::new(device, window, abilities.has_views),
             samples: abilities.samples,
             openness: None,
+            drawn: None,
         }
     }
 
@@ -127,18 +138,27 @@ impl TissueRenderer {
         if self.targets.as_ref().is_none_or(|targets| targets.shape != shape) {
             self.targets = Some(Targets::new(device, &self.copy, shape));
         }
-        let has_changed = self.buffers.update(device, queue, &self.pipelines, picture);
+        let changes = self.buffers.update(device, queue, &self.pipelines, picture);
         let eyes = picture.eyes.eyes();
         let eye_size = [(size[0] / eyes.len() as u32).max(1), size[1]];
-        for (&eye, buffer) in eyes.iter().zip(&self.buffers.numbers) {
-            let numbers = uniforms::of(picture, eye, eye_size);
+        let drawn = DrawnPicture {
+            numbers: eyes.iter().map(|&eye| uniforms::of(picture, eye, eye_size)).collect(),
+            parts: parts_of(picture),
+            shape,
+            shading: level.shading,
+        };
+        if !changes.any && self.drawn.as_ref() == Some(&drawn) {
+            return;
+        }
+        for (numbers, buffer) in drawn.numbers.iter().zip(&self.buffers.numbers) {
             queue.write_buffer(buffer, 0, bytemuck::cast_slice(numbers.as_flattened()));
         }
         let is_field = matches!(*picture.surface, SurfaceData::Field(_));
-        if is_field && (has_changed || self.openness != Some(level.shading)) {
+        if is_field && (changes.heights || self.openness != Some(level.shading)) {
             self.compute_openness(device, encoder, level.shading);
         }
-        let parts = parts_of(picture);
+        let parts = drawn.parts.clone();
+        self.drawn = Some(drawn);
         for &part in &parts {
             let key = PipelineKey { part, samples, shading: level.shading, output };
             self.pipelines.make(device, key);

@@ -56,9 +56,14 @@ pub(super) fn of(picture: &Picture, eye: Eye, [wide, high]: [u32; 2]) -> [[f32; 
     } else {
         rows[8] = [0.0, 0.0, 1.0, 1.0];
     }
+    let has_values = match &*picture.surface {
+        SurfaceData::Field(field) => !field.values.is_empty(),
+        SurfaceData::Mesh(_) => true,
+    };
     let (range, is_data, has_texture) = match look.colours {
         SurfaceColours::Tissue { has_texture } => ([0.0, 1.0], 0.0, has_texture),
-        SurfaceColours::Values { range } => (range, 1.0, false),
+        SurfaceColours::Values { range } if has_values => (range, 1.0, false),
+        SurfaceColours::Values { .. } => ([0.0, 1.0], 0.0, false),
     };
     // A range without length has one colour.
     let greatest = if range[1] > range[0] { range[1] } else { range[0] + 1.0 };
