@@ -26,6 +26,7 @@ const PACKAGES: [&str; 20] = [
     "app/cli",
     "app/station",
     "app/notifications",
+    "app/tissue-view",
     "app/window",
     "app",
 ];

@@ -1,0 +1,29 @@
+//! The picture of a deforming surface and a probe, drawn by the graphics processor, for the window and off the screen.
+//!
+//! The picture shows the numbers that it is given. Heights and places go to the graphics processor as they are; normals are central
+//! differences of the heights; nothing is smoothed. It never reads a clock, a file or a scene: times, surfaces and
+//! colours are handed in. Lengths are in mm, z is up, tissue is below.
+//!
+//! Start at [`Picture`], then `src/gpu/mod.rs`; the looks are in `src/shaders/tissue.wgsl`.
+
+mod callback;
+mod camera;
+mod gpu;
+mod legend;
+mod level;
+mod look;
+mod off_screen;
+mod picture;
+mod probe;
+mod surface;
+
+pub use callback::TissueCallback;
+pub use camera::{Camera, Eye, FIELD_OF_VIEW, ProjectedPoint, Vec3};
+pub use gpu::{AdapterAbilities, TissueRenderer};
+pub use legend::{Legend, LegendTick};
+pub use level::{DetailLevel, LEVELS, LevelChooser, Shading};
+pub use look::{ColourRamp, Look, Rgb, SurfaceColours};
+pub use off_screen::{Image, OffScreen, OffScreenError, Screen};
+pub use picture::{EyeLayout, Picture};
+pub use probe::{Probe, ProbeError, ProbeKind};
+pub use surface::{FieldData, MeshData, SurfaceData, SurfaceError};
