@@ -14,15 +14,25 @@ pub(super) type Shares = [f64; MOST_MATERIALS];
 pub enum MaterialError {
     #[error("a mesh of {0} materials is not possible; give from 1 to 8 force models")]
     Count(usize),
-    #[error("vertex {vertex} has material {material}, but there are {materials}, counted from 0; add a force model or correct the map")]
+    #[error(
+        "vertex {vertex} has material {material}, but there are {materials}, counted from 0; add a force model or correct the map"
+    )]
     Material { vertex: usize, material: usize, materials: usize },
-    #[error("the map of materials names vertex {vertex}, but the file of the mesh has {vertices}, counted from 0; correct the map")]
+    #[error(
+        "the map of materials names vertex {vertex}, but the file of the mesh has {vertices}, counted from 0; correct the map"
+    )]
     Vertex { vertex: usize, vertices: usize },
-    #[error("line {line} of the map of materials is '{text}'; write a vertex and a material, such as '17,1', and if needed a weight")]
+    #[error(
+        "line {line} of the map of materials is '{text}'; write a vertex and a material, such as '17,1', and if needed a weight"
+    )]
     Line { line: usize, text: String },
-    #[error("the colours give {given} values for {vertices} vertices; give one colour for each vertex of the file")]
+    #[error(
+        "the colours give {given} values for {vertices} vertices; give one colour for each vertex of the file"
+    )]
     Colours { given: usize, vertices: usize },
-    #[error("vertex {0} has no red, green or blue that is above zero; paint it in the colour of a material")]
+    #[error(
+        "vertex {0} has no red, green or blue that is above zero; paint it in the colour of a material"
+    )]
     Unpainted(usize),
 }
 
@@ -42,7 +52,11 @@ impl MaterialMap {
 
     /// From colours of the file's vertices: red, green and blue are the shares of the first, second and third material, whatever the
     /// brightness. Where vertices at one place differ, their mean counts.
-    pub fn from_colours(mesh: &TriangleMesh, colours: &[[f64; 3]], materials: usize) -> Result<Self, MaterialError> {
+    pub fn from_colours(
+        mesh: &TriangleMesh,
+        colours: &[[f64; 3]],
+        materials: usize,
+    ) -> Result<Self, MaterialError> {
         check_count(materials)?;
         let vertices = mesh.vertex_of_file().len();
         if colours.len() != vertices {
@@ -66,7 +80,11 @@ impl MaterialMap {
 
     /// From lines `vertex,material` or `vertex,material,weight`, both counted from 0 in the order of the mesh's file; the first line may be
     /// a heading. Vertices that no line names are of the first material.
-    pub fn from_csv(mesh: &TriangleMesh, text: &str, materials: usize) -> Result<Self, MaterialError> {
+    pub fn from_csv(
+        mesh: &TriangleMesh,
+        text: &str,
+        materials: usize,
+    ) -> Result<Self, MaterialError> {
         check_count(materials)?;
         let vertices = mesh.vertex_of_file().len();
         let mut sums = vec![[0.0; MOST_MATERIALS]; mesh.points().len()];
@@ -128,7 +146,11 @@ fn first_alone() -> Shares {
 }
 
 fn check_count(materials: usize) -> Result<(), MaterialError> {
-    if (1..=MOST_MATERIALS).contains(&materials) { Ok(()) } else { Err(MaterialError::Count(materials)) }
+    if (1..=MOST_MATERIALS).contains(&materials) {
+        Ok(())
+    } else {
+        Err(MaterialError::Count(materials))
+    }
 }
 
 fn csv_line(line: &str) -> Option<(usize, usize, f64)> {

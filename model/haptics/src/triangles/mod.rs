@@ -30,7 +30,7 @@ pub use blend::{BlendError, BlendTick, BlendedLaw};
 pub use dent::{Dent, DentSettings, DentTick};
 pub use error::TriangleMeshError;
 pub use geodesic::GeodesicDistance;
-pub use materials::{MaterialError, MaterialMap, MOST_MATERIALS};
+pub use materials::{MOST_MATERIALS, MaterialError, MaterialMap};
 pub use mesh::{LARGEST_MM, MOST_FACES, SMALLEST_MM, SurfacePoint, TriangleMesh, TriangleSoup};
 pub use proxy::{FAR_MM, MeshProxy, MeshTouch, Shading};
 pub use touch_loop::{MeshTick, MeshTouchError, MeshTouchLoop, MeshTouchSettings};

@@ -104,9 +104,11 @@ impl MeshProxy {
             if !is_left(mesh, &goal, side, device) {
                 return Some((goal, at, side));
             }
-            let hit = mesh.tree.first_hit(mesh, goal.point, device, |face| touches(mesh, &goal, face))?;
+            let hit =
+                mesh.tree.first_hit(mesh, goal.point, device, |face| touches(mesh, &goal, face))?;
             side = side_of(mesh, hit.face, minus(device, goal.point));
-            at = SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
+            at =
+                SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
         }
         // Between surfaces nearer than roundings: it stays where it came to.
         Some((at, at, side))
@@ -126,7 +128,8 @@ impl MeshProxy {
             && let Some(hit) = mesh.first_hit(last, device)
         {
             let side = side_of(mesh, hit.face, minus(device, last));
-            let at = SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
+            let at =
+                SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
             return self.held(mesh, at, side, device);
         }
         None
@@ -176,7 +179,11 @@ impl MeshProxy {
         self.clearance = 0.0;
         MeshTouch {
             touch: ProxyTouch {
-                state: if is_still && self.friction > 0.0 { TouchState::Sticks } else { TouchState::Slides },
+                state: if is_still && self.friction > 0.0 {
+                    TouchState::Sticks
+                } else {
+                    TouchState::Slides
+                },
                 point: at.point,
                 depth,
                 normal,
@@ -272,7 +279,8 @@ fn flat_normal(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector
     }
     let way = minus(at.point, device);
     let normal = mesh.normal_for_sign(at);
-    let normal = unit(normal).unwrap_or(mesh.face_normals[at.face as usize]).map(|part| side * part);
+    let normal =
+        unit(normal).unwrap_or(mesh.face_normals[at.face as usize]).map(|part| side * part);
     // Below a nanometre the direction is one of roundings.
     if length(way) > STILL_MM { unit(way).unwrap_or(normal) } else { normal }
 }
@@ -281,7 +289,12 @@ fn flat_normal(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector
 ///
 /// Steps go to the foot of the device on the plane of the normal; how far is from the steps before (Barzilai & Borwein, "Two-point step
 /// size gradient methods", IMA J. Numer. Anal. 8 (1988) 141-148), since a hollow needs less than the whole step and a dome more.
-fn shaded(mesh: &TriangleMesh, from: SurfacePoint, side: f64, device: Vector) -> (SurfacePoint, Vector) {
+fn shaded(
+    mesh: &TriangleMesh,
+    from: SurfacePoint,
+    side: f64,
+    device: Vector,
+) -> (SurfacePoint, Vector) {
     let miss = |at: &SurfacePoint| {
         let normal = mesh.shaded_normal(at.face, at.point).map(|part| side * part);
         let way = minus(device, at.point);

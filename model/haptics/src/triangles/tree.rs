@@ -55,7 +55,12 @@ impl Tree {
         self.boxes.first().map_or([[0.0; 3]; 2], |root| [root.low, root.high])
     }
 
-    pub(super) fn nearest(&self, mesh: &TriangleMesh, place: Vector, within: f64) -> Option<SurfacePoint> {
+    pub(super) fn nearest(
+        &self,
+        mesh: &TriangleMesh,
+        place: Vector,
+        within: f64,
+    ) -> Option<SurfacePoint> {
         let mut best = None;
         let mut least = within * within;
         let mut waiting = [(0u32, 0.0f64); WAITING];
@@ -79,7 +84,8 @@ impl Tree {
                 }
                 continue;
             }
-            let [near, far] = [index + 1, one.first].map(|child| (child, self.boxes[child as usize].gap(place)));
+            let [near, far] =
+                [index + 1, one.first].map(|child| (child, self.boxes[child as usize].gap(place)));
             let (near, far) = if near.1 <= far.1 { (near, far) } else { (far, near) };
             for child in [far, near] {
                 if child.1 <= least && count < WAITING {
@@ -138,8 +144,8 @@ impl TreeBox {
     #[inline]
     fn gap(&self, place: Vector) -> f64 {
         let mut sum = 0.0;
-        for axis in 0..3 {
-            let gap = (self.low[axis] - place[axis]).max(place[axis] - self.high[axis]).max(0.0);
+        for ((low, high), at) in self.low.iter().zip(&self.high).zip(&place) {
+            let gap = (low - at).max(at - high).max(0.0);
             sum += gap * gap;
         }
         sum
