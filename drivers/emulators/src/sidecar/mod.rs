@@ -415,7 +415,7 @@ impl EmulatedSidecar {
         let mut sample = SidecarSample {
             ticks: self.ticks(),
             counts: Some((counts as i32).clamp(-COUNTS_MAX - 1, COUNTS_MAX)),
-            pulses: Some(pulses + self.pulse_error),
+            pulses: Some(pulses.saturating_add(self.pulse_error)),
             status: self.status().0,
             values: if has_values { self.values() } else { Vec::new() },
         };

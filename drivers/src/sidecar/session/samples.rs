@@ -30,6 +30,10 @@ impl SidecarSession {
             let why = "the sidecar sends counts beyond its converter; correct its program";
             return self.on_impossible(now, why);
         }
+        if !sample.has_possible_pulses() {
+            let why = "the sidecar sends a position beyond 2147483647 pulses; correct its program";
+            return self.on_impossible(now, why);
+        }
         let time = match self.board_clock.take(now, sample.ticks) {
             BoardTime::Repeated => return self.on_garbled(now),
             BoardTime::At(time) => time,

@@ -86,6 +86,27 @@ fn a_small_jump_is_left_to_the_path() {
 }
 
 #[test]
+fn a_position_beyond_every_counter_is_no_reading_and_overflows_nothing() {
+    let is_possible = |host: &Host| {
+        let pulses = host.readings.iter().map(|reading| reading.pulses.unsigned_abs());
+        pulses.max().unwrap_or(0) < 1 << 32
+    };
+    let mut host = moving();
+    lie(&mut host, SidecarLie::Jump(1 << 31));
+    host.pass(0.5);
+    assert!(stands(&host) && is_possible(&host));
+    assert!(host.faults[0].to_string().contains("2147483647 pulses"), "{:?}", host.faults);
+    // From the first sample on.
+    let wire = Shared::new(Emulated::default());
+    wire.lock().emulator.set_lie(Some(SidecarLie::Jump(i64::MAX)));
+    let mut host = Host::on(wire);
+    host.send(RigCommand::DefinePosition { pulses: -1 });
+    host.pass(0.1);
+    assert_eq!(host.readings, []);
+    assert!(host.faults.iter().any(|fault| fault.to_string().contains("cannot be defined")));
+}
+
+#[test]
 fn a_motion_that_is_acknowledged_and_not_made_is_reported() {
     let mut host = Host::new();
     host.tell(RigCommand::EnableMotor);
