@@ -120,6 +120,23 @@ fn drive(file: &RigFile) -> Result<(), String> {
     Ok(())
 }
 
+/// With a motor of the test's own: neither ophyd-async nor its packages are needed.
+#[test]
+fn the_ophyd_example_never_moves_after_a_stop() {
+    if skip::lacks_program("python3") {
+        return;
+    }
+    let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let output = Command::new("python3")
+        .arg(crate_folder.join("tests/suite/ophyd_axis.py"))
+        .arg(crate_folder.join("sidecar/python"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+}
+
 /// The sketch on this computer, behind a pseudo-terminal.
 struct EmulatedBoard(std::process::Child);
 
