@@ -189,9 +189,10 @@ class Sidecar:
         """Sends samples until the axis stands, for most of the time that palpate leaves a program to end."""
         until = time.monotonic() + 0.4
         while self.moving() and time.monotonic() < until:
-            time.sleep(1.0 / self.rate)
-            if self._sending:
-                self._send_sample()
+            time.sleep(min(0.05, 1.0 / self.rate))
+            with contextlib.suppress(Exception):  # the link may be gone, and the axis still brakes
+                if self._sending:
+                    self._send_sample()
 
     def _read(self, source):
         try:

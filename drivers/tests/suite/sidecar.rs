@@ -124,6 +124,23 @@ fn drive(file: &RigFile) -> Result<(), String> {
     Ok(())
 }
 
+#[test]
+fn the_python_skeleton_brakes_and_ends_well_when_only_its_output_is_closed() {
+    if skip::lacks_program("python3") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    let output = Command::new("python3")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/closed_output.py"))
+        .args(["python3", "stage.py"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+}
+
 /// With a motor of the test's own: neither ophyd-async nor its packages are needed.
 #[test]
 fn the_ophyd_example_never_moves_after_a_stop() {
