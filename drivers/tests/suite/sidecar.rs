@@ -124,38 +124,39 @@ fn drive(file: &RigFile) -> Result<(), String> {
     Ok(())
 }
 
-#[test]
-fn the_python_skeleton_brakes_and_ends_well_when_only_its_output_is_closed() {
+/// Runs a script of this folder, with words behind it; what fails there fails here.
+fn run_script(script: &str, words: &[&str], folder: &Path) {
     if skip::lacks_program("python3") {
         return;
     }
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), SkeletonLanguage::Python);
     let output = Command::new("python3")
-        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/closed_output.py"))
-        .args(["python3", "stage.py"])
-        .current_dir(folder.path())
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite").join(script))
+        .args(words)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(folder)
         .output()
         .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{errors}");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_python_skeleton_brakes_and_ends_well_when_only_its_output_is_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    run_script("closed_output.py", &["python3", "stage.py"], folder.path());
+}
+
+#[test]
+fn a_python_sidecar_on_tcp_is_not_kept_by_a_peer_that_vanished() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    run_script("tcp_sidecar.py", &["."], folder.path());
 }
 
 /// With a motor of the test's own: neither ophyd-async nor its packages are needed.
 #[test]
 fn the_ophyd_example_never_moves_after_a_stop() {
-    if skip::lacks_program("python3") {
-        return;
-    }
-    let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let output = Command::new("python3")
-        .arg(crate_folder.join("tests/suite/ophyd_axis.py"))
-        .arg(crate_folder.join("sidecar/python"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .output()
-        .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{errors}");
+    run_script("ophyd_axis.py", &["sidecar/python"], Path::new(env!("CARGO_MANIFEST_DIR")));
 }
 
 /// The sketch on this computer, behind a pseudo-terminal.
