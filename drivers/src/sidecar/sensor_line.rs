@@ -65,11 +65,11 @@ impl SensorLine {
         let ReceivedItem::Message(message) = item else {
             return self.on_garbled();
         };
-        self.garbled_in_row = 0;
         match message {
             SidecarMessage::Sample(sample) => self.on_sample(now, &sample),
             SidecarMessage::Ok { number, .. } => {
                 if let Some((_, sent)) = self.beat.take_if(|(sent, _)| *sent == number) {
+                    self.garbled_in_row = 0;
                     self.stats.push(now.since(sent));
                 }
             }
@@ -105,6 +105,7 @@ impl SensorLine {
             BoardTime::At(time) => time,
             BoardTime::Restarted(_) => return self.end("the sidecar's clock ran back".into()),
         };
+        self.garbled_in_row = 0;
         self.sampled_at = now;
         let mapped = self.host_clock.map(time, now);
         let half = Nanos(self.stats.round_trip_min.0 / 2);

@@ -101,6 +101,8 @@ pub struct EmulatedSidecar {
     pulse_error: i64,
     /// Ticks that its clock has jumped.
     tick_error: i64,
+    /// Where its clock stands still.
+    stuck_tick: u32,
 }
 
 impl EmulatedSidecar {
@@ -130,6 +132,7 @@ impl EmulatedSidecar {
             lie: None,
             pulse_error: 0,
             tick_error: 0,
+            stuck_tick: 0,
         };
         sidecar.say_boot();
         sidecar

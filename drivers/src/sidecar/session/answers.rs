@@ -16,7 +16,6 @@ impl SidecarSession {
         let ReceivedItem::Message(message) = item else {
             return self.on_garbled(now);
         };
-        self.garbled_in_row = 0;
         match message {
             SidecarMessage::Sample(sample) => self.on_sample(now, &sample),
             SidecarMessage::Ok { number, .. } => self.on_ok(now, number),
@@ -54,11 +53,17 @@ impl SidecarSession {
         Some(self.pending.remove(index))
     }
 
+    /// An answer that was waited for has come.
+    fn note_answer(&mut self, now: Nanos) {
+        self.answered_at = now;
+        self.garbled_in_row = 0;
+    }
+
     fn on_ok(&mut self, now: Nanos, number: u64) {
         let Some(pending) = self.take_pending(number) else {
             return;
         };
-        self.answered_at = now;
+        self.note_answer(now);
         // Of a stop that was repeated it is not known which line is answered.
         if pending.numbers.len() == 1 {
             self.stats.push(now.since(pending.sent));
@@ -90,7 +95,7 @@ impl SidecarSession {
         let Some(pending) = self.take_pending(number) else {
             return;
         };
-        self.answered_at = now;
+        self.note_answer(now);
         match pending.request {
             // Nothing but a device that does not know this host refuses these.
             Request::Start | Request::Beat => self.on_restart(now),

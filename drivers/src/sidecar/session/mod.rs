@@ -132,6 +132,7 @@ pub struct SidecarSession {
     looked_at: Nanos,
     is_silent: bool,
     is_beyond: bool,
+    /// Lines and samples that mean nothing since the last one that was good.
     garbled_in_row: u32,
     /// Samples beyond twice the promised rate, and when that was counted.
     excess: f64,

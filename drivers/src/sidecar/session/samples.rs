@@ -42,6 +42,7 @@ impl SidecarSession {
                 time
             }
         };
+        self.garbled_in_row = 0;
         self.check_jump(now, time, pulses);
         self.sampled_at = now;
         self.is_silent = false;

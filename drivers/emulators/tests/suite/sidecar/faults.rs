@@ -78,6 +78,19 @@ fn every_lie_stops_the_axis_and_is_reported() {
 }
 
 #[test]
+fn samples_that_cannot_be_count_in_a_row_whatever_else_is_said() {
+    for one in [SidecarLie::ClockStuck, SidecarLie::BeyondConverter] {
+        let mut host = moving();
+        lie(&mut host, one);
+        // Fifty samples, and the answers of two beats.
+        host.pass(0.1);
+        let is_counted = host.faults.iter().any(|one| one.to_string().contains("mean nothing"));
+        assert!(is_counted, "{one:?}: {:?}", host.faults);
+        assert!(!host.faults.contains(&Fault::ControllerReset), "{one:?}");
+    }
+}
+
+#[test]
 fn a_small_jump_is_left_to_the_path() {
     let mut host = moving();
     lie(&mut host, SidecarLie::Jump(30));
