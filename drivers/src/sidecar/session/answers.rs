@@ -71,7 +71,10 @@ impl SidecarSession {
         let Request::Command(command) = pending.request else {
             return;
         };
+        // A stop behind it may end it before a sample shows it.
+        let is_stopped = self.is_stop_under_way();
         self.awaited = match command {
+            motion if motion.is_motion() && is_stopped => None,
             RigCommand::MoveTo(to) => {
                 Some(AwaitedMotion { since: now, end: Some(to.target_pulses + self.zero) })
             }

@@ -209,10 +209,14 @@ impl SidecarSession {
     fn stop_axis(&mut self, now: Nanos, why: &str) {
         self.refuse_waiting(now, why, RigCommand::is_motion);
         self.awaited = None;
-        let is_under_way = self.pending.iter().any(|pending| pending.request.is_stop());
-        if self.stops.is_empty() && !is_under_way {
+        if !self.is_stop_under_way() {
             self.stops.push_back((None, RigCommand::Stop));
         }
+    }
+
+    /// Whether a stop is to be written or answered.
+    fn is_stop_under_way(&self) -> bool {
+        !self.stops.is_empty() || self.pending.iter().any(|pending| pending.request.is_stop())
     }
 
     fn refuse_waiting(&mut self, now: Nanos, why: &str, is_refused: fn(&RigCommand) -> bool) {

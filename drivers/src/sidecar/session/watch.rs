@@ -90,8 +90,7 @@ impl SidecarSession {
             return;
         }
         let has_motion = self.orders.iter().any(|(_, command)| command.is_motion());
-        let is_stopped = !self.stops.is_empty() || self.pending.iter().any(|p| p.request.is_stop());
-        if has_motion || self.is_moving() && !is_stopped {
+        if has_motion || self.is_moving() && !self.is_stop_under_way() {
             self.attended_at = now;
             self.fail(now, "no samples were taken for half a second, so the axis is stopped");
         }

@@ -1,6 +1,7 @@
 //! Sidecars that die, hang, and lie: the axis stops, and the owner of the rig gets a fault.
 
 use super::bench::{Host, Shared, to};
+use palpate_drivers::wire::{Dialogue, Link};
 use palpate_emulators::DeviceFault;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::sidecar::{EmulatedSidecarSettings as Emulated, SidecarLie};
@@ -128,6 +129,27 @@ fn a_motion_that_is_acknowledged_and_not_made_is_reported() {
     host.pass(0.5);
     assert!(host.faults[0].to_string().contains("does not move"), "{:?}", host.faults);
     assert!(host.sent().contains("stop"));
+}
+
+#[test]
+fn a_stop_before_the_answer_of_a_move_is_no_missing_motion() {
+    let mut host = Host::new();
+    host.tell(RigCommand::EnableMotor);
+    host.send(to(8_000, 5.0));
+    // The move and the stop are under way at once; the axis never gets going.
+    for word in ["move", "stop"] {
+        while !host.sent().contains(word) {
+            let line = host.session.take_line(host.now()).expect("something to say");
+            host.wire.clone().write(&line).unwrap();
+        }
+        if word == "move" {
+            host.send(RigCommand::Stop);
+        }
+    }
+    host.pass(1.0);
+    assert_eq!(host.acks.last(), Some(&RigCommand::Stop));
+    assert!(stands(&host) && host.position_mm().abs() < 1e-9);
+    host.assert_clean();
 }
 
 #[test]
