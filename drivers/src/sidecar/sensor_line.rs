@@ -6,7 +6,7 @@ use super::sensors::SensorReports;
 use crate::board_clock::{BoardClock, BoardTime};
 use crate::rig::RigEventBody;
 use crate::split_rig::CellClock;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{Dialogue, LinkStats, Waiting};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ pub struct SensorLine {
     host_clock: CellClock,
     reports: SensorReports,
     silence_max: Nanos,
-    sampled_at: Nanos,
+    for_sample: Waiting,
     looked_at: Nanos,
     garbled_in_row: u32,
     /// Why it can no longer be trusted.
@@ -52,7 +52,7 @@ impl SensorLine {
             host_clock: CellClock::default(),
             reports,
             silence_max: DEAD.max(Nanos(DEAD_PERIODS * about.period().0)),
-            sampled_at: now,
+            for_sample: Waiting::new(now),
             looked_at: now,
             garbled_in_row: 0,
             ending: None,
@@ -106,7 +106,7 @@ impl SensorLine {
             BoardTime::Restarted(_) => return self.end("the sidecar's clock ran back".into()),
         };
         self.garbled_in_row = 0;
-        self.sampled_at = now;
+        self.for_sample = Waiting::new(now);
         let mapped = self.host_clock.map(time, now);
         let half = Nanos(self.stats.round_trip_min.0 / 2);
         self.reports.take(now, now.since(mapped) + half, &sample.values);
@@ -135,7 +135,7 @@ impl Dialogue for SensorLine {
         // What this computer did not look at was not silence of the sidecar.
         let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > Nanos::from_millis(20) {
-            self.sampled_at = self.sampled_at + pause;
+            self.for_sample.excuse(pause);
         }
         if !std::mem::replace(&mut self.is_started, true) {
             return Some(self.write(HostMessage::Start { is_binary: false }));
@@ -158,7 +158,7 @@ impl Dialogue for SensorLine {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        let is_silent = now.since(self.sampled_at) > self.silence_max;
+        let is_silent = self.for_sample.time(now) > self.silence_max;
         let silent = || "the sidecar sends no samples; check its program and cable".to_owned();
         self.ending.clone().or_else(|| is_silent.then(silent))
     }

@@ -3,6 +3,7 @@
 use super::{AwaitedMotion, PendingAnswer, Request, SidecarSession};
 use crate::rig::RigEventBody;
 use crate::sidecar::protocol::{ReceivedItem, SidecarMessage};
+use crate::wire::Waiting;
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
 
@@ -55,7 +56,7 @@ impl SidecarSession {
 
     /// An answer that was waited for has come.
     fn note_answer(&mut self, now: Nanos) {
-        self.answered_at = now;
+        self.for_answer = Waiting::new(now);
         self.garbled_in_row = 0;
     }
 
@@ -66,19 +67,19 @@ impl SidecarSession {
         self.note_answer(now);
         // Of a stop that was repeated it is not known which line is answered.
         if pending.numbers.len() == 1 {
-            self.stats.push(now.since(pending.sent));
+            self.stats.push(pending.sent.time(now));
         }
         let Request::Command(command) = pending.request else {
             return;
         };
         // A stop behind it may end it before a sample shows it.
-        let is_stopped = self.is_stop_under_way();
+        let (is_stopped, since) = (self.is_stop_under_way(), Waiting::new(now));
         self.awaited = match command {
             motion if motion.is_motion() && is_stopped => None,
             RigCommand::MoveTo(to) => {
-                Some(AwaitedMotion { since: now, end: Some(to.target_pulses + self.zero) })
+                Some(AwaitedMotion { since, end: Some(to.target_pulses + self.zero) })
             }
-            RigCommand::Oscillate(_) => Some(AwaitedMotion { since: now, end: None }),
+            RigCommand::Oscillate(_) => Some(AwaitedMotion { since, end: None }),
             _ => self.awaited,
         };
         if let Some(owed) = pending.owed {

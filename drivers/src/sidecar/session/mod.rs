@@ -12,7 +12,9 @@ use super::{SidecarSettings, worst_case_mm};
 use crate::board_clock::BoardClock;
 use crate::rig::RigEventBody;
 use crate::split_rig::CellClock;
-use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
+use crate::wire::{
+    AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS, Waiting,
+};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, MoveTo, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
@@ -42,7 +44,7 @@ struct PendingAnswer {
     request: Request,
     /// Numbers of its lines: a stop is repeated.
     numbers: Vec<u64>,
-    sent: Nanos,
+    sent: Waiting,
     repeated: Nanos,
     /// The command's number among those that the rig's owner waits for.
     owed: Option<u64>,
@@ -51,7 +53,7 @@ struct PendingAnswer {
 /// A motion that was acknowledged and has not been seen.
 #[derive(Clone, Copy, Debug)]
 struct AwaitedMotion {
-    since: Nanos,
+    since: Waiting,
     /// Pulses of its end; `None` for a sine.
     end: Option<i64>,
 }
@@ -127,8 +129,9 @@ pub struct SidecarSession {
     locked: Option<String>,
     sensors: SensorReports,
     attended_at: Nanos,
-    sampled_at: Nanos,
-    answered_at: Nanos,
+    /// For the next sample that is good, and for the next answer.
+    for_sample: Waiting,
+    for_answer: Waiting,
     looked_at: Nanos,
     is_silent: bool,
     is_beyond: bool,
@@ -171,8 +174,8 @@ impl SidecarSession {
             locked: None,
             sensors,
             attended_at: now,
-            sampled_at: now,
-            answered_at: now,
+            for_sample: Waiting::new(now),
+            for_answer: Waiting::new(now),
             looked_at: now,
             is_silent: false,
             is_beyond: false,
@@ -253,7 +256,8 @@ impl SidecarSession {
     ) -> Vec<u8> {
         self.number += 1;
         let numbers = vec![self.number];
-        self.pending.push(PendingAnswer { request, numbers, sent: now, repeated: now, owed });
+        let sent = Waiting::new(now);
+        self.pending.push(PendingAnswer { request, numbers, sent, repeated: now, owed });
         message.line(self.number, self.facts.has_checksum)
     }
 

@@ -5,6 +5,7 @@ use crate::board_clock::BoardTime;
 use crate::rig::RigEventBody;
 use crate::sidecar::BEYOND_RANGE;
 use crate::sidecar::protocol::SidecarSample;
+use crate::wire::Waiting;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, SampleAge};
 use palpate_model::units::Volts;
@@ -44,7 +45,7 @@ impl SidecarSession {
         };
         self.garbled_in_row = 0;
         self.check_jump(now, time, pulses);
-        self.sampled_at = now;
+        self.for_sample = Waiting::new(now);
         self.is_silent = false;
         self.check_range(now, counts);
         let status = self.shown_status(sample, pulses);

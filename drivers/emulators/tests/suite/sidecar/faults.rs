@@ -5,6 +5,7 @@ use palpate_drivers::wire::{Dialogue, Link};
 use palpate_emulators::DeviceFault;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::sidecar::{EmulatedSidecarSettings as Emulated, SidecarLie};
+use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
 
 /// Half a second into a long move at 5 mm/s.
@@ -149,6 +150,30 @@ fn a_stop_before_the_answer_of_a_move_is_no_missing_motion() {
     host.pass(1.0);
     assert_eq!(host.acks.last(), Some(&RigCommand::Stop));
     assert!(stands(&host) && host.position_mm().abs() < 1e-9);
+    host.assert_clean();
+}
+
+/// A computer that looks every 25 ms only, for good, and one that stood still for a second.
+#[test]
+fn silence_is_noticed_by_a_slow_computer_and_its_pause_is_none() {
+    let mut host = moving();
+    let ms = Nanos::from_millis;
+    let mut now = host.now();
+    let mut ended_after = None;
+    for turn in 1..=400 {
+        now = now + ms(25);
+        host.session.note_attendance(now);
+        while host.session.take_line(now).is_some() {}
+        if host.session.is_dead(now).is_some() {
+            ended_after = Some(25 * turn);
+            break;
+        }
+    }
+    // A second is excused, and after another one without a sample the link is dead.
+    assert!(ended_after.is_some_and(|ms| (1_000..=2_500).contains(&ms)), "{ended_after:?}");
+    let mut host = Host::new();
+    host.wire.pass(1.0);
+    host.pass(2.0);
     host.assert_clean();
 }
 
