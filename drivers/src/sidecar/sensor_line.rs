@@ -1,5 +1,7 @@
 //! The dialogue with a sidecar that only measures, beside any rig.
 
+use super::FLOODED;
+use super::budget::{FaultLimit, LinkBudget};
 use super::connect::ConnectedSidecar;
 use super::protocol::{HostMessage, ReceivedItem, SidecarMessage, SidecarParser, SidecarSample};
 use super::sensors::SensorReports;
@@ -31,6 +33,8 @@ pub struct SensorLine {
     for_sample: Waiting,
     looked_at: Nanos,
     garbled_in_row: u32,
+    budget: LinkBudget,
+    fault_limit: FaultLimit,
     /// Why it can no longer be trusted.
     ending: Option<String>,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -55,6 +59,8 @@ impl SensorLine {
             for_sample: Waiting::new(now),
             looked_at: now,
             garbled_in_row: 0,
+            budget: LinkBudget::new(about.rate, now),
+            fault_limit: FaultLimit::default(),
             ending: None,
             events: VecDeque::new(),
             stats: connected.stats,
@@ -78,8 +84,10 @@ impl SensorLine {
                 self.end(format!("the sidecar refuses to go on: {why}"));
             }
             SidecarMessage::Fault(why) => {
-                let why = format!("the sidecar reports: {why}");
-                self.events.push_back((now, RigEventBody::refusal(why)));
+                if self.fault_limit.allows(now) {
+                    let why = format!("the sidecar reports: {why}");
+                    self.events.push_back((now, RigEventBody::refusal(why)));
+                }
             }
             SidecarMessage::Boot(_) | SidecarMessage::Description(_) => {
                 self.end("the sidecar has restarted".into());
@@ -114,6 +122,7 @@ impl SensorLine {
 
     fn write(&mut self, message: HostMessage) -> Vec<u8> {
         self.number += 1;
+        self.budget.note_written();
         message.line(self.number, self.has_checksum)
     }
 }
@@ -124,9 +133,17 @@ impl Dialogue for SensorLine {
     fn command(&mut self, _now: Nanos, _command: RigCommand) {}
 
     fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
+        self.budget.take_bytes(now, bytes.len());
         for byte in bytes {
+            if self.ending.is_some() {
+                return;
+            }
             if let Some(item) = self.parser.take(*byte) {
+                self.budget.take_item(now);
                 self.on_item(now, item);
+            }
+            if self.budget.is_exceeded() {
+                self.end(format!("{FLOODED}; correct its program"));
             }
         }
     }
@@ -165,5 +182,58 @@ impl Dialogue for SensorLine {
 
     fn stats(&self) -> LinkStats {
         self.stats
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sidecar::sensors::SharedValues;
+    use std::sync::Arc;
+
+    fn line(rate: u32, values: &SharedValues) -> SensorLine {
+        let text = format!(
+            r#"{{"ok":1,"sidecar":1,"name":"a","boot":1,"tick_ns":1000,"rate":{rate},"sensors":[{{"name":"one","unit":"1"}}]}}"#
+        );
+        let description = serde_json::from_str(&text).unwrap();
+        let reports = SensorReports::new(&description, (0, 0), Arc::clone(values));
+        let stats = LinkStats::default();
+        let connected = ConnectedSidecar { description, stats, number: 1, raw: Vec::new() };
+        SensorLine::new(&connected, reports, Nanos::ZERO)
+    }
+
+    /// Lines of a millisecond each turn, for so long; when the link has ended, and how many events there were.
+    fn turns(rate: u32, most: u64, lines: impl Fn(u64) -> String) -> (Option<u64>, usize) {
+        let values = SharedValues::default();
+        let mut line = line(rate, &values);
+        let mut events = 0;
+        let ended = (1..=most).find(|ms| {
+            let now = Nanos::from_millis(*ms);
+            while line.take_line(now).is_some() {}
+            line.handle_bytes(now, lines(*ms).as_bytes());
+            events += std::iter::from_fn(|| line.take_event()).count();
+            line.is_dead(now).is_some()
+        });
+        (ended, events)
+    }
+
+    #[test]
+    fn as_many_samples_as_promised_are_taken_and_a_flood_ends_the_link() {
+        let sample = |micros: u64| format!("{{\"t\":{micros},\"v\":[1]}}\n");
+        let (ended, _) = turns(1_000, 5_000, |ms| sample(ms * 1_000));
+        assert_eq!(ended, None);
+        // Ten are promised, and 10 000 a second come.
+        let many = |ms: u64| (0..10).map(|i| sample(ms * 1_000 + i * 100)).collect();
+        let (ended, _) = turns(10, 2_000, many);
+        assert!(ended.is_some_and(|ms| ms < 100), "{ended:?}");
+    }
+
+    #[test]
+    fn a_flood_of_faults_or_answers_ends_the_link_and_fills_nothing() {
+        for word in ["{\"ok\":0}\n", "{\"fault\":\"hot\"}\n", "{\"no\":null,\"why\":\"\"}\n"] {
+            let lines = |ms: u64| format!("{{\"t\":{}}}\n{}", ms * 1_000, word.repeat(20));
+            let (ended, events) = turns(1_000, 2_000, lines);
+            assert!(ended.is_some() && events <= 20, "{word}: {ended:?} {events}");
+        }
     }
 }

@@ -4,6 +4,7 @@ mod answers;
 mod samples;
 mod watch;
 
+use super::budget::{FaultLimit, LinkBudget};
 use super::connect::ConnectedSidecar;
 use super::description::{SidecarAxis, SidecarCell, SidecarDescription};
 use super::protocol::{HostMessage, SidecarParser};
@@ -137,9 +138,8 @@ pub struct SidecarSession {
     is_beyond: bool,
     /// Lines and samples that mean nothing since the last one that was good.
     garbled_in_row: u32,
-    /// Samples beyond twice the promised rate, and when that was counted.
-    excess: f64,
-    counted_at: Nanos,
+    budget: LinkBudget,
+    fault_limit: FaultLimit,
     is_flooded: bool,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
@@ -180,8 +180,8 @@ impl SidecarSession {
             is_silent: false,
             is_beyond: false,
             garbled_in_row: 0,
-            excess: 0.0,
-            counted_at: now,
+            budget: LinkBudget::new(about.rate, now),
+            fault_limit: FaultLimit::default(),
             is_flooded: false,
             events: VecDeque::new(),
             stats: connected.stats,
@@ -205,7 +205,9 @@ impl SidecarSession {
     /// Something is wrong: the axis is stopped, and the rig's owner learns why.
     fn fail(&mut self, now: Nanos, why: &str) {
         self.stop_axis(now, why);
-        self.report(now, [RigEventBody::refusal(why)]);
+        if self.fault_limit.allows(now) {
+            self.report(now, [RigEventBody::refusal(why)]);
+        }
     }
 
     /// Stops the axis without a command, unless a stop is on its way.
@@ -255,6 +257,7 @@ impl SidecarSession {
         message: HostMessage,
     ) -> Vec<u8> {
         self.number += 1;
+        self.budget.note_written();
         let numbers = vec![self.number];
         let sent = Waiting::new(now);
         self.pending.push(PendingAnswer { request, numbers, sent, repeated: now, owed });
@@ -370,13 +373,19 @@ impl Dialogue for SidecarSession {
     }
 
     fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
+        self.budget.take_bytes(now, bytes.len());
         for byte in bytes {
             let mut item = self.parser.take(*byte);
             while let Some(received) = item {
+                self.budget.take_item(now);
+                if self.check_flood(now) {
+                    return;
+                }
                 self.on_item(now, received);
                 item = self.parser.next_ready();
             }
         }
+        self.check_flood(now);
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {

@@ -2,6 +2,7 @@
 
 use super::answers::GARBLED_MAX;
 use super::{PendingAnswer, Request, SidecarSession, stop_message};
+use crate::sidecar::FLOODED;
 use crate::wire::ATTENDED_MAX;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
@@ -50,8 +51,6 @@ impl SidecarSession {
     }
 
     fn excuse(&mut self, pause: Nanos) {
-        // What was sent meanwhile comes at once.
-        self.excess -= self.facts.rate * pause.seconds().0;
         for waiting in [&mut self.for_sample, &mut self.for_answer] {
             waiting.excuse(pause);
         }
@@ -106,6 +105,7 @@ impl SidecarSession {
             return None;
         };
         self.number += 1;
+        self.budget.note_written();
         pending.numbers.push(self.number);
         pending.repeated = now;
         Some(stop_message(command).line(self.number, self.facts.has_checksum))
@@ -125,9 +125,7 @@ impl SidecarSession {
             return Some("the sidecar has not accepted a stop for 1 s, so the axis may still move; use the emergency stop".into());
         }
         if self.is_flooded {
-            return Some(format!(
-                "the sidecar sends far more samples than it promised; {by_itself}"
-            ));
+            return Some(format!("{FLOODED}; {by_itself}"));
         }
         if self.garbled_in_row >= GARBLED_MAX {
             return Some(format!("the sidecar sends nothing that means anything; {by_itself}"));

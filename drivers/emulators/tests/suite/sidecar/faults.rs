@@ -93,6 +93,22 @@ fn samples_that_cannot_be_count_in_a_row_whatever_else_is_said() {
 }
 
 #[test]
+fn a_flood_of_lines_between_right_samples_ends_the_link_and_lists_few_faults() {
+    for word in ["{\"ok\":0}\n", "{\"fault\":\"hot\"}\n", "{\"no\":null,\"why\":\"\"}\n", "?\n"] {
+        let mut host = moving();
+        let lines = format!("\n{}", word.repeat(20)).into_bytes();
+        let spoil = move |byte| if byte == b'\n' { lines.clone() } else { vec![byte] };
+        host.wire.lock().spoil = Box::new(spoil);
+        let from = host.position_mm();
+        host.pass(2.0);
+        assert!(stands(&host) && host.ending.is_some(), "{word}: {:?}", host.ending);
+        // It brakes within a second, at 5 mm/s.
+        assert!(host.position_mm() - from < 5.3, "{word}: {}", host.position_mm() - from);
+        assert!(host.faults.len() <= 20, "{word}: {}", host.faults.len());
+    }
+}
+
+#[test]
 fn a_small_jump_is_left_to_the_path() {
     let mut host = moving();
     lie(&mut host, SidecarLie::Jump(30));
