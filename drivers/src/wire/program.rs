@@ -128,7 +128,8 @@ impl Drop for ProgramLink {
         } else if !self.log.is_over {
             tracing::warn!("what the program has started did not end by itself and is killed");
         }
-        // They may have ended at this moment.
+        // They may have ended at this moment, and the child may have left its group.
+        let _ = self.child.kill();
         let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
         let _ = self.child.wait();
         self.log.pass_on();

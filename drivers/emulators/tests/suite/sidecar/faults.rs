@@ -222,14 +222,28 @@ fn without_an_owner_who_takes_samples_the_axis_stops() {
 }
 
 #[test]
-fn a_stop_that_is_not_obeyed_is_stopped_by_silence_in_the_end() {
+fn a_stop_that_is_not_obeyed_is_seen_on_the_path_and_stopped_by_silence_in_the_end() {
+    // An honest one is on the path until it stands.
+    let mut host = moving();
+    host.tell(RigCommand::Stop);
+    host.pass(1.0);
+    host.assert_clean();
     let mut host = moving();
     lie(&mut host, SidecarLie::DeafToStops);
     host.tell(RigCommand::Stop);
-    // It said yes. The engine sees that it moves on; here the owner gives the link up.
+    // It said yes, and moves on: each sample then is off the commanded path, by which the engine ends a run.
+    let from = host.position_mm();
+    host.until("off the path", |host| !host.path_errors.is_empty());
+    let unseen = host.position_mm() - from;
+    // At 5 mm/s it would stand after 0.1 s and 0.25 mm.
+    assert!(unseen < 0.5 && !stands(&host), "{unseen}");
+    assert_eq!(host.ending, None, "its answers and samples are in order");
+    // The owner gives the link up: without beats the axis stands after its silence.
+    let from = host.position_mm();
     host.wire.lock().is_cut = true;
     host.pass(1.0);
-    assert!(stands(&host));
+    let way = host.position_mm() - from;
+    assert!(stands(&host) && way > 0.5 && way < STOPS_WITHIN_MM, "{way}");
 }
 
 #[test]
