@@ -200,7 +200,8 @@ mod tests {
 
     #[test]
     fn a_torrent_after_the_introduction_is_named() {
-        let about = "{\"ok\":1,\"sidecar\":1,\"name\":\"a\",\"boot\":1,\"tick_ns\":1000,\"rate\":10}\n";
+        let about =
+            "{\"ok\":1,\"sidecar\":1,\"name\":\"a\",\"boot\":1,\"tick_ns\":1000,\"rate\":10}\n";
         let (err, ms) = try_connect(about, b"{\"ok\":0}\n");
         assert!(err.to_string().contains("far more"), "{err}");
         assert!(ms < 10, "{ms}");

@@ -74,6 +74,11 @@ impl SidecarSession {
         };
         // A stop behind it may end it before a sample shows it.
         let (is_stopped, since) = (self.is_stop_under_way(), Waiting::new(now));
+        self.stop_accepted = match command {
+            stop if stop.is_stopping() => Some(since),
+            motion if motion.is_motion() => None,
+            _ => self.stop_accepted,
+        };
         self.awaited = match command {
             motion if motion.is_motion() && is_stopped => None,
             RigCommand::MoveTo(to) => {

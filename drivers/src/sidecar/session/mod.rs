@@ -78,7 +78,6 @@ struct Facts {
     has_checksum: bool,
     has_frames: bool,
     tick_ns: u64,
-    rate: f64,
     period: Nanos,
     beat_every: Nanos,
     worst_case_mm: f64,
@@ -100,7 +99,6 @@ impl Facts {
             has_checksum: about.crc,
             has_frames: about.binary,
             tick_ns: about.tick_ns,
-            rate: about.rate,
             period: about.period(),
             beat_every: Nanos(about.silence().0 / BEATS_PER_SILENCE).min(BEAT_MAX),
             worst_case_mm: worst_case_mm(speed_max, acceleration, about.silence()),
@@ -126,6 +124,8 @@ pub struct SidecarSession {
     /// Offset of the caller's pulses from the device's.
     zero: i64,
     awaited: Option<AwaitedMotion>,
+    /// Since a stop was accepted that no sample has shown.
+    stop_accepted: Option<Waiting>,
     /// Why no command but a stop is passed on.
     locked: Option<String>,
     sensors: SensorReports,
@@ -171,6 +171,7 @@ impl SidecarSession {
             newest: None,
             zero: 0,
             awaited: None,
+            stop_accepted: None,
             locked: None,
             sensors,
             attended_at: now,

@@ -3,8 +3,8 @@
 use super::{NewestSample, SidecarSession};
 use crate::board_clock::BoardTime;
 use crate::rig::RigEventBody;
-use crate::sidecar::{BEYOND_RANGE, FLOODED};
 use crate::sidecar::protocol::SidecarSample;
+use crate::sidecar::{BEYOND_RANGE, FLOODED};
 use crate::wire::Waiting;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, SampleAge};
@@ -43,6 +43,8 @@ impl SidecarSession {
         self.is_silent = false;
         self.check_range(now, counts);
         let status = self.shown_status(sample, pulses);
+        let is_obeyed = !status.has(AxisStatus::MOVING) || status.has(AxisStatus::STOPPING);
+        self.stop_accepted = self.stop_accepted.filter(|_| !is_obeyed);
         self.newest = Some(NewestSample { time, pulses, status: AxisStatus(sample.status) });
         let age = self.age(now, time);
         let reading = Reading {

@@ -60,6 +60,9 @@ impl SidecarSession {
         if let Some(awaited) = &mut self.awaited {
             awaited.since.excuse(pause);
         }
+        if let Some(accepted) = &mut self.stop_accepted {
+            accepted.excuse(pause);
+        }
     }
 
     fn watch_answers(&mut self, now: Nanos) {
@@ -118,11 +121,16 @@ impl SidecarSession {
         }
         let far = self.facts.worst_case_mm;
         let by_itself = format!("if the axis moves, it stops by itself within {far:.1} mm");
-        let is_unstopped =
-            |one: &PendingAnswer| one.request.is_stop() && one.sent.time(now) > DEAD;
+        let is_unstopped = |one: &PendingAnswer| one.request.is_stop() && one.sent.time(now) > DEAD;
         let silence = DEAD.max(Nanos(DEAD_PERIODS * self.facts.period.0));
         if self.pending.iter().any(is_unstopped) {
             return Some("the sidecar has not accepted a stop for 1 s, so the axis may still move; use the emergency stop".into());
+        }
+        if self.stop_accepted.is_some_and(|accepted| accepted.time(now) > silence) {
+            // Without beats its own watchdog brakes.
+            return Some(format!(
+                "the sidecar has accepted a stop, but the axis moves on; {by_itself}; use the emergency stop"
+            ));
         }
         if self.is_flooded {
             return Some(format!("{FLOODED}; {by_itself}"));

@@ -6,7 +6,8 @@ use palpate_emulators::DeviceFault;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::sidecar::{EmulatedSidecarSettings as Emulated, SidecarLie};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, RigCommand};
+use palpate_model::rig::{Fault, MoveTo, RigCommand};
+use palpate_model::units::{MmPerS, MmPerS2};
 
 /// Half a second into a long move at 5 mm/s.
 fn moving() -> Host {
@@ -97,7 +98,7 @@ fn a_flood_of_lines_between_right_samples_ends_the_link_and_lists_few_faults() {
     for word in ["{\"ok\":0}\n", "{\"fault\":\"hot\"}\n", "{\"no\":null,\"why\":\"\"}\n", "?\n"] {
         let mut host = moving();
         let lines = format!("\n{}", word.repeat(20)).into_bytes();
-        let spoil = move |byte| if byte == b'\n' { lines.clone() } else { vec![byte] };
+        let spoil = move |byte: u8| if byte == b'\n' { lines.clone() } else { vec![byte] };
         host.wire.lock().spoil = Box::new(spoil);
         let from = host.position_mm();
         host.pass(2.0);
@@ -222,28 +223,31 @@ fn without_an_owner_who_takes_samples_the_axis_stops() {
 }
 
 #[test]
-fn a_stop_that_is_not_obeyed_is_seen_on_the_path_and_stopped_by_silence_in_the_end() {
-    // An honest one is on the path until it stands.
-    let mut host = moving();
-    host.tell(RigCommand::Stop);
-    host.pass(1.0);
-    host.assert_clean();
+fn a_stop_that_is_accepted_and_not_obeyed_ends_the_link_and_silence_stops_the_axis() {
     let mut host = moving();
     lie(&mut host, SidecarLie::DeafToStops);
     host.tell(RigCommand::Stop);
-    // It said yes, and moves on: each sample then is off the commanded path, by which the engine ends a run.
     let from = host.position_mm();
-    host.until("off the path", |host| !host.path_errors.is_empty());
-    let unseen = host.position_mm() - from;
-    // At 5 mm/s it would stand after 0.1 s and 0.25 mm.
-    assert!(unseen < 0.5 && !stands(&host), "{unseen}");
-    assert_eq!(host.ending, None, "its answers and samples are in order");
-    // The owner gives the link up: without beats the axis stands after its silence.
-    let from = host.position_mm();
-    host.wire.lock().is_cut = true;
-    host.pass(1.0);
+    host.pass(0.9);
+    // It would stand after 0.1 s and 0.25 mm; answers and samples are in order.
+    assert!(!stands(&host) && host.ending.is_none() && host.position_mm() - from > 4.0);
+    host.pass(1.1);
+    assert!(host.ending.as_ref().is_some_and(|why| why.contains("moves on")), "{:?}", host.ending);
+    // A second until it is given up, and the silence of the host.
     let way = host.position_mm() - from;
-    assert!(stands(&host) && way > 0.5 && way < STOPS_WITHIN_MM, "{way}");
+    assert!(stands(&host) && way < 5.0 + STOPS_WITHIN_MM + 0.1, "{way}");
+    // An honest one is kept, also while it brakes for longer than that: 5 mm/s at 2.5 mm/s2.
+    let mut host = Host::new();
+    host.tell(RigCommand::EnableMotor);
+    let (speed, acceleration) = (MmPerS(5.0), MmPerS2(2.5));
+    host.tell(RigCommand::MoveTo(MoveTo { target_pulses: 40_000, speed, acceleration }));
+    host.pass(3.0);
+    host.tell(RigCommand::Stop);
+    host.pass(1.5);
+    assert!(!stands(&host));
+    host.pass(1.5);
+    assert!(stands(&host));
+    host.assert_clean();
 }
 
 #[test]
