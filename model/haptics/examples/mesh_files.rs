@@ -19,7 +19,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mesh = TriangleMesh::new(soup)?;
         let [low, high] = mesh.bounds();
         let size = [0, 1, 2].map(|axis| format!("{:.0}", high[axis] - low[axis])).join(" x ");
-        println!("{name}: {} triangles, {} open edges, {size} mm", mesh.faces().len(), mesh.open_edges());
+        println!(
+            "{name}: {} triangles, {} open edges, {size} mm",
+            mesh.faces().len(),
+            mesh.open_edges()
+        );
     }
     Ok(())
 }

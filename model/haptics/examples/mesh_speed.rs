@@ -38,7 +38,8 @@ enum Case {
 }
 
 impl Case {
-    const ALL: [Self; 6] = [Self::Slide, Self::Deep, Self::Wide, Self::Trail, Self::Air, Self::Fast];
+    const ALL: [Self; 6] =
+        [Self::Slide, Self::Deep, Self::Wide, Self::Trail, Self::Air, Self::Fast];
 
     fn name(self) -> &'static str {
         match self {
@@ -72,7 +73,9 @@ impl Case {
 fn around(mesh: &TriangleMesh, way: f64, depth: f64) -> [f64; 3] {
     let first = 1 + 160 * 78;
     let length = 1.3;
-    let at = |index: usize| (mesh.points()[first + index % 160], mesh.vertex_normals()[first + index % 160]);
+    let at = |index: usize| {
+        (mesh.points()[first + index % 160], mesh.vertex_normals()[first + index % 160])
+    };
     let share = (way / length).fract();
     let index = (way / length) as usize;
     let [(p, m), (q, n)] = [at(index), at(index + 1)];
@@ -100,7 +103,8 @@ fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
         shading: Shading::Smooth,
         dent: DentSettings { recovery, ..DentSettings::default() },
     };
-    let mut touched = MeshTouchLoop::new(mesh.clone(), MaterialMap::one(mesh), &settings).expect("a touch");
+    let mut touched =
+        MeshTouchLoop::new(mesh.clone(), MaterialMap::one(mesh), &settings).expect("a touch");
     let mut random = SplitMix::seeded(1);
     let mut times = Vec::with_capacity(ticks);
     let (mut moved, mut contacts) = (0, 0);
@@ -119,7 +123,10 @@ fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
     }
     let [p50, p99, p999, max] = percentiles(&mut times);
     let (moved, contacts) = (moved / ticks, 100 * contacts / ticks);
-    println!("{:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{moved:>10}{contacts:>10}", case.name());
+    println!(
+        "{:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{moved:>10}{contacts:>10}",
+        case.name()
+    );
 }
 
 /// What the machine alone adds: the same few instructions each time, without memory.

@@ -34,7 +34,8 @@ impl BlendedLaw {
         if !(1..=MOST_MATERIALS).contains(&settings.len()) {
             return Err(MaterialError::Count(settings.len()).into());
         }
-        let laws: Result<Vec<_>, _> = settings.iter().map(|one| ForceLaw::new(*one, depth)).collect();
+        let laws: Result<Vec<_>, _> =
+            settings.iter().map(|one| ForceLaw::new(*one, depth)).collect();
         Ok(Self { laws: laws?.into() })
     }
 

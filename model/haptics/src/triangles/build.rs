@@ -220,7 +220,8 @@ fn finish(
     for (index, face) in faces.iter().enumerate() {
         for corner in 0..3 {
             let vertex = face[corner] as usize;
-            sums[vertex] = plus(sums[vertex], corner_angle(&points, *face, corner), face_normals[index]);
+            sums[vertex] =
+                plus(sums[vertex], corner_angle(&points, *face, corner), face_normals[index]);
             if neighbours[index][corner] == OPEN {
                 is_at_open_edge[vertex] = true;
                 is_at_open_edge[face[(corner + 1) % 3] as usize] = true;

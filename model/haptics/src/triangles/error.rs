@@ -9,11 +9,17 @@ pub enum TriangleMeshError {
     Empty,
     #[error("the mesh has {faces} triangles, more than the {most} that are possible; decimate it")]
     TooManyFaces { faces: usize, most: usize },
-    #[error("vertex {vertex} of the mesh has a coordinate that is no finite number; repair the file")]
+    #[error(
+        "vertex {vertex} of the mesh has a coordinate that is no finite number; repair the file"
+    )]
     NotANumber { vertex: usize },
-    #[error("triangle {face} of the mesh has vertex {vertex}, but there are {vertices}; repair the file")]
+    #[error(
+        "triangle {face} of the mesh has vertex {vertex}, but there are {vertices}; repair the file"
+    )]
     Index { face: usize, vertex: usize, vertices: usize },
-    #[error("the mesh has {given} colours for {vertices} vertices; give one for each vertex, or none")]
+    #[error(
+        "the mesh has {given} colours for {vertices} vertices; give one for each vertex, or none"
+    )]
     Colours { given: usize, vertices: usize },
     #[error(
         "triangle {face} of the mesh has no area: its corners are on a line or within {tolerance_mm} mm of each other; remove triangles without area in the program that made the mesh"

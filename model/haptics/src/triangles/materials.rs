@@ -9,20 +9,33 @@ pub const MOST_MATERIALS: usize = 8;
 /// Shares of all materials at one place; they add up to one.
 pub(super) type Shares = [f64; MOST_MATERIALS];
 
+/// The first material alone.
+pub(crate) const FIRST_ALONE: Shares = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
 /// A painting that gives no materials.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MaterialError {
     #[error("a mesh of {0} materials is not possible; give from 1 to 8 force models")]
     Count(usize),
-    #[error("vertex {vertex} has material {material}, but there are {materials}, counted from 0; add a force model or correct the map")]
+    #[error(
+        "vertex {vertex} has material {material}, but there are {materials}, counted from 0; add a force model or correct the map"
+    )]
     Material { vertex: usize, material: usize, materials: usize },
-    #[error("the map of materials names vertex {vertex}, but the file of the mesh has {vertices}, counted from 0; correct the map")]
+    #[error(
+        "the map of materials names vertex {vertex}, but the file of the mesh has {vertices}, counted from 0; correct the map"
+    )]
     Vertex { vertex: usize, vertices: usize },
-    #[error("line {line} of the map of materials is '{text}'; write a vertex and a material, such as '17,1', and if needed a weight")]
+    #[error(
+        "line {line} of the map of materials is '{text}'; write a vertex and a material, such as '17,1', and if needed a weight"
+    )]
     Line { line: usize, text: String },
-    #[error("the colours give {given} values for {vertices} vertices; give one colour for each vertex of the file")]
+    #[error(
+        "the colours give {given} values for {vertices} vertices; give one colour for each vertex of the file"
+    )]
     Colours { given: usize, vertices: usize },
-    #[error("vertex {0} has no red, green or blue that is above zero; paint it in the colour of a material")]
+    #[error(
+        "vertex {0} has no red, green or blue that is above zero; paint it in the colour of a material"
+    )]
     Unpainted(usize),
 }
 
@@ -37,12 +50,16 @@ impl MaterialMap {
     /// One material everywhere.
     #[must_use]
     pub fn one(mesh: &TriangleMesh) -> Self {
-        Self { materials: 1, shares: vec![first_alone(); mesh.points().len()].into() }
+        Self { materials: 1, shares: vec![FIRST_ALONE; mesh.points().len()].into() }
     }
 
     /// From colours of the file's vertices: red, green and blue are the shares of the first, second and third material, whatever the
     /// brightness. Where vertices at one place differ, their mean counts.
-    pub fn from_colours(mesh: &TriangleMesh, colours: &[[f64; 3]], materials: usize) -> Result<Self, MaterialError> {
+    pub fn from_colours(
+        mesh: &TriangleMesh,
+        colours: &[[f64; 3]],
+        materials: usize,
+    ) -> Result<Self, MaterialError> {
         check_count(materials)?;
         let vertices = mesh.vertex_of_file().len();
         if colours.len() != vertices {
@@ -66,7 +83,11 @@ impl MaterialMap {
 
     /// From lines `vertex,material` or `vertex,material,weight`, both counted from 0 in the order of the mesh's file; the first line may be
     /// a heading. Vertices that no line names are of the first material.
-    pub fn from_csv(mesh: &TriangleMesh, text: &str, materials: usize) -> Result<Self, MaterialError> {
+    pub fn from_csv(
+        mesh: &TriangleMesh,
+        text: &str,
+        materials: usize,
+    ) -> Result<Self, MaterialError> {
         check_count(materials)?;
         let vertices = mesh.vertex_of_file().len();
         let mut sums = vec![[0.0; MOST_MATERIALS]; mesh.points().len()];
@@ -91,7 +112,7 @@ impl MaterialMap {
     fn normalised(materials: usize, mut sums: Vec<Shares>) -> Self {
         for shares in &mut sums {
             let sum: f64 = shares.iter().sum();
-            *shares = if sum > 0.0 { shares.map(|part| part / sum) } else { first_alone() };
+            *shares = if sum > 0.0 { shares.map(|part| part / sum) } else { FIRST_ALONE };
         }
         Self { materials, shares: sums.into() }
     }
@@ -121,14 +142,12 @@ impl MaterialMap {
     }
 }
 
-fn first_alone() -> Shares {
-    let mut shares = [0.0; MOST_MATERIALS];
-    shares[0] = 1.0;
-    shares
-}
-
 fn check_count(materials: usize) -> Result<(), MaterialError> {
-    if (1..=MOST_MATERIALS).contains(&materials) { Ok(()) } else { Err(MaterialError::Count(materials)) }
+    if (1..=MOST_MATERIALS).contains(&materials) {
+        Ok(())
+    } else {
+        Err(MaterialError::Count(materials))
+    }
 }
 
 fn csv_line(line: &str) -> Option<(usize, usize, f64)> {

@@ -157,10 +157,12 @@ impl TriangleMesh {
         let own = self.face_normals[at.face as usize];
         match at.feature {
             TriangleFeature::Inside => own,
-            TriangleFeature::Edge(edge) => match self.neighbours[at.face as usize][usize::from(edge)] {
-                OPEN => own,
-                other => plus(own, 1.0, self.face_normals[other as usize]),
-            },
+            TriangleFeature::Edge(edge) => {
+                match self.neighbours[at.face as usize][usize::from(edge)] {
+                    OPEN => own,
+                    other => plus(own, 1.0, self.face_normals[other as usize]),
+                }
+            }
             TriangleFeature::Corner(corner) => {
                 self.vertex_normals[self.faces[at.face as usize][usize::from(corner)] as usize]
             }

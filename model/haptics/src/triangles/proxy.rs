@@ -48,8 +48,8 @@ pub struct MeshProxy {
     /// Where it is on the surface, and on which side: 1 in front, -1 behind an open part.
     at: Option<(SurfacePoint, f64)>,
     last: Option<Vector>,
-    /// No surface is nearer to the place of the last free tick than this, in mm.
-    clearance: f64,
+    /// [`MeshTouch::below`] of the last tick.
+    below: f64,
 }
 
 /// Contact of a device with a mesh.
@@ -70,24 +70,26 @@ impl MeshProxy {
     pub fn new(friction: f64, shading: Shading) -> Result<Self, SettingError> {
         let settings = [("friction coefficient", friction, "")];
         SettingRange::UpTo(FRICTION_MOST).check("a contact point", &settings)?;
-        Ok(Self { friction, shading, at: None, last: None, clearance: 0.0 })
+        Ok(Self { friction, shading, at: None, last: None, below: 0.0 })
     }
 
     /// One tick: the device is at `device` (mm).
     pub fn follow(&mut self, mesh: &TriangleMesh, device: [f64; 3]) -> MeshTouch {
         if !is_finite(device) {
             let at = self.last.unwrap_or_default();
-            return without(TouchState::NotANumber, at, None, -self.clearance);
+            return without(TouchState::NotANumber, at, None, self.below);
         }
         let last = self.last.replace(device);
         let held = match self.at.take() {
             Some((at, side)) => self.held(mesh, at, side, device),
             None => self.reached(mesh, last, device),
         };
-        match held {
+        let contact = match held {
             Some((goal, from, side)) => self.touched(mesh, goal, from, side, device),
             None => self.free(mesh, device),
-        }
+        };
+        self.below = contact.below;
+        contact
     }
 
     /// From a contact: where its point goes, from where, and on which side; `None` in the air.
@@ -104,9 +106,11 @@ impl MeshProxy {
             if !is_left(mesh, &goal, side, device) {
                 return Some((goal, at, side));
             }
-            let hit = mesh.tree.first_hit(mesh, goal.point, device, |face| touches(mesh, &goal, face))?;
+            let hit =
+                mesh.tree.first_hit(mesh, goal.point, device, |face| touches(mesh, &goal, face))?;
             side = side_of(mesh, hit.face, minus(device, goal.point));
-            at = SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
+            at =
+                SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
         }
         // Between surfaces nearer than roundings: it stays where it came to.
         Some((at, at, side))
@@ -120,13 +124,15 @@ impl MeshProxy {
         device: Vector,
     ) -> Option<(SurfacePoint, SurfacePoint, f64)> {
         let way = last.map_or(0.0, |last| length(minus(device, last)));
-        // Nothing is nearer than the clearance.
+        // A shorter way than to the nearest surface meets none; a millionth less, since the distance is rounded.
+        let clearance = (1.0 - 1e-6) * -self.below;
         if let Some(last) = last
-            && way >= self.clearance
+            && way >= clearance
             && let Some(hit) = mesh.first_hit(last, device)
         {
             let side = side_of(mesh, hit.face, minus(device, last));
-            let at = SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
+            let at =
+                SurfacePoint { face: hit.face, point: hit.point, feature: TriangleFeature::Inside };
             return self.held(mesh, at, side, device);
         }
         None
@@ -135,15 +141,12 @@ impl MeshProxy {
     /// Without contact, unless the device is inside: it began there, or came through a place that is one rounding wide.
     fn free(&mut self, mesh: &TriangleMesh, device: Vector) -> MeshTouch {
         let Some(nearest) = mesh.nearest(device, FAR_MM) else {
-            self.clearance = FAR_MM;
             return without(TouchState::Free, device, None, -FAR_MM);
         };
         if mesh.is_closed[nearest.face as usize] && !mesh.is_outside(&nearest, device) {
             return self.touched(mesh, nearest, nearest, 1.0, device);
         }
         let distance = length(minus(device, nearest.point));
-        // A millionth less: sums of many short ways may not round past it.
-        self.clearance = distance * (1.0 - 1e-6);
         without(TouchState::Free, device, Some(nearest), -distance)
     }
 
@@ -173,10 +176,13 @@ impl MeshProxy {
             (goal, 0.0)
         };
         self.at = Some((at, side));
-        self.clearance = 0.0;
         MeshTouch {
             touch: ProxyTouch {
-                state: if is_still && self.friction > 0.0 { TouchState::Sticks } else { TouchState::Slides },
+                state: if is_still && self.friction > 0.0 {
+                    TouchState::Sticks
+                } else {
+                    TouchState::Slides
+                },
                 point: at.point,
                 depth,
                 normal,
@@ -272,7 +278,8 @@ fn flat_normal(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector
     }
     let way = minus(at.point, device);
     let normal = mesh.normal_for_sign(at);
-    let normal = unit(normal).unwrap_or(mesh.face_normals[at.face as usize]).map(|part| side * part);
+    let normal =
+        unit(normal).unwrap_or(mesh.face_normals[at.face as usize]).map(|part| side * part);
     // Below a nanometre the direction is one of roundings.
     if length(way) > STILL_MM { unit(way).unwrap_or(normal) } else { normal }
 }
@@ -281,7 +288,12 @@ fn flat_normal(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector
 ///
 /// Steps go to the foot of the device on the plane of the normal; how far is from the steps before (Barzilai & Borwein, "Two-point step
 /// size gradient methods", IMA J. Numer. Anal. 8 (1988) 141-148), since a hollow needs less than the whole step and a dome more.
-fn shaded(mesh: &TriangleMesh, from: SurfacePoint, side: f64, device: Vector) -> (SurfacePoint, Vector) {
+fn shaded(
+    mesh: &TriangleMesh,
+    from: SurfacePoint,
+    side: f64,
+    device: Vector,
+) -> (SurfacePoint, Vector) {
     let miss = |at: &SurfacePoint| {
         let normal = mesh.shaded_normal(at.face, at.point).map(|part| side * part);
         let way = minus(device, at.point);

@@ -33,7 +33,9 @@ pub(super) fn shade(
                 // The two edges with this vertex.
                 for edge in [corner, (corner + 2) % 3] {
                     let other = neighbours[face][edge];
-                    if other == OPEN || dot(face_normals[face], face_normals[other as usize]) < CREASE {
+                    if other == OPEN
+                        || dot(face_normals[face], face_normals[other as usize]) < CREASE
+                    {
                         continue;
                     }
                     let other = other as usize;

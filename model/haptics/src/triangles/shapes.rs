@@ -19,8 +19,8 @@ pub fn plate(side_mm: [f64; 2], cells: [usize; 2]) -> TriangleSoup {
     for row in 0..cells[1] {
         for column in 0..cells[0] {
             let first = row * (cells[0] + 1) + column;
-            let [a, b, c, d] =
-                [first, first + 1, first + cells[0] + 1, first + cells[0] + 2].map(|index| index as u32);
+            let [a, b, c, d] = [first, first + 1, first + cells[0] + 1, first + cells[0] + 2]
+                .map(|index| index as u32);
             soup.faces.extend([[a, b, d], [a, d, c]]);
         }
     }
@@ -123,7 +123,12 @@ fn stomach_radius(share: f64) -> f64 {
 }
 
 /// A tube of rings around an axis, closed by a point at each end, where its radius is zero. Rings are turned as little as possible.
-fn tube(rings: usize, sides: usize, axis: fn(f64) -> Vector, radius: fn(f64) -> f64) -> TriangleSoup {
+fn tube(
+    rings: usize,
+    sides: usize,
+    axis: fn(f64) -> Vector,
+    radius: fn(f64) -> f64,
+) -> TriangleSoup {
     const STEP: f64 = 1e-4;
     let mut soup = TriangleSoup::default();
     let mut across = [0.0, 1.0, 0.0];

@@ -55,7 +55,12 @@ impl Tree {
         self.boxes.first().map_or([[0.0; 3]; 2], |root| [root.low, root.high])
     }
 
-    pub(super) fn nearest(&self, mesh: &TriangleMesh, place: Vector, within: f64) -> Option<SurfacePoint> {
+    pub(super) fn nearest(
+        &self,
+        mesh: &TriangleMesh,
+        place: Vector,
+        within: f64,
+    ) -> Option<SurfacePoint> {
         let mut best = None;
         let mut least = within * within;
         let mut waiting = [(0u32, 0.0f64); WAITING];
@@ -79,7 +84,8 @@ impl Tree {
                 }
                 continue;
             }
-            let [near, far] = [index + 1, one.first].map(|child| (child, self.boxes[child as usize].gap(place)));
+            let [near, far] =
+                [index + 1, one.first].map(|child| (child, self.boxes[child as usize].gap(place)));
             let (near, far) = if near.1 <= far.1 { (near, far) } else { (far, near) };
             for child in [far, near] {
                 if child.1 <= least && count < WAITING {

@@ -13,7 +13,10 @@ pub enum TriangleFeature {
 /// The point of a triangle that is nearest to `point`, and on which part of the triangle it is, by the regions that the corners and
 /// edges have (Ericson, "Real-Time Collision Detection", 2005, section 5.1.5).
 #[must_use]
-pub fn closest_on_triangle([a, b, c]: [[f64; 3]; 3], point: [f64; 3]) -> ([f64; 3], TriangleFeature) {
+pub fn closest_on_triangle(
+    [a, b, c]: [[f64; 3]; 3],
+    point: [f64; 3],
+) -> ([f64; 3], TriangleFeature) {
     use TriangleFeature::{Corner, Edge, Inside};
     let (ab, ac) = (minus(b, a), minus(c, a));
     let from_a = minus(point, a);
@@ -54,7 +57,12 @@ pub fn closest_on_triangle([a, b, c]: [[f64; 3]; 3], point: [f64; 3]) -> ([f64; 
 /// The volume that the way spans with an edge has exactly the opposite sign in the triangle on the other side of that edge, and zero
 /// counts for both, so nothing slips between two triangles (Woop, Benthin & Wald, "Watertight ray/triangle intersection", J. Comput.
 /// Graph. Tech. 2 (2013) 65-82, by the same thought).
-pub(super) fn meets(corners: [Vector; 3], normal: Vector, from: Vector, along: Vector) -> Option<f64> {
+pub(super) fn meets(
+    corners: [Vector; 3],
+    normal: Vector,
+    from: Vector,
+    along: Vector,
+) -> Option<f64> {
     let [a, b, c] = corners.map(|corner| minus(corner, from));
     let spans = [dot(along, cross(a, b)), dot(along, cross(b, c)), dot(along, cross(c, a))];
     let is_within = spans.iter().all(|span| *span >= 0.0) || spans.iter().all(|span| *span <= 0.0);

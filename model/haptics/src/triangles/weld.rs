@@ -3,7 +3,7 @@
 //! STL has three vertices for every triangle, and other formats repeat a vertex for every normal or colour. Only where triangles
 //! have a vertex in common are they neighbours.
 
-use super::vector::{Vector, minus, dot};
+use super::vector::{Vector, dot, minus};
 use std::collections::HashMap;
 
 /// Vertices nearer than this share of the mesh's size are one: 16 roundings of a coordinate in single precision (2^-24 of it), which is

@@ -27,7 +27,8 @@ fn what_is_no_mesh_is_refused() {
     }
     let beyond = TriangleSoup { faces: vec![[0, 1, 2], [0, 3, 1]], ..triangle() };
     assert_eq!(refused(beyond), Error::Index { face: 1, vertex: 3, vertices: 3 });
-    let flat = TriangleSoup { points: vec![[0.0; 3], [10.0, 0.0, 0.0], [5.0, 0.0, 0.0]], ..triangle() };
+    let flat =
+        TriangleSoup { points: vec![[0.0; 3], [10.0, 0.0, 0.0], [5.0, 0.0, 0.0]], ..triangle() };
     assert!(matches!(refused(flat), Error::NoArea { face: 0, .. }));
     let twice = TriangleSoup { faces: vec![[0, 1, 2], [0, 1, 1]], ..triangle() };
     assert!(matches!(refused(twice), Error::NoArea { face: 1, .. }));

@@ -3,7 +3,8 @@
 use super::mesh_support::{apart, mesh};
 use palpate_haptics::triangles::TriangleSoup;
 use palpate_haptics::triangles::files::{
-    MeshFileError, MeshFormat, MeshUnit, read_gltf, read_mesh, read_obj, read_stl, write_glb, write_obj, write_stl,
+    MeshFileError, MeshFormat, MeshUnit, read_gltf, read_mesh, read_obj, read_stl, write_glb,
+    write_obj, write_stl,
 };
 use palpate_haptics::triangles::shapes::{ball, cuboid, phantom, stomach};
 use palpate_model::random::SplitMix;
@@ -30,8 +31,14 @@ fn obj_that_is_none_is_refused_with_its_line() {
         let refusal = refused(&format!("{square}{face}\n"));
         assert_eq!(refusal, MeshFileError::ObjIndex { line: 4, index, vertices: 3 });
     }
-    assert!(matches!(refused(&format!("{square}f 1 2\n")), MeshFileError::ObjLine { what: "face", .. }));
-    assert!(matches!(refused(&format!("{square}f 1 2 a\n")), MeshFileError::ObjLine { what: "face", .. }));
+    assert!(matches!(
+        refused(&format!("{square}f 1 2\n")),
+        MeshFileError::ObjLine { what: "face", .. }
+    ));
+    assert!(matches!(
+        refused(&format!("{square}f 1 2 a\n")),
+        MeshFileError::ObjLine { what: "face", .. }
+    ));
     assert_eq!(refused("v 0 0 0 1 1 1\nv 0 0 0\n"), MeshFileError::ObjColours);
 }
 
@@ -48,7 +55,8 @@ fn stl_in_text_and_binary_are_the_same_mesh() {
         text += " endloop\nendfacet\n";
     }
     text += "endsolid\n";
-    let [one, other] = [&binary[..], text.as_bytes()].map(|bytes| read_stl(bytes, MeshUnit::Millimetre).unwrap());
+    let [one, other] =
+        [&binary[..], text.as_bytes()].map(|bytes| read_stl(bytes, MeshUnit::Millimetre).unwrap());
     assert_eq!(one, other);
     assert_eq!(mesh(one.clone()).points().len(), 8);
     // Some programs begin binary files with the word of ASCII files.
@@ -62,7 +70,10 @@ fn stl_in_text_and_binary_are_the_same_mesh() {
     assert_eq!(refused("solid\nvertex 1 2 3\n"), MeshFileError::StlCorners(1));
     let mut endless = vec![0; 84];
     endless[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
-    assert!(matches!(read_stl(&endless, MeshUnit::Millimetre), Err(MeshFileError::TooManyFaces { .. })));
+    assert!(matches!(
+        read_stl(&endless, MeshUnit::Millimetre),
+        Err(MeshFileError::TooManyFaces { .. })
+    ));
 }
 
 /// Single precision of metres is at most 2^-24 of 0.3 m: 2e-5 mm.
@@ -72,8 +83,12 @@ fn what_is_written_is_read_again() {
         assert_eq!(read_obj(write_obj(&soup).as_bytes(), MeshUnit::Millimetre).unwrap(), soup);
         let read = read_gltf(&write_glb(&soup)).unwrap();
         assert_eq!(read.faces, soup.faces);
-        assert!(read.points.iter().zip(&soup.points).all(|(one, other)| apart(*one, *other) < 2e-5));
-        assert!(read.colours.iter().zip(&soup.colours).all(|(one, other)| apart(*one, *other) < 2e-7));
+        assert!(
+            read.points.iter().zip(&soup.points).all(|(one, other)| apart(*one, *other) < 2e-5)
+        );
+        assert!(
+            read.colours.iter().zip(&soup.colours).all(|(one, other)| apart(*one, *other) < 2e-7)
+        );
         assert_eq!(read.colours.len(), soup.colours.len());
     }
 }
@@ -94,15 +109,25 @@ fn gltf_nodes_strips_and_short_numbers_are_read() {
     let soup = read_gltf(strip.as_bytes()).unwrap();
     assert_eq!(soup.faces, [[0, 1, 2], [1, 3, 2]]);
     // Twice as long along x, a quarter turn to y, a metre to the right.
-    for (point, expected) in soup.points.iter().zip([[1000.0, 0.0], [1000.0, 2000.0], [0.0, 0.0], [0.0, 2000.0]]) {
+    for (point, expected) in
+        soup.points.iter().zip([[1000.0, 0.0], [1000.0, 2000.0], [0.0, 0.0], [0.0, 2000.0]])
+    {
         assert!(apart(*point, [expected[0], expected[1], 0.0]) < 1e-9, "{point:?}");
     }
-    let mirror = json(r#"{"attributes":{"POSITION":0},"mode":6}"#, r#"{"mesh":0,"matrix":[-1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#);
+    let mirror = json(
+        r#"{"attributes":{"POSITION":0},"mode":6}"#,
+        r#"{"mesh":0,"matrix":[-1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1]}"#,
+    );
     let soup = read_gltf(mirror.as_bytes()).unwrap();
     assert_eq!(soup.faces, [[1, 0, 2], [2, 0, 3]]);
     assert_eq!(soup.points[1], [-1000.0, 0.0, 0.0]);
     let circle = json(r#"{"attributes":{"POSITION":0}}"#, r#"{"children":[1]},{"children":[0]}"#);
-    assert!(read_gltf(circle.replace(r#""nodes":["#, r#""scenes":[{"nodes":[0]}],"nodes":["#).as_bytes()).is_err());
+    assert!(
+        read_gltf(
+            circle.replace(r#""nodes":["#, r#""scenes":[{"nodes":[0]}],"nodes":["#).as_bytes()
+        )
+        .is_err()
+    );
 }
 
 #[test]
@@ -111,7 +136,10 @@ fn gltf_that_cannot_be_read_is_refused() {
     assert!(matches!(refused("x"), MeshFileError::Gltf(_)));
     let needs = refused(r#"{"extensionsRequired":["KHR_draco_mesh_compression"]}"#);
     assert_eq!(needs, MeshFileError::GltfExtension("KHR_draco_mesh_compression".to_owned()));
-    assert_eq!(refused(r#"{"buffers":[{"uri":"a.bin"}]}"#), MeshFileError::GltfExternal("a.bin".to_owned()));
+    assert_eq!(
+        refused(r#"{"buffers":[{"uri":"a.bin"}]}"#),
+        MeshFileError::GltfExternal("a.bin".to_owned())
+    );
     let index = refused(r#"{"nodes":[{"mesh":3}]}"#);
     assert_eq!(index, MeshFileError::GltfPart { what: "mesh" });
     // Numbers that promise more than any computer has.

@@ -3,7 +3,8 @@
 use super::mesh_support::{mesh, plus};
 use palpate_haptics::triangles::shapes::{NODULE_MM, phantom, plate};
 use palpate_haptics::triangles::{
-    BlendedLaw, DentSettings, MaterialError, MaterialMap, MeshTouchLoop, MeshTouchSettings, Shading, TriangleMesh,
+    BlendedLaw, DentSettings, MaterialError, MaterialMap, MeshTouchLoop, MeshTouchSettings,
+    Shading, TriangleMesh,
 };
 use palpate_haptics::{ForceLaw, LawSettings, Period};
 use palpate_model::units::Depth;
@@ -32,9 +33,14 @@ fn materials_blend_over_a_triangle() {
     assert!((at(5.0, 0.0) - 0.5).abs() < 1e-12);
     assert!((at(0.0, 10.0) - 0.5).abs() < 1e-12);
     assert!((at(5.0, 2.5) - 0.5).abs() < 1e-12);
-    let refused = |colours: &[[f64; 3]], materials| MaterialMap::from_colours(&mesh, colours, materials).unwrap_err();
+    let refused = |colours: &[[f64; 3]], materials| {
+        MaterialMap::from_colours(&mesh, colours, materials).unwrap_err()
+    };
     assert_eq!(refused(&colours[1..], 2), MaterialError::Colours { given: 3, vertices: 4 });
-    assert_eq!(refused(&colours, 1), MaterialError::Material { vertex: 1, material: 1, materials: 1 });
+    assert_eq!(
+        refused(&colours, 1),
+        MaterialError::Material { vertex: 1, material: 1, materials: 1 }
+    );
     assert_eq!(refused(&[[0.0; 3]; 4], 2), MaterialError::Unpainted(0));
     assert_eq!(refused(&[[f64::NAN; 3]; 4], 2), MaterialError::Unpainted(0));
     assert_eq!(refused(&colours, 9), MaterialError::Count(9));

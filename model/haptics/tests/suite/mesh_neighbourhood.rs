@@ -5,7 +5,8 @@ use super::mesh_touch::sliding;
 use palpate_haptics::surface::SurfaceRecovery;
 use palpate_haptics::triangles::shapes::{ball, plate, stomach};
 use palpate_haptics::triangles::{
-    Dent, DentSettings, GeodesicDistance, MaterialMap, MeshTouchLoop, MeshTouchSettings, Shading, TriangleMesh,
+    Dent, DentSettings, GeodesicDistance, MaterialMap, MeshTouchLoop, MeshTouchSettings, Shading,
+    TriangleMesh,
 };
 use palpate_haptics::{LawSettings, Period};
 use palpate_model::Seconds;
@@ -61,7 +62,10 @@ fn distances_on_a_ball_are_arcs() {
         let (mut worst, mut low, mut high) = (0.0f64, 0.0f64, 0.0f64);
         let mut random = SplitMix::seeded(70);
         for _ in 0..30 {
-            let from = mesh.nearest(super::mesh_support::direction(&mut random).map(|part| radius * part), 5.0);
+            let from = mesh.nearest(
+                super::mesh_support::direction(&mut random).map(|part| radius * part),
+                5.0,
+            );
             let from = from.expect("on the ball");
             distances.search(&mesh, &from, 30.0);
             for (vertex, distance) in distances.found() {
@@ -107,7 +111,9 @@ fn a_dent_is_as_deep_as_the_contact_less_the_slope_times_the_distance() {
         slow.tick(&mesh, None);
         let share = (-0.01 * f64::from(tick)).exp();
         // A nanometre is how far beyond rest a vertex aims.
-        assert!(first.iter().zip(slow.sunk()).all(|(first, now)| (first * share - now).abs() < 2e-6));
+        assert!(
+            first.iter().zip(slow.sunk()).all(|(first, now)| (first * share - now).abs() < 2e-6)
+        );
     }
     for _ in 0..2000 {
         slow.tick(&mesh, None);
@@ -143,7 +149,9 @@ fn a_tick_on_a_mesh_allocates_nothing() {
     assert_eq!(counted.count_total, 0);
     assert!(contacts > 1000, "{contacts}");
     // And the same bits again.
-    let again = |mut touched: MeshTouchLoop| path.iter().map(|device| touched.tick(*device)).collect::<Vec<_>>();
+    let again = |mut touched: MeshTouchLoop| {
+        path.iter().map(|device| touched.tick(*device)).collect::<Vec<_>>()
+    };
     let fresh = || MeshTouchLoop::new(mesh.clone(), MaterialMap::one(&mesh), &settings).unwrap();
     assert_eq!(again(fresh()), again(fresh()));
 }

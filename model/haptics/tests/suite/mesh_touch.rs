@@ -1,11 +1,14 @@
 //! The contact point on meshes against planes, balls, corners and slow searches.
 
 use super::mesh_support::{
-    apart, corners, direction, distance_to, dot, hit_share, length, mesh, minus, plus, uniform, unit, within,
+    apart, corners, direction, distance_to, dot, hit_share, length, mesh, minus, plus, uniform,
+    unit, within,
 };
 use palpate_haptics::surface::TouchState;
 use palpate_haptics::triangles::shapes::{ball, cuboid, plate, stomach};
-use palpate_haptics::triangles::{FAR_MM, MeshProxy, Shading, TriangleMesh, TriangleSoup, closest_on_triangle};
+use palpate_haptics::triangles::{
+    FAR_MM, MeshProxy, Shading, TriangleMesh, TriangleSoup, closest_on_triangle,
+};
 use palpate_model::random::SplitMix;
 
 fn proxy(friction: f64, shading: Shading) -> MeshProxy {
@@ -22,7 +25,10 @@ fn the_nearest_point_of_a_triangle_is_that_of_its_plane_and_edges() {
         let at = place();
         let (point, _) = closest_on_triangle(triangle, at);
         // Roundings are of the size of the triangle over its height.
-        let flat = length(super::mesh_support::cross(minus(triangle[1], triangle[0]), minus(triangle[2], triangle[0])));
+        let flat = length(super::mesh_support::cross(
+            minus(triangle[1], triangle[0]),
+            minus(triangle[2], triangle[0]),
+        ));
         if flat > 1e-3 {
             worst = worst.max((apart(point, at) - distance_to(triangle, at)).abs());
         }
@@ -47,8 +53,11 @@ fn the_tree_finds_what_a_search_of_all_triangles_finds() {
         let to = within(&mut random, low, high);
         let along = minus(to, place);
         // A closed surface is met from outside.
-        let shares = all.iter().enumerate().filter(|(face, _)| dot(along, mesh.face_normals()[*face]) < 0.0);
-        let least = shares.filter_map(|(_, one)| hit_share(*one, place, along)).fold(f64::INFINITY, f64::min);
+        let shares =
+            all.iter().enumerate().filter(|(face, _)| dot(along, mesh.face_normals()[*face]) < 0.0);
+        let least = shares
+            .filter_map(|(_, one)| hit_share(*one, place, along))
+            .fold(f64::INFINITY, f64::min);
         match mesh.first_hit(place, to) {
             Some(hit) => {
                 hits += 1;
@@ -62,7 +71,9 @@ fn the_tree_finds_what_a_search_of_all_triangles_finds() {
 
 #[test]
 fn a_plane_gives_its_depth_and_its_normal() {
-    let tilted = |point: [f64; 3]| [point[0], 0.6 * point[1] - 0.8 * point[2], 0.8 * point[1] + 0.6 * point[2]];
+    let tilted = |point: [f64; 3]| {
+        [point[0], 0.6 * point[1] - 0.8 * point[2], 0.8 * point[1] + 0.6 * point[2]]
+    };
     let mut soup = plate([40.0, 40.0], [9, 7]);
     soup.points.iter_mut().for_each(|point| *point = tilted(*point));
     let mesh = mesh(soup);
@@ -171,7 +182,12 @@ fn floor_edge_and_corner_hold_with_one_two_and_three_planes() {
 fn one_triangle_is_touched_from_both_sides_and_left_over_its_rim() {
     let points = vec![[0.0; 3], [10.0, 0.0, 0.0], [0.0, 10.0, 0.0]];
     let mesh = mesh(TriangleSoup { points, faces: vec![[0, 1, 2]], colours: Vec::new() });
-    for (side, shading) in [(1.0, Shading::Flat), (-1.0, Shading::Flat), (1.0, Shading::Smooth), (-1.0, Shading::Smooth)] {
+    for (side, shading) in [
+        (1.0, Shading::Flat),
+        (-1.0, Shading::Flat),
+        (1.0, Shading::Smooth),
+        (-1.0, Shading::Smooth),
+    ] {
         let mut proxy = proxy(0.0, shading);
         let mut touch = |x: f64, y: f64, z: f64| proxy.follow(&mesh, [x, y, side * z]);
         assert_eq!(touch(2.0, 3.0, 1.0).touch.state, TouchState::Free);
@@ -244,7 +260,8 @@ fn friction_holds_within_its_cone() {
 fn a_rigid_motion_moves_the_contact_with_it() {
     let turn = |point: [f64; 3]| {
         let (sin, cos) = 0.7f64.sin_cos();
-        let [x, y, z] = [cos * point[0] - sin * point[1], sin * point[0] + cos * point[1], point[2]];
+        let [x, y, z] =
+            [cos * point[0] - sin * point[1], sin * point[0] + cos * point[1], point[2]];
         let (sin, cos) = (-1.9f64).sin_cos();
         [x, cos * y - sin * z, sin * y + cos * z]
     };
@@ -261,8 +278,19 @@ fn a_rigid_motion_moves_the_contact_with_it() {
             let device = plus(sliding(&here, step, 2.5), 1.0, [0.031, 0.017, 0.023]);
             let [a, b] = [one.follow(&here, device), other.follow(&there, moved(device))];
             assert_eq!(a.touch.is_contact(), b.touch.is_contact(), "{step}");
-            assert!(apart(moved(a.touch.point), b.touch.point) < 1e-6, "{step}: {}", apart(moved(a.touch.point), b.touch.point));
-            assert!((a.below - b.below).abs() < 1e-7, "{step}: {} {} {:?} {:?}", a.below, b.below, a.on, b.on);
+            assert!(
+                apart(moved(a.touch.point), b.touch.point) < 1e-6,
+                "{step}: {}",
+                apart(moved(a.touch.point), b.touch.point)
+            );
+            assert!(
+                (a.below - b.below).abs() < 1e-7,
+                "{step}: {} {} {:?} {:?}",
+                a.below,
+                b.below,
+                a.on,
+                b.on
+            );
             if a.touch.is_contact() {
                 assert!(apart(turn(a.touch.normal), b.touch.normal) < 1e-6);
             }

@@ -22,7 +22,8 @@ fn fast_pokes_do_not_go_through_a_thin_plate() {
         let mut proxy = proxy(0.0, shading);
         let above = within(&mut random, [5.0, 5.0, 0.01], [45.0, 45.0, 1.0]);
         let below = within(&mut random, [5.0, 5.0, -1000.0], [45.0, 45.0, -0.01]);
-        let [z, other] = if from_above { [thick + above[2], below[2]] } else { [-above[2], thick - below[2]] };
+        let [z, other] =
+            if from_above { [thick + above[2], below[2]] } else { [-above[2], thick - below[2]] };
         proxy.follow(&mesh, [above[0], above[1], z]);
         let contact = proxy.follow(&mesh, [below[0], below[1], other]);
         let (face, normal) = if from_above { (thick, 1.0) } else { (0.0, -1.0) };
@@ -85,7 +86,11 @@ fn the_contact_point_is_never_inside() {
 }
 
 /// The largest change of a force in N/mm over the steps of a path, for a stiffness of 1 N/mm.
-fn slope(path: impl Iterator<Item = [f64; 3]>, mesh: &palpate_haptics::triangles::TriangleMesh, shading: Shading) -> f64 {
+fn slope(
+    path: impl Iterator<Item = [f64; 3]>,
+    mesh: &palpate_haptics::triangles::TriangleMesh,
+    shading: Shading,
+) -> f64 {
     let mut proxy = proxy(0.0, shading);
     let mut last: Option<([f64; 3], [f64; 3])> = None;
     let mut worst = 0.0f64;
@@ -142,7 +147,12 @@ fn force_does_not_jump_along_a_stomach() {
 }
 
 /// Work of the hand on a closed path through an elastic body of 1 N/mm, in N mm, by trapezoids.
-fn loop_work(mesh: &palpate_haptics::triangles::TriangleMesh, shading: Shading, at: impl Fn(f64) -> [f64; 3], steps: usize) -> f64 {
+fn loop_work(
+    mesh: &palpate_haptics::triangles::TriangleMesh,
+    shading: Shading,
+    at: impl Fn(f64) -> [f64; 3],
+    steps: usize,
+) -> f64 {
     let mut proxy = proxy(0.0, shading);
     let mut last: Option<([f64; 3], [f64; 3])> = None;
     let mut work = 0.0;
@@ -172,11 +182,16 @@ fn a_closed_path_makes_no_energy() {
         let [low, high] = mesh.bounds();
         let middle = within(&mut random, low, high);
         let out = direction(&mut random);
-        let across = super::mesh_support::unit(super::mesh_support::cross(out, direction(&mut random)));
+        let across =
+            super::mesh_support::unit(super::mesh_support::cross(out, direction(&mut random)));
         let radius = uniform(&mut random, 5.0, 25.0);
         let at = |share: f64| {
             let angle = std::f64::consts::TAU * share;
-            plus(plus(plus(middle, radius, out), -radius * angle.cos(), out), radius * angle.sin(), across)
+            plus(
+                plus(plus(middle, radius, out), -radius * angle.cos(), out),
+                radius * angle.sin(),
+                across,
+            )
         };
         // Begun outside, so that the start has no energy.
         let start = (0..60).map(|step| f64::from(step) / 60.0).find(|share| {
@@ -189,7 +204,8 @@ fn a_closed_path_makes_no_energy() {
         // most); there are few of them, and where the force falls it errs to the hand's loss.
         assert!(work > -0.1, "{round}: {work}");
         lost += usize::from(work > 1.0);
-        smooth_gain = smooth_gain.max(-loop_work(mesh, Shading::Smooth, |share| at(start + share), 4000));
+        smooth_gain =
+            smooth_gain.max(-loop_work(mesh, Shading::Smooth, |share| at(start + share), 4000));
     }
     assert!(lost > 5, "{lost}");
     println!("largest energy from a smooth loop: {smooth_gain} N mm");

@@ -25,11 +25,19 @@ pub fn read_gltf(bytes: &[u8]) -> Result<TriangleSoup, Error> {
     let (json, binary) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let document: Document =
         serde_json::from_slice(json).map_err(|error| Error::Gltf(error.to_string()))?;
-    let is_read = |name: &&String| name.as_str() != "KHR_mesh_quantization" && name.as_str() != "KHR_materials_unlit";
+    let is_read = |name: &&String| {
+        name.as_str() != "KHR_mesh_quantization" && name.as_str() != "KHR_materials_unlit"
+    };
     if let Some(name) = document.extensions_required.iter().find(is_read) {
         return Err(Error::GltfExtension(name.clone()));
     }
-    let mut reader = Reader { buffers: buffers(&document, binary)?, document: &document, soup: TriangleSoup::default(), nodes: 0, is_coloured: true };
+    let mut reader = Reader {
+        buffers: buffers(&document, binary)?,
+        document: &document,
+        soup: TriangleSoup::default(),
+        nodes: 0,
+        is_coloured: true,
+    };
     for root in roots(&document)? {
         reader.node(root, &STILL, 0)?;
     }
@@ -132,13 +140,17 @@ impl Reader<'_> {
         let points = self.numbers(position, 3, what)?;
         let count = points.len() / 3;
         for point in points.chunks_exact(3) {
-            self.soup.points.push(frame.map(|[x, y, z, way]| {
-                METRE * (x * point[0] + y * point[1] + z * point[2] + way)
-            }));
+            self.soup.points.push(
+                frame.map(|[x, y, z, way]| {
+                    METRE * (x * point[0] + y * point[1] + z * point[2] + way)
+                }),
+            );
         }
         self.colours(primitive, count)?;
         let corners: Vec<u32> = match primitive.indices {
-            Some(indices) => self.numbers(indices, 1, "indices")?.iter().map(|one| *one as u32).collect(),
+            Some(indices) => {
+                self.numbers(indices, 1, "indices")?.iter().map(|one| *one as u32).collect()
+            }
             None => (0..count as u32).collect(),
         };
         if corners.iter().any(|corner| *corner as usize >= count) {
@@ -151,7 +163,8 @@ impl Reader<'_> {
                 face.swap(1, 2);
             }
             // Strips are joined by triangles without area.
-            let is_joint = mode != 4 && (face[0] == face[1] || face[1] == face[2] || face[0] == face[2]);
+            let is_joint =
+                mode != 4 && (face[0] == face[1] || face[1] == face[2] || face[0] == face[2]);
             if !is_joint {
                 self.soup.faces.push(face.map(|corner| first + corner));
             }
@@ -191,7 +204,9 @@ impl Reader<'_> {
         let bytes = buffer.get(view.byte_offset..end).ok_or_else(refused)?;
         let stride = view.byte_stride.unwrap_or(parts * width);
         // All of it before anything is allocated for it.
-        let last = stride.checked_mul(accessor.count - 1).and_then(|way| way.checked_add(accessor.byte_offset));
+        let last = stride
+            .checked_mul(accessor.count - 1)
+            .and_then(|way| way.checked_add(accessor.byte_offset));
         let needed = last.and_then(|last| last.checked_add(parts * width)).ok_or_else(refused)?;
         if stride < parts * width || needed > bytes.len() {
             return Err(refused());
@@ -240,7 +255,12 @@ fn triangles(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
                 [three[0], three[1 + turn], three[2 - turn]]
             })
             .collect(),
-        6 => corners.get(1..).unwrap_or_default().windows(2).map(|two| [two[0], two[1], corners[0]]).collect(),
+        6 => corners
+            .get(1..)
+            .unwrap_or_default()
+            .windows(2)
+            .map(|two| [two[0], two[1], corners[0]])
+            .collect(),
         _ => corners.chunks_exact(3).map(|three| [three[0], three[1], three[2]]).collect(),
     }
 }
@@ -273,5 +293,6 @@ fn within(outer: &Frame, inner: &Frame) -> Frame {
 }
 
 fn determinant([a, b, c]: &Frame) -> f64 {
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }

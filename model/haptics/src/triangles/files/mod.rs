@@ -67,11 +67,15 @@ impl MeshFormat {
 pub enum MeshFileError {
     #[error("line {line} of the OBJ file is no {what}: '{text}'; export it again")]
     ObjLine { line: usize, what: &'static str, text: String },
-    #[error("the face in line {line} of the OBJ file names vertex {index}, but {vertices} are before it; export it again")]
+    #[error(
+        "the face in line {line} of the OBJ file names vertex {index}, but {vertices} are before it; export it again"
+    )]
     ObjIndex { line: usize, index: i64, vertices: usize },
     #[error("only some vertices of the OBJ file have a colour; colour all or none")]
     ObjColours,
-    #[error("the STL file ends at {bytes} bytes, but its {faces} triangles need {needed}; copy it again")]
+    #[error(
+        "the STL file ends at {bytes} bytes, but its {faces} triangles need {needed}; copy it again"
+    )]
     StlShort { bytes: usize, faces: usize, needed: usize },
     #[error("line {line} of the STL file is no vertex: '{text}'; export it again")]
     StlLine { line: usize, text: String },
@@ -79,7 +83,9 @@ pub enum MeshFileError {
     StlCorners(usize),
     #[error("the file is neither GLB nor glTF: {0}; export it again as GLB")]
     Gltf(String),
-    #[error("the glTF file needs the extension {0}, which is not read; export it without compression")]
+    #[error(
+        "the glTF file needs the extension {0}, which is not read; export it without compression"
+    )]
     GltfExtension(String),
     #[error("the glTF file keeps its numbers in {0}; export it as GLB, which has them in one file")]
     GltfExternal(String),
@@ -90,7 +96,11 @@ pub enum MeshFileError {
 }
 
 /// Reads a file's bytes. The unit is for OBJ and STL, which do not say theirs; glTF is in metres by its specification.
-pub fn read_mesh(format: MeshFormat, bytes: &[u8], unit: MeshUnit) -> Result<TriangleSoup, MeshFileError> {
+pub fn read_mesh(
+    format: MeshFormat,
+    bytes: &[u8],
+    unit: MeshUnit,
+) -> Result<TriangleSoup, MeshFileError> {
     match format {
         MeshFormat::Obj => read_obj(bytes, unit),
         MeshFormat::Stl => read_stl(bytes, unit),

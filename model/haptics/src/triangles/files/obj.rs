@@ -21,12 +21,18 @@ pub fn read_obj(bytes: &[u8], unit: MeshUnit) -> Result<TriangleSoup, MeshFileEr
             joined.push_str(line);
             line = &joined;
         }
-        let refused = |what| MeshFileError::ObjLine { line: index + 1, what, text: line.chars().take(60).collect() };
+        let refused = |what| MeshFileError::ObjLine {
+            line: index + 1,
+            what,
+            text: line.chars().take(60).collect(),
+        };
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
                 let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
-                let numbers = numbers.filter(|numbers| numbers.len() >= 3).ok_or_else(|| refused("vertex"))?;
+                let numbers = numbers
+                    .filter(|numbers| numbers.len() >= 3)
+                    .ok_or_else(|| refused("vertex"))?;
                 soup.points.push([0, 1, 2].map(|axis| numbers[axis] * unit.mm()));
                 // Three more numbers are a colour, by the practice of MeshLab and Blender; one alone is a weight.
                 if numbers.len() >= 6 {

@@ -18,7 +18,8 @@ pub fn read_stl(bytes: &[u8], unit: MeshUnit) -> Result<TriangleSoup, MeshFileEr
 }
 
 fn binary(bytes: &[u8], unit: MeshUnit) -> Result<TriangleSoup, MeshFileError> {
-    let count = bytes.get(80..HEAD).and_then(|count| count.try_into().ok()).map_or(0, u32::from_le_bytes);
+    let count =
+        bytes.get(80..HEAD).and_then(|count| count.try_into().ok()).map_or(0, u32::from_le_bytes);
     let faces = count as usize;
     check_faces(faces)?;
     let needed = HEAD + FACE * faces;
@@ -58,6 +59,8 @@ fn ascii(text: &str, unit: MeshUnit) -> Result<TriangleSoup, MeshFileError> {
     if !soup.points.len().is_multiple_of(3) {
         return Err(MeshFileError::StlCorners(soup.points.len()));
     }
-    soup.faces = (0..soup.points.len() as u32 / 3).map(|face| [0, 1, 2].map(|corner| 3 * face + corner)).collect();
+    soup.faces = (0..soup.points.len() as u32 / 3)
+        .map(|face| [0, 1, 2].map(|corner| 3 * face + corner))
+        .collect();
     Ok(soup)
 }

@@ -77,7 +77,10 @@ fn json(soup: &TriangleSoup, [indices, positions, colours]: [usize; 3]) -> Strin
     let [low, high] = soup.points.iter().fold(start, |[low, high], point| {
         // The specification wants the bounds of the numbers as stored.
         let point = point.map(|part| f64::from((part / 1000.0) as f32));
-        [[0, 1, 2].map(|axis| low[axis].min(point[axis])), [0, 1, 2].map(|axis| high[axis].max(point[axis]))]
+        [
+            [0, 1, 2].map(|axis| low[axis].min(point[axis])),
+            [0, 1, 2].map(|axis| high[axis].max(point[axis])),
+        ]
     });
     let count = soup.points.len();
     let mut attributes = serde_json::json!({ "POSITION": 1 });
