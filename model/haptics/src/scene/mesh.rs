@@ -7,8 +7,8 @@ use super::{
 };
 use crate::SettingError;
 use crate::triangles::{
-    DentSettings, FAR_MM, MOST_MATERIALS, MaterialMap, MeshTouch, Shading, TouchedMesh,
-    TriangleMesh,
+    DentSettings, FAR_MM, FIRST_ALONE, MOST_MATERIALS, MaterialMap, MeshTouch, Shading,
+    TouchedMesh, TriangleMesh,
 };
 use palpate_model::viscoelastic::ModifiedKelvin;
 use std::sync::Arc;
@@ -60,11 +60,16 @@ impl MeshSceneSettings {
         [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]))
     }
 
-    /// Position of the stylus at the start, in mm: above the middle and the highest vertex.
+    /// Position of the stylus at the start, in mm: above the surface in the middle, or where there is none, as beside a bend, above the
+    /// highest vertex.
     pub fn start(&self) -> [f64; 3] {
         let [x, y, _] = self.middle();
-        let [_, high] = self.mesh.bounds();
-        [x, y, high[2] + START_HEIGHT_MM]
+        let [low, high] = self.mesh.bounds();
+        let above = self.mesh.first_hit([x, y, high[2] + 1.0], [x, y, low[2] - 1.0]);
+        let higher = |one: [f64; 3], other: &[f64; 3]| if other[2] > one[2] { *other } else { one };
+        let highest = || self.mesh.points().iter().fold(low, higher);
+        let [x, y, z] = above.map_or_else(highest, |hit| hit.point);
+        [x, y, z + START_HEIGHT_MM]
     }
 }
 
@@ -86,7 +91,7 @@ impl MeshScene {
         Ok(Self {
             touched,
             rendering: ForceRendering::new(scene, &settings.bodies, -high)?,
-            shares: [0.0; MOST_MATERIALS],
+            shares: FIRST_ALONE,
             last: SceneTick {
                 device: start,
                 proxy: start,

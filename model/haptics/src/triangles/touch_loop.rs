@@ -2,7 +2,7 @@
 
 use super::blend::{BlendError, BlendedLaw};
 use super::dent::{Dent, DentSettings, DentTick};
-use super::materials::{MOST_MATERIALS, MaterialMap};
+use super::materials::{FIRST_ALONE, MOST_MATERIALS, MaterialMap};
 use super::mesh::TriangleMesh;
 use super::proxy::{FAR_MM, MeshProxy, MeshTouch, Shading};
 use crate::{Flags, LawSettings, SettingError};
@@ -110,7 +110,7 @@ impl MeshTouchLoop {
         Ok(Self {
             touched: TouchedMesh::new(mesh, materials, surface, settings.dent)?,
             law: BlendedLaw::new(&settings.laws, Depth(-FAR_MM))?,
-            shares: [0.0; MOST_MATERIALS],
+            shares: FIRST_ALONE,
         })
     }
 
