@@ -21,9 +21,10 @@ pub struct DentSettings {
 }
 
 impl Default for DentSettings {
-    /// The slope of the scene's height field, 45 degrees, within the stroke of the force law; at rest again at once.
+    /// The slope of the scene's height field, 45 degrees; on a stomach of 50 000 triangles 20 mm have some 500 vertices, which are found well
+    /// within a tick of a millisecond; at rest again at once.
     fn default() -> Self {
-        Self { slope: 1.0, reach_mm: super::FAR_MM, recovery: SurfaceRecovery::ELASTIC }
+        Self { slope: 1.0, reach_mm: 20.0, recovery: SurfaceRecovery::ELASTIC }
     }
 }
 

@@ -98,12 +98,11 @@ impl GeodesicDistance {
         let beyond = if distance > self.reach { self.beyond[vertex as usize] + 1 } else { 1 };
         for (to, with) in [(one, other), (other, one)] {
             let (here, there) = (minus(at(vertex), at(to)), minus(at(with), at(to)));
-            let is_passed = self.passed[to as usize] == self.pass;
-            // A front meets the nearest corner first, unless the triangle is obtuse there.
-            if is_passed && self.distance[to as usize] <= distance && dot(here, there) >= 0.0 {
-                continue;
-            }
-            let mut best = distance + length(here);
+            // A corner that was passed before has no longer way than along this edge, but may have one across the triangle: the front
+            // around a source that is near is round.
+            let is_before =
+                self.passed[to as usize] == self.pass && self.distance[to as usize] <= distance;
+            let mut best = if is_before { f64::INFINITY } else { distance + length(here) };
             if self.passed[with as usize] == self.pass {
                 let known = [distance, self.distance[with as usize]];
                 if let Some(across) = unfold(here, there, known) {

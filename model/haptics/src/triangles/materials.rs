@@ -9,6 +9,9 @@ pub const MOST_MATERIALS: usize = 8;
 /// Shares of all materials at one place; they add up to one.
 pub(super) type Shares = [f64; MOST_MATERIALS];
 
+/// The first material alone.
+pub(crate) const FIRST_ALONE: Shares = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+
 /// A painting that gives no materials.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum MaterialError {
@@ -47,7 +50,7 @@ impl MaterialMap {
     /// One material everywhere.
     #[must_use]
     pub fn one(mesh: &TriangleMesh) -> Self {
-        Self { materials: 1, shares: vec![first_alone(); mesh.points().len()].into() }
+        Self { materials: 1, shares: vec![FIRST_ALONE; mesh.points().len()].into() }
     }
 
     /// From colours of the file's vertices: red, green and blue are the shares of the first, second and third material, whatever the
@@ -109,7 +112,7 @@ impl MaterialMap {
     fn normalised(materials: usize, mut sums: Vec<Shares>) -> Self {
         for shares in &mut sums {
             let sum: f64 = shares.iter().sum();
-            *shares = if sum > 0.0 { shares.map(|part| part / sum) } else { first_alone() };
+            *shares = if sum > 0.0 { shares.map(|part| part / sum) } else { FIRST_ALONE };
         }
         Self { materials, shares: sums.into() }
     }
@@ -137,12 +140,6 @@ impl MaterialMap {
         }
         sum
     }
-}
-
-fn first_alone() -> Shares {
-    let mut shares = [0.0; MOST_MATERIALS];
-    shares[0] = 1.0;
-    shares
 }
 
 fn check_count(materials: usize) -> Result<(), MaterialError> {

@@ -48,8 +48,8 @@ pub struct MeshProxy {
     /// Where it is on the surface, and on which side: 1 in front, -1 behind an open part.
     at: Option<(SurfacePoint, f64)>,
     last: Option<Vector>,
-    /// No surface is nearer to the place of the last free tick than this, in mm.
-    clearance: f64,
+    /// [`MeshTouch::below`] of the last tick.
+    below: f64,
 }
 
 /// Contact of a device with a mesh.
@@ -70,24 +70,26 @@ impl MeshProxy {
     pub fn new(friction: f64, shading: Shading) -> Result<Self, SettingError> {
         let settings = [("friction coefficient", friction, "")];
         SettingRange::UpTo(FRICTION_MOST).check("a contact point", &settings)?;
-        Ok(Self { friction, shading, at: None, last: None, clearance: 0.0 })
+        Ok(Self { friction, shading, at: None, last: None, below: 0.0 })
     }
 
     /// One tick: the device is at `device` (mm).
     pub fn follow(&mut self, mesh: &TriangleMesh, device: [f64; 3]) -> MeshTouch {
         if !is_finite(device) {
             let at = self.last.unwrap_or_default();
-            return without(TouchState::NotANumber, at, None, -self.clearance);
+            return without(TouchState::NotANumber, at, None, self.below);
         }
         let last = self.last.replace(device);
         let held = match self.at.take() {
             Some((at, side)) => self.held(mesh, at, side, device),
             None => self.reached(mesh, last, device),
         };
-        match held {
+        let contact = match held {
             Some((goal, from, side)) => self.touched(mesh, goal, from, side, device),
             None => self.free(mesh, device),
-        }
+        };
+        self.below = contact.below;
+        contact
     }
 
     /// From a contact: where its point goes, from where, and on which side; `None` in the air.
@@ -122,9 +124,10 @@ impl MeshProxy {
         device: Vector,
     ) -> Option<(SurfacePoint, SurfacePoint, f64)> {
         let way = last.map_or(0.0, |last| length(minus(device, last)));
-        // Nothing is nearer than the clearance.
+        // A shorter way than to the nearest surface meets none; a millionth less, since the distance is rounded.
+        let clearance = (1.0 - 1e-6) * -self.below;
         if let Some(last) = last
-            && way >= self.clearance
+            && way >= clearance
             && let Some(hit) = mesh.first_hit(last, device)
         {
             let side = side_of(mesh, hit.face, minus(device, last));
@@ -138,15 +141,12 @@ impl MeshProxy {
     /// Without contact, unless the device is inside: it began there, or came through a place that is one rounding wide.
     fn free(&mut self, mesh: &TriangleMesh, device: Vector) -> MeshTouch {
         let Some(nearest) = mesh.nearest(device, FAR_MM) else {
-            self.clearance = FAR_MM;
             return without(TouchState::Free, device, None, -FAR_MM);
         };
         if mesh.is_closed[nearest.face as usize] && !mesh.is_outside(&nearest, device) {
             return self.touched(mesh, nearest, nearest, 1.0, device);
         }
         let distance = length(minus(device, nearest.point));
-        // A millionth less: sums of many short ways may not round past it.
-        self.clearance = distance * (1.0 - 1e-6);
         without(TouchState::Free, device, Some(nearest), -distance)
     }
 
@@ -176,7 +176,6 @@ impl MeshProxy {
             (goal, 0.0)
         };
         self.at = Some((at, side));
-        self.clearance = 0.0;
         MeshTouch {
             touch: ProxyTouch {
                 state: if is_still && self.friction > 0.0 {

@@ -143,12 +143,9 @@ impl TreeBox {
     /// Square of the distance of a place.
     #[inline]
     fn gap(&self, place: Vector) -> f64 {
-        let mut sum = 0.0;
-        for ((low, high), at) in self.low.iter().zip(&self.high).zip(&place) {
-            let gap = (low - at).max(at - high).max(0.0);
-            sum += gap * gap;
-        }
-        sum
+        let gaps = [0, 1, 2]
+            .map(|axis| (self.low[axis] - place[axis]).max(place[axis] - self.high[axis]).max(0.0));
+        dot(gaps, gaps)
     }
 
     /// Whether a way meets it before the share `most`. A box is taken a little larger: roundings must not lose a triangle that

@@ -10,6 +10,7 @@ mod mesh_build;
 mod mesh_files;
 mod mesh_materials;
 mod mesh_neighbourhood;
+mod mesh_scene;
 mod mesh_support;
 mod mesh_touch;
 mod mesh_walks;
