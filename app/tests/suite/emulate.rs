@@ -30,7 +30,7 @@ fn start(more: &[&str]) -> (Emulator, Value) {
     start_device("galil", more)
 }
 
-fn start_device(device: &str, more: &[&str]) -> (Emulator, Value) {
+pub(super) fn start_device(device: &str, more: &[&str]) -> (Emulator, Value) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
         .args(["emulate", device, "--tcp", "127.0.0.1:0", "--json"])
         .args(more)

@@ -1,6 +1,9 @@
 //! `palpate scene`.
 
-use crate::support::{assert_refused, json, palpate, stderr, stdout, typed};
+use crate::emulate::start_device;
+use crate::support::{
+    assert_refused, json, palpate, short_run, split_words, stderr, stdout, succeeded, typed,
+};
 
 #[test]
 fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
@@ -116,4 +119,33 @@ fn a_mesh_is_planned_from_what_is_measured() {
     assert_eq!(names[..2], ["closed form", "first moved first"], "{bench}");
     let mut speeds = methods.iter().map(|one| one["nodes_per_ms"].as_f64());
     assert!(speeds.all(|speed| speed > Some(0.0)), "{bench}");
+}
+
+#[test]
+fn a_recorded_specimen_is_touched_by_the_simulated_hand_and_through_a_device() {
+    let at = tempfile::tempdir().unwrap();
+    succeeded(&short_run(at.path(), "pad", &[]));
+    std::fs::write(at.path().join("pad.toml"), "name = \"pad\"\n[tissue]\nsource = \"pad\"\n")
+        .unwrap();
+    let by_hand = json(&palpate(at.path(), &["scene", "run", "pad.toml", "--json"]));
+    assert_eq!(by_hand["path"], "poke");
+    assert!(by_hand["device"].is_null());
+    assert!(by_hand["force_max_n"].as_f64().unwrap() > 0.0, "{by_hand}");
+    let (_service, ready) = start_device("inverse", &[]);
+    let service = ready["at"].as_str().unwrap();
+    let line = format!(
+        "scene record pad.toml --device inverse --service {service} --seconds 2 --to touched --json"
+    );
+    let touched = palpate(at.path(), &split_words(&line));
+    assert!(stderr(&touched).contains("a round trip takes"), "{}", stderr(&touched));
+    let touched = json(&touched);
+    assert_eq!((&touched["name"], &touched["path"]), (&"pad".into(), &"device".into()));
+    // How many there were, and whether the force came up, depends on how busy the computer is.
+    assert!(touched["device"]["reports"].as_u64().unwrap() > 0, "{touched}");
+    let again = json(&palpate(at.path(), &["scene", "replay", "touched", "--json"]));
+    assert_eq!((&again["is_identical"], &again["is_whole"]), (&true.into(), &true.into()));
+    // Another is not there.
+    let line = format!("scene run --device inverse:left --service {service}");
+    assert_refused(&palpate(at.path(), &split_words(&line)), 1, "left");
+    assert_refused(&palpate(at.path(), &["scene", "run", "--device", "omni"]), 2, "inverse:NAME");
 }
