@@ -7,6 +7,7 @@ use super::rig::BenchArgs;
 use super::terminal::{ctrl_c_flag, read_lines};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
+use palpate_drivers::priority::request_real_time;
 use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
@@ -315,6 +316,8 @@ fn inverse(args: &InverseArgs, output: &Output) -> Result<(), Failure> {
     };
     let (mut device, _) = EmulatedInverse::new(settings).map_err(Failure::usage)?;
     let (model, label) = ("Inverse3".to_owned(), "Inverse service".to_owned());
+    // A thousand answers a second: without it, this computer's other work would be the service's delay.
+    let _ = request_real_time();
     let announcement = Announcement { device: "inverse", model, label, cell: None };
     let wire = WireArgs {
         pty: None,
