@@ -25,7 +25,8 @@ const MOST_STEPS: usize = 4096;
 const ROUNDS: usize = 4;
 /// Steps to the place of the interpolated normal. Each leaves a share of depth over radius of the last, or less.
 const SHADING_STEPS: usize = 24;
-/// They end where the next is less than this, in mm: far below any device's resolution.
+/// They end where the next is less than this, in mm, and a device that is no further from the surface is on it: far below any device's
+/// resolution, and some thousand roundings of a coordinate of 1000 mm.
 const STILL_MM: f64 = 1e-9;
 
 palpate_model::named! {
@@ -85,8 +86,13 @@ impl MeshProxy {
             None => self.reached(mesh, last, device),
         };
         let contact = match held {
+            Some((goal, _, side))
+                if is_level(&goal, device) && is_left(mesh, &goal, side, device) =>
+            {
+                self.level(goal, side, device)
+            }
             Some((goal, from, side)) => self.touched(mesh, goal, from, side, device),
-            None => self.free(mesh, device),
+            None => self.free(mesh, last, device),
         };
         self.below = contact.below;
         contact
@@ -103,7 +109,7 @@ impl MeshProxy {
         let (mut at, mut side) = (at, side);
         for _ in 0..ROUNDS {
             let goal = descend(mesh, at.face, device);
-            if !is_left(mesh, &goal, side, device) {
+            if !is_left(mesh, &goal, side, device) || is_level(&goal, device) {
                 return Some((goal, at, side));
             }
             let hit =
@@ -139,15 +145,27 @@ impl MeshProxy {
     }
 
     /// Without contact, unless the device is inside: it began there, or came through a place that is one rounding wide.
-    fn free(&mut self, mesh: &TriangleMesh, device: Vector) -> MeshTouch {
+    fn free(&mut self, mesh: &TriangleMesh, last: Option<Vector>, device: Vector) -> MeshTouch {
         let Some(nearest) = mesh.nearest(device, FAR_MM) else {
             return without(TouchState::Free, device, None, -FAR_MM);
         };
         if mesh.is_closed[nearest.face as usize] && !mesh.is_outside(&nearest, device) {
             return self.touched(mesh, nearest, nearest, 1.0, device);
         }
+        if is_level(&nearest, device) {
+            let along = last.map_or([0.0; 3], |last| minus(device, last));
+            return self.level(nearest, side_of(mesh, nearest.face, along), device);
+        }
         let distance = length(minus(device, nearest.point));
         without(TouchState::Free, device, Some(nearest), -distance)
+    }
+
+    /// On the surface itself there is no depth and no contact, but the side is known: of a way that begins on an open part, its hit
+    /// does not say from where it comes.
+    fn level(&mut self, at: SurfacePoint, side: f64, device: Vector) -> MeshTouch {
+        self.at = Some((at, side));
+        let distance = length(minus(device, at.point));
+        MeshTouch { side, ..without(TouchState::Free, device, Some(at), -distance) }
     }
 
     fn touched(
@@ -252,6 +270,11 @@ fn is_left(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector) ->
     }
 }
 
+/// Whether the device is on the surface, as far as roundings let it be known.
+fn is_level(at: &SurfacePoint, device: Vector) -> bool {
+    length(minus(device, at.point)) <= STILL_MM
+}
+
 /// Whether a face has the part of the surface that a point is on; a way from there meets it nowhere else.
 fn touches(mesh: &TriangleMesh, at: &SurfacePoint, face: u32) -> bool {
     let corners = mesh.faces[at.face as usize];
@@ -266,9 +289,9 @@ fn touches(mesh: &TriangleMesh, at: &SurfacePoint, face: u32) -> bool {
     }
 }
 
-/// From which side a way comes to a face.
+/// From which side a way comes to a face; one along the face counts as from the front.
 fn side_of(mesh: &TriangleMesh, face: u32, along: Vector) -> f64 {
-    if dot(along, mesh.face_normals[face as usize]) < 0.0 { 1.0 } else { -1.0 }
+    if dot(along, mesh.face_normals[face as usize]) > 0.0 { -1.0 } else { 1.0 }
 }
 
 /// From the device to the contact point; the normal of the surface where they are one.
