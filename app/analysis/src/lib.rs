@@ -54,6 +54,8 @@ pub mod scene;
 pub mod scene_bench;
 #[cfg(feature = "haptics")]
 pub mod scene_device;
+#[cfg(feature = "haptics")]
+pub mod scene_mesh;
 pub mod select;
 pub mod session_actions;
 pub mod session_entries;

@@ -1,18 +1,24 @@
 //! A scene in real time, its recording and its replay.
 
 use super::haptics::{LoopMeasurement, fit_haptic_body};
-use super::population::is_member;
 use super::scene_device::DeviceUse;
+use super::scene_mesh::{
+    MeshReport, mesh_scene_settings, read_mesh_scene, resolve_mesh, source_path,
+};
 use super::tick_replay::{
     FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
 };
 use palpate_haptic_devices::InverseDevice;
-use palpate_haptics::scene::{HandLedScene, HandPose, NoForceReason, Pose, Scene, ScenePath};
+use palpate_haptics::scene::{
+    HandLedMeshScene, HandLedScene, HandPose, MeshScene, MeshSceneError, NoForceReason, Pose,
+    Scene, ScenePath, SceneTick,
+};
 use palpate_runner::haptics::scene::{
-    COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
+    COLUMNS, Columns, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
 use palpate_runner::haptics::scene_file::SceneFile;
-use palpate_runner::haptics::{SceneEnd, SceneLoop};
+use palpate_runner::haptics::scene_mesh::SceneMesh;
+use palpate_runner::haptics::{LoopScene, SceneEnd, SceneFrame, SceneLoop};
 use palpate_sessions::ticks::{SETTINGS_FILE, TickRecording, has_columns};
 use serde::Serialize;
 use std::path::Path;
@@ -22,23 +28,47 @@ use std::time::Duration;
 /// Interval between two looks at a running scene: half a frame.
 const LOOK: Duration = Duration::from_millis(8);
 
-/// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
+/// A scene file with its body, and what is to be known of that; without a file the scene that is built in. Its tissue is a square.
 pub fn read_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
+    let read = read_any_scene(file)?;
+    match (&read.0.mesh, file) {
+        (Some(_), Some(path)) => Err(format!(
+            "the tissue of {} is a mesh, which only the command line runs so far; open a scene without mesh.file here",
+            path.display()
+        )),
+        _ => Ok(read),
+    }
+}
+
+/// The same, its tissue a square or a mesh. Paths of a mesh become absolute, with the SHA-256 of what is there.
+pub fn read_any_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
     let Some(path) = file else { return Ok((SceneFile::default(), Vec::new())) };
     let called = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|err| format!("cannot read {called} ({err}); give a scene file"))?;
     let mut scene = SceneFile::parse(&called, &text)?;
     let mut notes = Vec::new();
+    // A source is named from where its file is.
+    let folder = path.parent().unwrap_or(Path::new(""));
     if let Some(source) = scene.source.take() {
-        // A source is named from where its file is.
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let source = if is_member(&source) { source.into() } else { folder.join(&source) };
-        let found = fit_haptic_body(&source)?;
+        let found = fit_haptic_body(&source_path(folder, &source))?;
         scene.body = found.body;
         notes = found.notes;
     }
+    if let Some(mesh) = &mut scene.mesh {
+        let found = resolve_mesh(mesh, folder).map_err(|err| format!("{called}: {err}"))?;
+        notes.extend(found);
+    }
     Ok((scene, notes))
+}
+
+/// Refuses a scene that cannot be, before anything is measured or written. The check of a square is the same on any number of nodes.
+pub fn check_scene(file: &SceneFile) -> Result<(), String> {
+    const COARSEST: usize = 3;
+    match &file.mesh {
+        Some(mesh) => read_mesh_scene(file, mesh, None).map(|_| ()),
+        None => file.scene(COARSEST).map(|_| ()),
+    }
 }
 
 /// Result of a scene that ran in real time.
@@ -47,8 +77,11 @@ pub struct SceneRun {
     pub name: String,
     /// The hand's path; `device` where a person's hand led a real one.
     pub path: &'static str,
-    /// Nodes along a side.
-    pub nodes: usize,
+    /// Nodes along a side of a square.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshReport>,
     pub ticks: u64,
     /// Greatest depth of a frame in mm.
     pub depth_max_mm: f64,
@@ -76,6 +109,33 @@ pub enum SceneHand<'a> {
     OnDevice { device: Box<InverseDevice>, seconds: Option<f64>, is_ending: &'a AtomicBool },
 }
 
+/// What a scene that plays shows of its newest tick.
+trait Shown: LoopScene {
+    fn shown(frame: &Self::Frame) -> &SceneTick;
+    /// Ticks since the start.
+    fn ticks(&self) -> u64;
+}
+
+impl Shown for Scene {
+    fn shown(frame: &SceneFrame) -> &SceneTick {
+        &frame.tick
+    }
+
+    fn ticks(&self) -> u64 {
+        Scene::ticks(self)
+    }
+}
+
+impl Shown for MeshScene {
+    fn shown(frame: &SceneTick) -> &SceneTick {
+        frame
+    }
+
+    fn ticks(&self) -> u64 {
+        self.last().tick
+    }
+}
+
 /// Runs a scene, its mesh known, in real time, and records it in a new folder if one is given.
 pub fn play_scene(
     file: &SceneFile,
@@ -83,9 +143,25 @@ pub fn play_scene(
     record: Option<&Path>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<SceneRun, String> {
+    if let Some(mesh) = &file.mesh {
+        let (scene, report) = read_mesh_scene(file, mesh, None)?;
+        let played = play(file, scene, hand, record, progress)?;
+        return Ok(SceneRun { mesh: Some(report), ..played });
+    }
     let nodes = file.nodes.ok_or("the scene has no number of nodes; report this bug in palpate")?;
     let scene = file.scene(nodes)?;
-    let settings = *scene.settings();
+    let played = play(file, scene, hand, record, progress)?;
+    Ok(SceneRun { nodes: Some(nodes), ..played })
+}
+
+fn play<S: Shown>(
+    file: &SceneFile,
+    scene: S,
+    hand: SceneHand<'_>,
+    record: Option<&Path>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<SceneRun, String> {
+    let period = scene.period();
     let start = |columns| {
         record.map(|folder| SceneRecorder::start(folder, &file.text(), columns)).transpose()
     };
@@ -103,20 +179,13 @@ pub fn play_scene(
         }
     };
     let priority = live.granted_priority().to_string();
-    let (mut depth_max_mm, mut force_max_n) = (0.0_f64, 0.0_f64);
-    let mut seen: Vec<(NoForceReason, u64)> = Vec::new();
+    let mut seen = SeenTicks::default();
     let mut is_over = false;
     while !is_over && live.is_alive() && !is_ending.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
-        let tick = live.view().tick;
-        depth_max_mm = depth_max_mm.max(tick.depth);
-        let [x, y, z] = tick.force;
-        force_max_n = force_max_n.max(x.hypot(y).hypot(z));
-        match seen.iter_mut().find(|(why, _)| *why == tick.no_force_reason) {
-            Some((_, count)) => *count += 1,
-            None => seen.push((tick.no_force_reason, 1)),
-        }
-        let seconds = settings.period.time_of(tick.tick).seconds().0;
+        let tick = *S::shown(live.view());
+        seen.add(&tick);
+        let seconds = period.time_of(tick.tick).seconds().0;
         progress(whole.map_or(0.0, |whole| seconds / whole));
         is_over = match monitor {
             None => live.is_over(),
@@ -126,23 +195,22 @@ pub fn play_scene(
     let device = monitor.map(|monitor| DeviceUse::of(monitor.report()));
     let end = live.stop().ok_or("the loop of the scene failed; report this bug in palpate")?;
     let recorded = end.recorded.transpose()?;
-    seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let frames = seen.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
     let tick_us = file.tolerances.tick_us;
     Ok(SceneRun {
         name: file.name.clone(),
         path,
-        nodes: settings.nodes,
+        nodes: None,
+        mesh: None,
         ticks: end.scene.ticks(),
-        depth_max_mm,
-        force_max_n,
-        why: seen.iter().map(|(why, count)| (why.name(), *count as f64 / frames)).collect(),
+        depth_max_mm: seen.depth_max_mm,
+        force_max_n: seen.force_max_n,
+        why: seen.shares(),
         surface_hash: format!("{:016x}", end.scene.hash()),
         device,
         tick_us,
         is_within_budget: 1e6 * end.timing.work.p99_9.0 <= tick_us,
         paced: LoopMeasurement {
-            rate_hz: settings.period.hz(),
+            rate_hz: period.hz(),
             busy_threads: 0,
             priority,
             statistics: end.timing,
@@ -151,7 +219,46 @@ pub fn play_scene(
     })
 }
 
+/// What the frames of a scene had.
+#[derive(Default)]
+struct SeenTicks {
+    depth_max_mm: f64,
+    force_max_n: f64,
+    why: Vec<(NoForceReason, u64)>,
+}
+
+impl SeenTicks {
+    fn add(&mut self, tick: &SceneTick) {
+        self.depth_max_mm = self.depth_max_mm.max(tick.depth);
+        let [x, y, z] = tick.force;
+        self.force_max_n = self.force_max_n.max(x.hypot(y).hypot(z));
+        match self.why.iter_mut().find(|(why, _)| *why == tick.no_force_reason) {
+            Some((_, count)) => *count += 1,
+            None => self.why.push((tick.no_force_reason, 1)),
+        }
+    }
+
+    /// Reasons with their shares, the most frequent first.
+    fn shares(mut self) -> Vec<(&'static str, f64)> {
+        self.why.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let frames = self.why.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
+        self.why.iter().map(|(why, count)| (why.name(), *count as f64 / frames)).collect()
+    }
+}
+
 impl Replayable<3, 10> for HandLedScene {
+    fn tick(&mut self, row: &SceneRow) -> SceneRow {
+        let (hand, elapsed) = scene_input(row);
+        let tick = self.tick_after(hand, elapsed);
+        scene_row(hand, elapsed, &tick)
+    }
+
+    fn state_hash(&self) -> u64 {
+        self.scene.hash()
+    }
+}
+
+impl Replayable<3, 10> for HandLedMeshScene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (hand, elapsed) = scene_input(row);
         let tick = self.tick_after(hand, elapsed);
@@ -184,6 +291,19 @@ impl Replayable<3, 10> for Scene {
     }
 }
 
+/// On a device that was sensed.
+impl Replayable<3, 10> for MeshScene {
+    fn tick(&mut self, row: &SceneRow) -> SceneRow {
+        let (sensed, elapsed) = scene_input(row);
+        let tick = self.render(Pose { at: sensed.at, turn: sensed.turn }, elapsed);
+        scene_row(sensed, elapsed, &tick)
+    }
+
+    fn state_hash(&self) -> u64 {
+        self.hash()
+    }
+}
+
 /// Replays every tick of a recording from its inputs.
 pub fn replay(
     folder: &Path,
@@ -201,6 +321,9 @@ pub fn replay(
     let found = TickRecording::read(folder, columns)?;
     let called = folder.join(SETTINGS_FILE).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;
+    if let Some(mesh) = &file.mesh {
+        return replay_mesh(folder, (&file, mesh), (&found, columns), is_going);
+    }
     let nodes = file.nodes.ok_or_else(|| {
         format!("{called} does not state the number of nodes; use a complete recording")
     })?;
@@ -211,4 +334,22 @@ pub fn replay(
     }
     let mut led = HandLedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
     replay_ticks(&name, &found, columns, &mut led, is_going)
+}
+
+/// The files of the mesh are where they were, or in the folder of the recording, and have the bytes that they had.
+fn replay_mesh(
+    folder: &Path,
+    (file, mesh): (&SceneFile, &SceneMesh),
+    (found, columns): (&TickRecording<3, 10>, Columns),
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<ReplayResult, String> {
+    let settings = mesh_scene_settings(file, mesh, Some(folder))?;
+    let refused = |err: MeshSceneError| format!("the scene '{}': {err}", file.name);
+    let name = format!("scene '{}' on {}", file.name, mesh.file);
+    if columns == SENSED_COLUMNS {
+        let mut scene = MeshScene::new(&settings).map_err(refused)?;
+        return replay_ticks(&name, found, columns, &mut scene, is_going);
+    }
+    let mut led = HandLedMeshScene::new(&settings).map_err(refused)?;
+    replay_ticks(&name, found, columns, &mut led, is_going)
 }

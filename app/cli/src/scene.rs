@@ -10,7 +10,9 @@ use clap::{Args, Subcommand};
 use palpate_analysis::population::library_member;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::report::scene::{bench_text, device_lines, plan_text, played_text};
-use palpate_analysis::scene::{SceneHand, SceneRun, play_scene, read_scene, replay};
+use palpate_analysis::scene::{
+    SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
+};
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
 use palpate_analysis::scene_device::{DeviceChoice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
@@ -132,7 +134,7 @@ struct PlayedOutput<'a> {
     planned_again: Option<&'a ScenePlan>,
 }
 
-/// Nodes along a side for the check of a scene whose mesh is still to be planned; the check is the same on any mesh.
+/// Nodes along a side of a scene whose mesh is still to be planned; the device is the same on any mesh.
 const COARSEST: usize = 3;
 
 /// A day, in s.
@@ -157,7 +159,7 @@ pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure
 }
 
 fn read(file: Option<&Path>, output: &Output) -> Result<SceneFile, Failure> {
-    let (scene, notes) = read_scene(file).map_err(Failure::usage)?;
+    let (scene, notes) = read_any_scene(file).map_err(Failure::usage)?;
     notes.iter().for_each(|note| output.note(note));
     Ok(scene)
 }
@@ -171,12 +173,13 @@ fn run_scene(
     let seconds = args.seconds.map(|one| above_zero("seconds", one, SECONDS_MAX, "s"));
     let seconds = seconds.transpose()?;
     let mut file = read(args.file.as_deref(), output)?;
+    refuse_on_mesh(args, &file)?;
     if let Some(specimen) = &args.specimen {
         file.body = library_member(specimen).map_err(Failure::usage)?.body;
         file.name.clone_from(specimen);
     }
     // An impossible scene is refused before anything is measured or written.
-    file.scene(COARSEST).map_err(Failure::usage)?;
+    check_scene(&file).map_err(Failure::usage)?;
     let opened = args.device.as_ref().map(|name| device(args, name, &mut file, output));
     let opened = opened.transpose()?;
     let is_ending = ctrl_c_flag()?;
@@ -228,6 +231,22 @@ fn run_scene(
     Ok(())
 }
 
+/// What a scene on a mesh has no part of.
+fn refuse_on_mesh(args: &SceneRunArgs, file: &SceneFile) -> Result<(), Failure> {
+    let Some(mesh) = &file.mesh else { return Ok(()) };
+    if args.device.is_some() {
+        return Err(Failure::usage(
+            "a scene on a mesh is led by the simulated hand so far; leave out --device",
+        ));
+    }
+    if args.specimen.is_some() && !mesh.bodies.is_empty() {
+        return Err(Failure::usage(
+            "the mesh of the scene has its own force models; leave out --specimen, or name the specimen in mesh.bodies",
+        ));
+    }
+    Ok(())
+}
+
 /// Opens the device, says what is to be known before the first touch, and gives its numbers to the scene.
 fn device(
     args: &SceneRunArgs,
@@ -246,6 +265,11 @@ fn device(
 
 fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {
     let file = read(args.file.as_deref(), output)?;
+    if file.mesh.is_some() {
+        return Err(Failure::usage(
+            "the triangles of a mesh from a file are not planned; give a scene without mesh.file",
+        ));
+    }
     let extent = match args.full {
         true => TradeExtent::Full,
         false => TradeExtent::Quick,

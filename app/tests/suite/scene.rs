@@ -65,6 +65,29 @@ fn a_scene_file_is_shown_whole_and_run() {
     assert!(run["force_max_n"].as_f64().unwrap() > 0.1, "{run}");
 }
 
+/// A box of 40 mm as a file that a person can read.
+const BOX: &str = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 40 40 0\nv 0 0 40\nv 40 0 40\nv 0 40 40\nv 40 40 40\n\
+    f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+
+#[test]
+fn a_mesh_is_touched_recorded_and_computed_again() {
+    let at = tempfile::tempdir().unwrap();
+    std::fs::write(at.path().join("box.obj"), BOX).unwrap();
+    std::fs::write(at.path().join("box.toml"), "[mesh]\nfile = \"box.obj\"\n").unwrap();
+    let run = json(&palpate(at.path(), &["scene", "record", "box.toml", "--to", "poke", "--json"]));
+    assert_eq!(run["mesh"]["triangles"], 12, "{run}");
+    assert!(run.get("nodes").is_none(), "{run}");
+    assert!(run["depth_max_mm"].as_f64().unwrap() > 5.0, "{run}");
+    let again = json(&palpate(at.path(), &["scene", "replay", "poke", "--json"]));
+    assert_eq!(again["is_identical"], true, "{again}");
+    let shown = stdout(&palpate(at.path(), &["scene", "show", "box.toml"]));
+    assert!(shown.contains("sha256 = \"") && shown.contains("reach_mm = 20.0"), "{shown}");
+    std::fs::write(at.path().join("box.obj"), BOX.replace("40", "41")).unwrap();
+    assert_refused(&palpate(at.path(), &["scene", "replay", "poke"]), 2, "another file");
+    let bench = palpate(at.path(), &["scene", "bench", "box.toml"]);
+    assert_refused(&bench, 2, "mesh.file");
+}
+
 #[test]
 fn what_is_impossible_is_refused_in_words() {
     let at = tempfile::tempdir().unwrap();

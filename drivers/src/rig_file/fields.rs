@@ -136,6 +136,11 @@ impl Fields {
         self.mistakes.push(Mistake { line, message: format!("{key}: {message}") });
     }
 
+    /// Whether a key is there.
+    pub fn is_given(&self, key: &str) -> bool {
+        self.all.iter().any(|field| field.key == key)
+    }
+
     fn take(&mut self, key: &str) -> Option<Value> {
         let field = self.all.iter_mut().find(|field| field.key == key)?;
         field.is_taken = true;
@@ -164,7 +169,7 @@ impl Fields {
     }
 
     /// A list of texts, if it is there.
-    pub(super) fn texts(&mut self, key: &str) -> Option<Vec<String>> {
+    pub fn texts(&mut self, key: &str) -> Option<Vec<String>> {
         let hint = "give a list of texts, such as [\"python3\", \"my_stage.py\"]";
         self.read_value(key, hint, |value| match value {
             Value::Texts(texts) if !texts.is_empty() => Some(texts),
@@ -216,7 +221,7 @@ impl Fields {
     }
 
     pub fn required_number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
-        if !self.all.iter().any(|field| field.key == key) {
+        if !self.is_given(key) {
             self.mistake(key, "this key is missing; add it to the file");
             return None;
         }

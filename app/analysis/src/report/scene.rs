@@ -8,11 +8,15 @@ use palpate_haptics::surface::ScenePlan;
 
 #[must_use]
 pub fn played_text(played: &SceneRun) -> String {
+    let tissue = match (&played.mesh, played.nodes) {
+        (Some(mesh), _) => {
+            format!("{} triangles of {}, materials: {}", mesh.triangles, mesh.file, mesh.materials)
+        }
+        (None, nodes) => format!("{0} x {0} nodes", nodes.unwrap_or_default()),
+    };
     let mut lines = vec![format!(
-        "scene '{}', {} x {} nodes, path {}: {} ticks, depth up to {:.2} mm, force up to {:.2} N",
+        "scene '{}', {tissue}, path {}: {} ticks, depth up to {:.2} mm, force up to {:.2} N",
         played.name,
-        played.nodes,
-        played.nodes,
         played.path,
         played.ticks,
         played.depth_max_mm,
@@ -36,8 +40,9 @@ pub fn played_text(played: &SceneRun) -> String {
         )
     } else {
         format!(
-            "one tick in a thousand takes more than {work:.0} us, but the budget is {} us; use fewer nodes, or end other programs",
-            played.tick_us
+            "one tick in a thousand takes more than {work:.0} us, but the budget is {} us; use fewer {}, or end other programs",
+            played.tick_us,
+            if played.mesh.is_some() { "triangles" } else { "nodes" }
         )
     });
     lines.push(format!("surface {}", played.surface_hash));

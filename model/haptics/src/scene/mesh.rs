@@ -51,6 +51,9 @@ pub struct MeshScene {
     shares: [f64; MOST_MATERIALS],
     last: SceneTick,
     contact: Option<MeshTouch>,
+    settings: SceneSettings,
+    middle: [f64; 3],
+    start: [f64; 3],
 }
 
 impl MeshSceneSettings {
@@ -99,6 +102,9 @@ impl MeshScene {
                 ..SceneTick::default()
             },
             contact: None,
+            settings: *scene,
+            middle: settings.middle(),
+            start,
         })
     }
 
@@ -123,6 +129,21 @@ impl MeshScene {
 
     pub fn last(&self) -> SceneTick {
         self.last
+    }
+
+    /// Device, loop and guards; what it has of a square of tissue has no effect.
+    pub fn settings(&self) -> &SceneSettings {
+        &self.settings
+    }
+
+    /// [`MeshSceneSettings::middle`].
+    pub fn middle(&self) -> [f64; 3] {
+        self.middle
+    }
+
+    /// [`MeshSceneSettings::start`].
+    pub fn start(&self) -> [f64; 3] {
+        self.start
     }
 
     /// The last contact with its triangle.
@@ -170,7 +191,13 @@ impl HandLedMeshScene {
 
     /// One tick, led by a hand.
     pub fn tick(&mut self, hand: HandPose) -> SceneTick {
-        self.device.follow(hand, self.scene.last().force, 1);
-        self.scene.render(self.device.pose(), 1)
+        self.tick_after(hand, 1)
+    }
+
+    /// The tick that comes `elapsed` ticks after the last. Device and law are led through what was missed.
+    pub fn tick_after(&mut self, hand: HandPose, elapsed: u64) -> SceneTick {
+        let elapsed = elapsed.max(1);
+        self.device.follow(hand, self.scene.last().force, elapsed);
+        self.scene.render(self.device.pose(), elapsed)
     }
 }

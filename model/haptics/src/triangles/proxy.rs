@@ -23,9 +23,15 @@ pub const FAR_MM: f64 = 30.0;
 const MOST_STEPS: usize = 4096;
 /// Surfaces that a device may leave and reach in one tick.
 const ROUNDS: usize = 4;
-/// Steps to the place of the interpolated normal. Each leaves a share of depth over radius of the last, or less.
+/// Steps to the place of the interpolated normal. Five to ten are usual, up to twenty near the centre of an uneven bend.
 const SHADING_STEPS: usize = 24;
-/// They end where the next is less than this, in mm: far below any device's resolution.
+/// A step that leaves less than this share of the miss is as good as its length can be; the next estimate would be of roundings.
+const DONE_SHARE: f64 = 0.01;
+/// Bounds of a step's length as a share of the way to the foot: a dome needs `1 / (1 - depth / radius)` of it, which is 40 at 0.975,
+/// a hollow half of it or more.
+const GAINS: [f64; 2] = [0.1, 40.0];
+/// They end where the next is less than this, in mm, and a device that is no further from the surface is on it: far below any device's
+/// resolution, and some thousand roundings of a coordinate of 1000 mm.
 const STILL_MM: f64 = 1e-9;
 
 palpate_model::named! {
@@ -85,8 +91,13 @@ impl MeshProxy {
             None => self.reached(mesh, last, device),
         };
         let contact = match held {
+            Some((goal, _, side))
+                if is_level(&goal, device) && is_left(mesh, &goal, side, device) =>
+            {
+                self.level(goal, side, device)
+            }
             Some((goal, from, side)) => self.touched(mesh, goal, from, side, device),
-            None => self.free(mesh, device),
+            None => self.free(mesh, last, device),
         };
         self.below = contact.below;
         contact
@@ -103,7 +114,7 @@ impl MeshProxy {
         let (mut at, mut side) = (at, side);
         for _ in 0..ROUNDS {
             let goal = descend(mesh, at.face, device);
-            if !is_left(mesh, &goal, side, device) {
+            if !is_left(mesh, &goal, side, device) || is_level(&goal, device) {
                 return Some((goal, at, side));
             }
             let hit =
@@ -139,15 +150,27 @@ impl MeshProxy {
     }
 
     /// Without contact, unless the device is inside: it began there, or came through a place that is one rounding wide.
-    fn free(&mut self, mesh: &TriangleMesh, device: Vector) -> MeshTouch {
+    fn free(&mut self, mesh: &TriangleMesh, last: Option<Vector>, device: Vector) -> MeshTouch {
         let Some(nearest) = mesh.nearest(device, FAR_MM) else {
             return without(TouchState::Free, device, None, -FAR_MM);
         };
         if mesh.is_closed[nearest.face as usize] && !mesh.is_outside(&nearest, device) {
             return self.touched(mesh, nearest, nearest, 1.0, device);
         }
+        if is_level(&nearest, device) {
+            let along = last.map_or([0.0; 3], |last| minus(device, last));
+            return self.level(nearest, side_of(mesh, nearest.face, along), device);
+        }
         let distance = length(minus(device, nearest.point));
         without(TouchState::Free, device, Some(nearest), -distance)
+    }
+
+    /// On the surface itself there is no depth and no contact, but the side is known: of a way that begins on an open part, its hit
+    /// does not say from where it comes.
+    fn level(&mut self, at: SurfacePoint, side: f64, device: Vector) -> MeshTouch {
+        self.at = Some((at, side));
+        let distance = length(minus(device, at.point));
+        MeshTouch { side, ..without(TouchState::Free, device, Some(at), -distance) }
     }
 
     fn touched(
@@ -252,6 +275,11 @@ fn is_left(mesh: &TriangleMesh, at: &SurfacePoint, side: f64, device: Vector) ->
     }
 }
 
+/// Whether the device is on the surface, as far as roundings let it be known.
+fn is_level(at: &SurfacePoint, device: Vector) -> bool {
+    length(minus(device, at.point)) <= STILL_MM
+}
+
 /// Whether a face has the part of the surface that a point is on; a way from there meets it nowhere else.
 fn touches(mesh: &TriangleMesh, at: &SurfacePoint, face: u32) -> bool {
     let corners = mesh.faces[at.face as usize];
@@ -266,9 +294,9 @@ fn touches(mesh: &TriangleMesh, at: &SurfacePoint, face: u32) -> bool {
     }
 }
 
-/// From which side a way comes to a face.
+/// From which side a way comes to a face; one along the face counts as from the front.
 fn side_of(mesh: &TriangleMesh, face: u32, along: Vector) -> f64 {
-    if dot(along, mesh.face_normals[face as usize]) < 0.0 { 1.0 } else { -1.0 }
+    if dot(along, mesh.face_normals[face as usize]) > 0.0 { -1.0 } else { 1.0 }
 }
 
 /// From the device to the contact point; the normal of the surface where they are one.
@@ -299,6 +327,9 @@ fn shaded(
         let way = minus(device, at.point);
         (normal, plus(way, -dot(way, normal), normal))
     };
+    // The place is no further from the nearest point than the device is. So no step walks further, and a place in the middle of a bend,
+    // to which no normal leads, costs a walk around it and not one over the whole mesh.
+    let depth = length(minus(from.point, device));
     let mut at = from;
     let (normal, mut off) = miss(&at);
     let mut best = (at, normal, length(off));
@@ -307,14 +338,14 @@ fn shaded(
         if best.2 <= STILL_MM {
             break;
         }
-        let next = descend(mesh, at.face, plus(at.point, gain, off));
+        let next = descend(mesh, at.face, within(plus(at.point, gain, off), from.point, depth));
         let (next_normal, next_off) = miss(&next);
-        let change = minus(off, next_off);
-        let along = dot(off, change);
-        // A step that takes most of the way off is kept: over edges the next estimate would be of two triangles.
-        if dot(next_off, next_off) > 0.25 * dot(off, off) {
+        let along = dot(off, minus(off, next_off));
+        let (was, is) = (dot(off, off), dot(next_off, next_off));
+        if is > DONE_SHARE * DONE_SHARE * was {
+            let [least, most] = GAINS;
             gain = if along > 0.0 {
-                (gain * dot(off, off) / along).clamp(0.1, 4.0)
+                (gain * was / along).clamp(least, most)
             } else {
                 0.5 * gain.min(1.0)
             };
@@ -325,11 +356,17 @@ fn shaded(
         }
     }
     // It may not be led away over a fold, nor to where the device is above the plane.
-    let depth = length(minus(from.point, device));
     let is_near = length(minus(best.0.point, from.point)) <= depth;
     let is_under = dot(minus(best.0.point, device), best.1) > 0.0;
     if is_near && is_under {
         return (best.0, best.1);
     }
     (from, miss(&from).0)
+}
+
+/// The point itself, or the one on the way to it that is `reach` from `middle`.
+fn within(point: Vector, middle: Vector, reach: f64) -> Vector {
+    let way = minus(point, middle);
+    let far = length(way);
+    if far > reach { plus(middle, reach / far, way) } else { point }
 }

@@ -205,6 +205,48 @@ fn one_triangle_is_touched_from_both_sides_and_left_over_its_rim() {
     }
 }
 
+/// An open sheet has two fronts. A device that stops exactly on it, for any number of ticks, and then leaves where it came from meets
+/// nothing; one that goes on is held. Steps of a sensor stop there often, and the sheet is tilted so that roundings are of either sign.
+#[test]
+fn a_device_that_stops_on_an_open_sheet_keeps_its_side() {
+    let mut random = SplitMix::seeded(17);
+    for _ in 0..400 {
+        let turn = direction(&mut random);
+        let [a, b] = [turn, direction(&mut random)];
+        let across = unit(super::mesh_support::cross(a, b));
+        let along = super::mesh_support::cross(across, a);
+        let tilted = |[x, y, z]: [f64; 3]| {
+            plus(plus(across.map(|part| x * part), y, along), z, turn.map(|part| -part))
+        };
+        let mut soup = plate([40.0, 40.0], [9, 7]);
+        soup.points.iter_mut().for_each(|point| *point = tilted(*point));
+        let mesh = mesh(soup);
+        // From the side to which the triangles' normals point, and from the other.
+        let up = mesh.face_normals()[0];
+        for side in [1.0, -1.0] {
+            let shading = Shading::ALL[random.below(2)];
+            let mut proxy = proxy(0.2, shading);
+            let (x, y) = (uniform(&mut random, 5.0, 35.0), uniform(&mut random, 5.0, 35.0));
+            let at = |height: f64| plus(tilted([x, y, 0.0]), side * height, up);
+            let begins_deep = random.below(2) == 0;
+            proxy.follow(&mesh, at(0.055));
+            if begins_deep {
+                assert!(proxy.follow(&mesh, at(-0.055)).touch.is_contact());
+            }
+            for _ in 0..random.below(3) {
+                let level = proxy.follow(&mesh, at(0.0));
+                assert!(level.below.abs() < 1e-9, "{}", level.below);
+            }
+            let leaves = proxy.follow(&mesh, at(0.055));
+            assert!(!leaves.touch.is_contact(), "{side} {shading}: {leaves:?}");
+            proxy.follow(&mesh, at(0.0));
+            let pressed = proxy.follow(&mesh, at(-0.5));
+            assert!((pressed.touch.depth - 0.5).abs() < 1e-9, "{side} {shading}: {pressed:?}");
+            assert!(apart(pressed.touch.normal, up.map(|part| side * part)) < 1e-9);
+        }
+    }
+}
+
 #[test]
 fn a_device_that_begins_inside_is_pushed_out_the_nearest_way() {
     let mesh = mesh(cuboid([20.0, 30.0, 40.0]));

@@ -6,15 +6,18 @@
 
 pub mod device_recording;
 mod guided_device;
+mod loop_scene;
 mod loop_thread;
 pub mod scene;
 pub mod scene_file;
+pub mod scene_mesh;
 mod simulated;
 pub mod slave;
 mod stylus;
 pub mod timing;
 
 pub use guided_device::{GuidedDevice, GuidedDeviceView, HandTarget, TRAIL, TrailPoint};
+pub use loop_scene::{Laps, LoopScene};
 pub use loop_thread::{LoopTask, RealTimeLoop};
 pub use palpate_drivers::priority;
 pub use scene::{SceneEnd, SceneFrame, SceneLoop};

@@ -1,9 +1,9 @@
 //! The virtual scene in a loop: a device, frames for graphics, and a recording of its ticks.
 
+use super::loop_scene::{Laps, LoopScene};
 use super::timing::LoopTiming;
-use super::{LoopTask, RealTimeLoop, Stylus};
+use super::{LoopTask, RealTimeLoop};
 use palpate_drivers::priority::GrantedPriority;
-use palpate_haptics::Period;
 use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{HandPose, Pose, Scene, ScenePath, SceneTick};
 use palpate_haptics::surface::{GridRect, HeightField};
@@ -80,7 +80,7 @@ pub struct SceneFrame {
 }
 
 impl SceneFrame {
-    fn new(scene: &Scene) -> Self {
+    pub(super) fn new(scene: &Scene) -> Self {
         let nodes = scene.field().grid().columns();
         let stride = stride(nodes);
         let shown = 1 + (nodes - 1) / stride;
@@ -97,7 +97,7 @@ impl SceneFrame {
     }
 
     /// Copies what has moved since the last frame.
-    fn update(&mut self, scene: &Scene) {
+    pub(super) fn update(&mut self, scene: &Scene) {
         self.tick = scene.last();
         self.copy(scene.field(), self.displaced.union(scene.dirty()));
         self.displaced = scene.dirty();
@@ -130,38 +130,33 @@ fn stride(nodes: usize) -> usize {
 
 /// A scene as a loop ticks it.
 #[derive(Debug)]
-pub struct SceneTask {
-    scene: Scene,
+pub struct SceneTask<S = Scene> {
+    scene: S,
     device: Box<dyn HapticDevice>,
     recorder: Option<SceneRecorder>,
     apart: u64,
     since: u64,
 }
 
-impl SceneTask {
+impl<S: LoopScene> SceneTask<S> {
     #[must_use]
-    pub fn new(
-        scene: Scene,
-        device: Box<dyn HapticDevice>,
-        recorder: Option<SceneRecorder>,
-    ) -> Self {
-        let period: Period = scene.settings().period;
-        let apart = (period.hz() / FRAMES_HZ).round().max(1.0) as u64;
+    pub fn new(scene: S, device: Box<dyn HapticDevice>, recorder: Option<SceneRecorder>) -> Self {
+        let apart = (scene.period().hz() / FRAMES_HZ).round().max(1.0) as u64;
         Self { scene, device, recorder, apart, since: apart }
     }
 
     /// What is seen before the first tick.
-    pub fn first(&self) -> SceneFrame {
-        SceneFrame::new(&self.scene)
+    pub fn first(&self) -> S::Frame {
+        self.scene.frame()
     }
 
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &S {
         &self.scene
     }
 }
 
-impl LoopTask for SceneTask {
-    type View = SceneFrame;
+impl<S: LoopScene> LoopTask for SceneTask<S> {
+    type View = S::Frame;
 
     fn tick(&mut self, elapsed: u64) {
         let Pose { at, turn } = self.device.sense(elapsed);
@@ -178,30 +173,30 @@ impl LoopTask for SceneTask {
         self.since >= self.apart
     }
 
-    fn show(&self, view: &mut SceneFrame) {
-        view.update(&self.scene);
+    fn show(&self, view: &mut S::Frame) {
+        self.scene.update(view);
     }
 }
 
 #[derive(Debug)]
-pub struct SceneEnd {
-    pub scene: Scene,
+pub struct SceneEnd<S = Scene> {
+    pub scene: S,
     pub timing: LoopTiming,
     pub recorded: Option<Result<TickCounts, String>>,
 }
 
 /// A scene in real time. Dropping it ends the loop.
 #[derive(Debug)]
-pub struct SceneLoop {
-    beat: RealTimeLoop<SceneTask>,
+pub struct SceneLoop<S: LoopScene = Scene> {
+    beat: RealTimeLoop<SceneTask<S>>,
     /// The hand on the simulated device, and whether its path has come to its end.
     hand: Option<(Mutex<Input<HandPose>>, Arc<AtomicBool>)>,
 }
 
-impl SceneLoop {
+impl<S: LoopScene> SceneLoop<S> {
     /// Begins to tick on the simulated device. After `path`, or without one, the hand goes where it is [pointed](Self::point).
     pub fn start(
-        scene: Scene,
+        scene: S,
         path: Option<ScenePath>,
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
@@ -209,12 +204,11 @@ impl SceneLoop {
     }
 
     pub fn start_laps(
-        scene: Scene,
-        path: (Option<ScenePath>, u32),
+        scene: S,
+        path: Laps,
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
-        let made = Stylus::new(*scene.settings(), path);
-        let (device, pointing) = made.map_err(|err| err.to_string())?;
+        let (device, pointing) = scene.stylus(path).map_err(|err| err.to_string())?;
         let hand = (Mutex::new(pointing), device.end_flag());
         let mut live = Self::start_on_device(Box::new(device), scene, recorder)?;
         live.hand = Some(hand);
@@ -224,11 +218,11 @@ impl SceneLoop {
     /// Begins to tick on a device with the settings of the scene. Its recording has [`SENSED_COLUMNS`].
     pub fn start_on_device(
         device: Box<dyn HapticDevice>,
-        scene: Scene,
+        scene: S,
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
-        let period = scene.settings().period;
-        if *device.settings() != scene.settings().device {
+        let period = scene.period();
+        if device.settings() != scene.device() {
             return Err(
                 "the scene has the settings of a different device; give the scene the settings of the connected device".into(),
             );
@@ -253,7 +247,7 @@ impl SceneLoop {
     }
 
     /// The newest frame.
-    pub fn view(&mut self) -> &SceneFrame {
+    pub fn view(&mut self) -> &S::Frame {
         self.beat.view()
     }
 
@@ -277,7 +271,7 @@ impl SceneLoop {
     }
 
     /// Ends it, and its recording after everything is written; `None` if its work failed.
-    pub fn stop(self) -> Option<SceneEnd> {
+    pub fn stop(self) -> Option<SceneEnd<S>> {
         let kept = self.beat.timing();
         let task = self.beat.end()?;
         let recorded = task.recorder.map(|recorder| recorder.finish(task.scene.hash()));

@@ -1,5 +1,6 @@
 //! Scene files: which tissue, mesh, device, loop and tolerances a scene has, as TOML.
 
+use super::scene_mesh::{self, SceneMesh};
 use palpate_drivers::rig_file::fields::{Fields, Mistake, format_mistakes};
 use palpate_haptics::Period;
 use palpate_haptics::scene::{DeviceSettings, Scene, SceneSettings};
@@ -40,6 +41,8 @@ pub struct SceneFile {
     /// The session or table whose fit is the body; without it, [`Self::body`] is.
     pub source: Option<String>,
     pub body: ModifiedKelvin,
+    /// A mesh of triangles as the tissue; without it a square, which has the next number and those of nodes and cuts.
+    pub mesh: Option<SceneMesh>,
     /// Length of a side in mm.
     pub side_mm: f64,
     /// MaxShear over the distance of nodes: the steepest slope of the tissue, the same on every mesh.
@@ -70,6 +73,7 @@ impl Default for SceneFile {
             name: "thesis body".to_owned(),
             source: None,
             body: usual.body,
+            mesh: None,
             side_mm: usual.side_mm,
             slope: 1.0,
             recovery_s: None,
@@ -110,25 +114,22 @@ impl SceneFile {
         };
         put(format!("name = \"{}\"", plain(&self.name)));
         put("\n[tissue]".to_owned());
+        let has_bodies = self.mesh.as_ref().is_some_and(|mesh| !mesh.bodies.is_empty());
         match &self.source {
+            _ if has_bodies => {}
             Some(source) => put(format!("source = \"{}\"", plain(source))),
             None => put(format_body(&self.body)),
         }
-        put(format!("side_mm = {:?}", self.side_mm));
+        if self.mesh.is_none() {
+            put(format!("side_mm = {:?}", self.side_mm));
+        }
         put(format!("slope = {:?}", self.slope));
         if let Some(recovery) = self.recovery_s {
             put(format!("recovery_s = {recovery:?}"));
         }
         put(format!("friction = {:?}", self.friction));
-        put("\n[mesh]".to_owned());
-        match self.nodes {
-            Some(nodes) => put(format!("nodes = {nodes}")),
-            None => put("auto = true".to_owned()),
-        }
-        if let Some(range) = self.cut_nodes {
-            put(format!("cut_nodes = {range}"));
-        }
-        put(format!("cut_mm = {:?}", self.cut_mm));
+        let mesh = self.mesh.as_ref().map_or_else(|| self.square_lines(), SceneMesh::lines);
+        mesh.into_iter().for_each(&mut put);
         put("\n[loop]".to_owned());
         put(format!("rate_hz = {:?}", self.rate_hz));
         let scheme = SCHEMES.iter().find(|(_, scheme)| *scheme == self.scheme);
@@ -146,17 +147,35 @@ impl SceneFile {
         text
     }
 
+    /// The table `[mesh]` of a square of tissue.
+    fn square_lines(&self) -> Vec<String> {
+        let mut lines = vec!["\n[mesh]".to_owned()];
+        lines.push(match self.nodes {
+            Some(nodes) => format!("nodes = {nodes}"),
+            None => "auto = true".to_owned(),
+        });
+        lines.extend(self.cut_nodes.map(|range| format!("cut_nodes = {range}")));
+        lines.push(format!("cut_mm = {:?}", self.cut_mm));
+        lines
+    }
+
+    /// The force model that stands for all: the first of a mesh that has several.
+    pub fn first_body(&self) -> ModifiedKelvin {
+        let first = self.mesh.as_ref().and_then(|mesh| mesh.bodies.first());
+        first.and_then(|one| one.body).unwrap_or(self.body)
+    }
+
     /// What a scene of it is made of, with so many nodes along a side where the file leaves them to be planned.
     pub fn settings(&self, planned_nodes: usize) -> Result<SceneSettings, String> {
         let nodes = self.nodes.unwrap_or(planned_nodes);
         let words = |err: &dyn std::error::Error| format!("the scene '{}': {err}", self.name);
         let spacing = self.side_mm / nodes.saturating_sub(1) as f64;
         let mut settings = SceneSettings {
-            body: self.body,
+            body: self.first_body(),
             side_mm: self.side_mm,
             nodes,
             max_shear_mm: self.slope * spacing,
-            recovery_s: self.recovery_s.unwrap_or(self.body.tau_eps),
+            recovery_s: self.recovery_s.unwrap_or(self.first_body().tau_eps),
             friction: self.friction,
             period: Period::of_rate(self.rate_hz).map_err(|err| words(&err))?,
             scheme: self.scheme,
@@ -248,6 +267,7 @@ fn read(fields: &mut Fields) -> SceneFile {
     }
     file.body = body.unwrap_or(file.body);
     file.source = source.filter(|source| source != THESIS);
+    file.mesh = scene_mesh::read(fields);
     // A spacing from a nanometre to a metre, so that every mesh is possible.
     set(&mut file.side_mm, fields.number("tissue.side_mm", 1.0, 1000.0));
     set(&mut file.slope, fields.number("tissue.slope", 0.0, 1000.0));
@@ -293,7 +313,7 @@ fn set(value: &mut f64, given: Option<f64>) {
     *value = given.unwrap_or(*value);
 }
 
-fn plain(text: &str) -> String {
+pub(super) fn plain(text: &str) -> String {
     let mut out = String::new();
     for letter in text.chars() {
         match letter {
@@ -312,7 +332,10 @@ fn plain(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene_mesh::MaterialBody;
     use super::*;
+    use palpate_haptics::triangles::Shading;
+    use palpate_haptics::triangles::files::MeshUnit;
 
     #[test]
     fn scene_file_reads_back_to_the_same_bits() {
@@ -331,8 +354,31 @@ mod tests {
             device: DeviceSettings { mass_kg: 1.0 / 7.0, ..DeviceSettings::default() },
             ..usual.clone()
         };
+        let bodies = ["C:\\a.b \"c\"", "thesis", "thesis"].map(|name| MaterialBody {
+            name: name.to_owned(),
+            body: (name == "thesis").then_some(ModifiedKelvin::THESIS),
+        });
+        let mesh = SceneMesh {
+            file: "C:\\organs\\stomach.GLB".to_owned(),
+            sha256: Some("0f".repeat(32)),
+            unit: MeshUnit::Centimetre,
+            materials: Some("a.csv".to_owned()),
+            materials_sha256: Some("a0".repeat(32)),
+            bodies: bodies.to_vec(),
+            shading: Shading::Flat,
+            reach_mm: 1.0 / 3.0,
+        };
+        let plainest = SceneMesh {
+            sha256: None,
+            materials: None,
+            materials_sha256: None,
+            bodies: Vec::new(),
+            ..mesh.clone()
+        };
+        let [organ, plain_organ] =
+            [mesh, plainest].map(|one| SceneFile { mesh: Some(one), ..usual.clone() });
         let fitted = SceneFile { source: Some("C:\\data\\liver".to_owned()), ..usual.clone() };
-        for file in [usual, odd, fitted] {
+        for file in [usual, odd, organ, plain_organ, fitted] {
             let again = SceneFile::parse("a.toml", &file.text());
             assert_eq!(again.as_ref(), Ok(&file), "{}", file.text());
         }
@@ -361,6 +407,16 @@ mod tests {
             ),
             ("[mesh]\nnodes = 10.5", "line 2: mesh.nodes: "),
             ("[mesh]\nnodes = 51\nauto = true", "line 3: mesh.auto"),
+            ("[mesh]\nunit = \"mm\"", "line 2: mesh.unit: "),
+            ("[mesh]\nfile = \"a.ply\"", "line 2: mesh.file: "),
+            ("[mesh]\nfile = \"a.stl\"\nnodes = 5", "line 3: mesh.nodes: "),
+            ("[mesh]\nfile = \"a.stl\"\nsha256 = \"12\"", "line 3: mesh.sha256: "),
+            ("[mesh]\nfile = \"a.stl\"\nunit = \"inch\"", "line 3: mesh.unit: give \"mm\""),
+            ("[mesh]\nfile = \"a.stl\"\n[bodies.pad]\nmu1 = 1", "line 4: 'bodies.pad.mu1'"),
+            (
+                "[tissue]\nsource = \"b\"\n[mesh]\nfile = \"a.stl\"\nbodies = [\"thesis\"]",
+                "line 2: tissue.source: ",
+            ),
             ("[loop]\nrate_hz = 20", "line 2: loop.rate_hz: "),
             ("[loop]\nintegrator = \"magic\"", "line 2: loop.integrator: give \""),
             ("[device]\nmass_kg = 0", "mass_kg = 0"),

@@ -13,6 +13,8 @@ use triple_buffer::{Input, Output, triple_buffer};
 pub struct Stylus {
     device: SimulatedDevice,
     settings: SceneSettings,
+    /// From the scene of a path to this one in mm.
+    shift: [f64; 3],
     path: Option<ScenePath>,
     laps: u32,
     pointed: Output<HandPose>,
@@ -26,12 +28,24 @@ impl Stylus {
     /// Starts over the middle of the tissue and follows the path `laps` times; the input moves the hand afterwards.
     pub fn new(
         settings: SceneSettings,
+        path: (Option<ScenePath>, u32),
+    ) -> Result<(Self, Input<HandPose>), SceneError> {
+        let (middle, start) = (settings.middle(), settings.start());
+        Self::from_start(settings, (middle, start), path)
+    }
+
+    /// Starts at `start` with the workspace around `middle`, in mm; the path is moved with the start.
+    pub fn from_start(
+        settings: SceneSettings,
+        (middle, start): ([f64; 3], [f64; 3]),
         (path, laps): (Option<ScenePath>, u32),
     ) -> Result<(Self, Input<HandPose>), SceneError> {
-        let hand = HandPose { at: settings.start(), turn: [0.0; 3] };
+        let hand = HandPose { at: start, turn: [0.0; 3] };
         let (input, pointed) = triple_buffer(&hand);
+        let usual = settings.start();
         let stylus = Self {
-            device: SimulatedDevice::of(&settings)?,
+            device: SimulatedDevice::new(settings.device, settings.period, middle, start)?,
+            shift: [0, 1, 2].map(|axis| start[axis] - usual[axis]),
             settings,
             path,
             laps,
@@ -53,7 +67,8 @@ impl Stylus {
         let t = self.settings.period.time_of(self.ticks).seconds().0;
         match self.path {
             Some(path) if t <= path.seconds() * f64::from(self.laps) => {
-                path.at(t % path.seconds(), &self.settings)
+                let HandPose { at, turn } = path.at(t % path.seconds(), &self.settings);
+                HandPose { at: [0, 1, 2].map(|axis| at[axis] + self.shift[axis]), turn }
             }
             _ => {
                 self.is_over.store(true, Ordering::Relaxed);
