@@ -1,10 +1,12 @@
 """A station and a headless Chromium that watches it."""
 import json
 import os
+import selectors
 import shutil
 import signal
 import socket
 import subprocess
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -13,6 +15,8 @@ from program import skip
 
 # Longest wait for anything, in s: ten times what the slowest took on two slow cores.
 PATIENCE = 300.0
+UPGRADE = ("GET /api/v1/live?per_second=10 HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+           "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n")
 
 
 def wait_for(what, attempt):
@@ -43,6 +47,27 @@ def lacks_browser(script):
 def free_port():
     with socket.create_server(("127.0.0.1", 0)) as one:
         return one.getsockname()[1]
+
+
+def watch(port, count):
+    """Watchers that read whatever comes; the bytes that they got so far, in a list of one."""
+    selector = selectors.DefaultSelector()
+    for _ in range(count):
+        watcher = socket.create_connection(("127.0.0.1", port))
+        watcher.sendall(UPGRADE.format(port=port).encode())
+        selector.register(watcher, selectors.EVENT_READ)
+    got = [0]
+
+    def read():
+        while True:
+            for key, _ in selector.select():
+                data = key.fileobj.recv(1 << 20)
+                got[0] += len(data)
+                if not data:
+                    selector.unregister(key.fileobj)
+
+    threading.Thread(target=read, daemon=True).start()
+    return got
 
 
 class Station:

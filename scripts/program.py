@@ -16,9 +16,9 @@ def palpate():
     return pathlib.Path(json.loads(listed.stdout)["target_directory"]) / "debug" / "palpate"
 
 
-def skip(kind, name, script, reason="it is not installed"):
+def skip(kind, name, script, reason="it is not installed", advice="scripts/install-test-tools installs it"):
     """Says that a script does not try something for want of a program or file, to the gate too."""
-    print(f"skipped: there is no {kind} {name}; scripts/install-test-tools installs it")
+    print(f"skipped: there is no {kind} {name}; {advice}")
     if "PALPATE_SKIPPED" in os.environ:
         with open(os.environ["PALPATE_SKIPPED"], "a") as skipped:
             skipped.write(f"{kind}\t{name}\t{script}\t{reason}\n")

@@ -52,6 +52,8 @@ pub mod run_quality;
 pub mod scene;
 #[cfg(feature = "haptics")]
 pub mod scene_bench;
+#[cfg(feature = "haptics")]
+pub mod scene_device;
 pub mod select;
 pub mod session_actions;
 pub mod session_entries;

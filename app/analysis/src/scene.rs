@@ -2,9 +2,11 @@
 
 use super::haptics::{LoopMeasurement, fit_haptic_body};
 use super::population::is_member;
+use super::scene_device::DeviceUse;
 use super::tick_replay::{
     FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
 };
+use palpate_haptic_devices::InverseDevice;
 use palpate_haptics::scene::{HandLedScene, HandPose, NoForceReason, Pose, Scene, ScenePath};
 use palpate_runner::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
@@ -14,6 +16,7 @@ use palpate_runner::haptics::{SceneEnd, SceneLoop};
 use palpate_sessions::ticks::{SETTINGS_FILE, TickRecording, has_columns};
 use serde::Serialize;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Interval between two looks at a running scene: half a frame.
@@ -42,7 +45,7 @@ pub fn read_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), Strin
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneRun {
     pub name: String,
-    /// The hand's path.
+    /// The hand's path; `device` where a person's hand led a real one.
     pub path: &'static str,
     /// Nodes along a side.
     pub nodes: usize,
@@ -58,27 +61,52 @@ pub struct SceneRun {
     /// The budget of a tick in microseconds, and whether 999 ticks in a thousand kept to it.
     pub tick_us: f64,
     pub is_within_budget: bool,
+    /// How the connection to a real device was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<DeviceUse>,
     #[serde(flatten)]
     pub paced: LoopMeasurement,
 }
 
-/// Runs a scene, its mesh known, in real time along a path, `laps` times, and records it in a new folder if one is given.
+/// Who leads the stylus.
+pub enum SceneHand<'a> {
+    /// The simulated hand, along a path so many times.
+    Simulated(ScenePath, u32),
+    /// A person's hand on a device that was opened for this scene, for so many seconds or until the flag is set.
+    OnDevice { device: Box<InverseDevice>, seconds: Option<f64>, is_ending: &'a AtomicBool },
+}
+
+/// Runs a scene, its mesh known, in real time, and records it in a new folder if one is given.
 pub fn play_scene(
     file: &SceneFile,
-    (path, laps): (ScenePath, u32),
+    hand: SceneHand<'_>,
     record: Option<&Path>,
     progress: &mut dyn FnMut(f64),
 ) -> Result<SceneRun, String> {
     let nodes = file.nodes.ok_or("the scene has no number of nodes; report this bug in palpate")?;
     let scene = file.scene(nodes)?;
     let settings = *scene.settings();
-    let recorder = record.map(|folder| SceneRecorder::start(folder, &file.text(), COLUMNS));
-    let mut live = SceneLoop::start_laps(scene, (Some(path), laps), recorder.transpose()?)?;
+    let start = |columns| {
+        record.map(|folder| SceneRecorder::start(folder, &file.text(), columns)).transpose()
+    };
+    let no_flag = AtomicBool::new(false);
+    let (mut live, whole, path, monitor, is_ending) = match hand {
+        SceneHand::Simulated(path, laps) => {
+            let live = SceneLoop::start_laps(scene, (Some(path), laps), start(COLUMNS)?)?;
+            let whole = path.seconds() * f64::from(laps);
+            (live, Some(whole), path.name(), None, &no_flag)
+        }
+        SceneHand::OnDevice { device, seconds, is_ending } => {
+            let monitor = device.monitor();
+            let live = SceneLoop::start_on_device(device, scene, start(SENSED_COLUMNS)?)?;
+            (live, seconds, "device", Some(monitor), is_ending)
+        }
+    };
     let priority = live.granted_priority().to_string();
-    let whole = path.seconds() * f64::from(laps);
     let (mut depth_max_mm, mut force_max_n) = (0.0_f64, 0.0_f64);
     let mut seen: Vec<(NoForceReason, u64)> = Vec::new();
-    while !live.is_over() && live.is_alive() {
+    let mut is_over = false;
+    while !is_over && live.is_alive() && !is_ending.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
         let tick = live.view().tick;
         depth_max_mm = depth_max_mm.max(tick.depth);
@@ -88,8 +116,14 @@ pub fn play_scene(
             Some((_, count)) => *count += 1,
             None => seen.push((tick.no_force_reason, 1)),
         }
-        progress(settings.period.time_of(tick.tick).seconds().0 / whole);
+        let seconds = settings.period.time_of(tick.tick).seconds().0;
+        progress(whole.map_or(0.0, |whole| seconds / whole));
+        is_over = match monitor {
+            None => live.is_over(),
+            Some(_) => whole.is_some_and(|whole| seconds >= whole),
+        };
     }
+    let device = monitor.map(|monitor| DeviceUse::of(monitor.report()));
     let end = live.stop().ok_or("the loop of the scene failed; report this bug in palpate")?;
     let recorded = end.recorded.transpose()?;
     seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
@@ -97,13 +131,14 @@ pub fn play_scene(
     let tick_us = file.tolerances.tick_us;
     Ok(SceneRun {
         name: file.name.clone(),
-        path: path.name(),
+        path,
         nodes: settings.nodes,
         ticks: end.scene.ticks(),
         depth_max_mm,
         force_max_n,
         why: seen.iter().map(|(why, count)| (why.name(), *count as f64 / frames)).collect(),
         surface_hash: format!("{:016x}", end.scene.hash()),
+        device,
         tick_us,
         is_within_budget: 1e6 * end.timing.work.p99_9.0 <= tick_us,
         paced: LoopMeasurement {

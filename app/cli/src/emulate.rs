@@ -11,6 +11,7 @@ use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
 use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
+use palpate_emulators::inverse::{EmulatedInverse, InverseServiceSettings};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{EmulatorAddress, ServeError, ServeEvent, ServeOptions, serve};
 use palpate_emulators::sidecar::{EmulatedSidecar, EmulatedSidecarSettings};
@@ -33,6 +34,8 @@ pub enum EmulateCommand {
     Mark10(Mark10Args),
     /// A sidecar: a board with stage, load cell, thermometer and trigger line that speaks the sidecar protocol
     Sidecar(SidecarArgs),
+    /// Haply's Inverse service with an Inverse3, whose hand pokes; on the network at 127.0.0.1:10001 without --tcp
+    Inverse(InverseArgs),
 }
 
 /// The wire to an emulated device.
@@ -133,6 +136,29 @@ pub struct SidecarArgs {
     bench: BenchArgs,
 }
 
+/// Arguments of `palpate emulate inverse`.
+#[derive(Debug, Args)]
+pub struct InverseArgs {
+    /// Serve on the network at this address; port 0 takes any free port
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:10001")]
+    tcp: SocketAddr,
+    /// From a message to its report in ms
+    #[arg(long, value_name = "MS", default_value_t = 0.0, value_parser = reply_ms)]
+    reply_ms: f64,
+    /// A fault, KIND@SECONDS[:DURATION]: drop, partial, late, deaf, mute or disconnect; may be repeated. Lines on standard input take effect at once: KIND[:DURATION]
+    #[arg(long, value_name = "FAULT")]
+    fault: Vec<ScheduledFault>,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Longer than any service takes.
+fn reply_ms(text: &str) -> Result<f64, String> {
+    let ms = parse_number(text).ok().filter(|ms| (0.0..=1000.0).contains(ms));
+    ms.ok_or_else(|| "give 0 to 1000".to_owned())
+}
+
 const HOME_PINS: [Choice<HomeWiring>; 2] = [
     ("limit", HomeWiring::Limit, "Home switch on the limit pin of the axis"),
     ("probe", HomeWiring::Probe, "Home switch on the probe pin, limit switches on the limit pin"),
@@ -198,6 +224,7 @@ pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failu
         EmulateCommand::Grbl(args) => grbl(args, output),
         EmulateCommand::Mark10(args) => mark10(args, output),
         EmulateCommand::Sidecar(args) => sidecar(args, output),
+        EmulateCommand::Inverse(args) => inverse(args, output),
     }
 }
 
@@ -278,6 +305,25 @@ fn sidecar(args: &SidecarArgs, output: &Output) -> Result<(), Failure> {
     let (model, label) = ("sidecar".to_owned(), "sidecar".to_owned());
     let announcement = Announcement { device: "sidecar", model, label, cell: None };
     emulate(&mut device, announcement, &args.wire, None, args.bench.seed, output)
+}
+
+fn inverse(args: &InverseArgs, output: &Output) -> Result<(), Failure> {
+    let settings = InverseServiceSettings {
+        reply_delay: Nanos((args.reply_ms * 1e6) as u64),
+        seed: args.seed,
+        ..InverseServiceSettings::default()
+    };
+    let (mut device, _) = EmulatedInverse::new(settings).map_err(Failure::usage)?;
+    let (model, label) = ("Inverse3".to_owned(), "Inverse service".to_owned());
+    let announcement = Announcement { device: "inverse", model, label, cell: None };
+    let wire = WireArgs {
+        pty: None,
+        tcp: Some(args.tcp),
+        baud: None,
+        latency_ms: 0,
+        fault: args.fault.clone(),
+    };
+    emulate(&mut device, announcement, &wire, None, args.seed, output)
 }
 
 fn emulate(

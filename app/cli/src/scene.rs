@@ -4,19 +4,25 @@ use super::Failure;
 use super::arguments::{above_zero, parse_number};
 use super::new_file;
 use super::output::Output;
+use super::terminal::ctrl_c_flag;
 use super::trade::with_bar;
 use clap::{Args, Subcommand};
 use palpate_analysis::population::library_member;
 use palpate_analysis::progress::Progress;
-use palpate_analysis::report::scene::{bench_text, plan_text, played_text};
-use palpate_analysis::scene::{SceneRun, play_scene, read_scene, replay};
+use palpate_analysis::report::scene::{bench_text, device_lines, plan_text, played_text};
+use palpate_analysis::scene::{SceneHand, SceneRun, play_scene, read_scene, replay};
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
+use palpate_analysis::scene_device::{DeviceChoice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_analysis::trade::{TradeExtent, measure_scene};
+use palpate_haptic_devices::InverseDevice;
+use palpate_haptic_devices::inverse::DeadMan;
+use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 /// See and feel a piece of tissue: run a scene, record it, replay a recording
@@ -46,9 +52,32 @@ pub struct SceneRunArgs {
     /// Tissue of a specimen of a population, population:NAME#NUMBER, instead of that of the scene file
     #[arg(long, value_name = "SPECIMEN")]
     specimen: Option<String>,
-    /// Duration in s, during which the path repeats; without it the path runs once
+    /// A haptic device instead of the simulated hand: inverse, or inverse:NAME where several are connected
+    #[arg(long, value_name = "DEVICE", value_parser = device_name, conflicts_with = "path")]
+    device: Option<DeviceName>,
+    /// Where the device's service listens, ADDRESS:PORT
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        default_value = "127.0.0.1:10001",
+        requires = "device"
+    )]
+    service: SocketAddr,
+    /// Duration in s, during which the path repeats; without it the path runs once, and a device is used until Ctrl-C
     #[arg(long, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: Option<f64>,
+}
+
+/// A device's name in its service, if there is a choice.
+#[derive(Clone, Debug)]
+struct DeviceName(Option<String>);
+
+fn device_name(text: &str) -> Result<DeviceName, String> {
+    match text.split_once(':') {
+        None if text == "inverse" => Ok(DeviceName(None)),
+        Some(("inverse", name)) if !name.is_empty() => Ok(DeviceName(Some(name.into()))),
+        _ => Err("give inverse or inverse:NAME".into()),
+    }
 }
 
 fn path(name: &str) -> Result<ScenePath, String> {
@@ -139,13 +168,8 @@ fn run_scene(
     record: Option<&Path>,
     output: &Output,
 ) -> Result<(), Failure> {
-    let laps = match args.seconds {
-        None => 1,
-        Some(seconds) => {
-            let seconds = above_zero("seconds", seconds, SECONDS_MAX, "s")?;
-            (seconds / args.path.seconds()).ceil() as u32
-        }
-    };
+    let seconds = args.seconds.map(|one| above_zero("seconds", one, SECONDS_MAX, "s"));
+    let seconds = seconds.transpose()?;
     let mut file = read(args.file.as_deref(), output)?;
     if let Some(specimen) = &args.specimen {
         file.body = library_member(specimen).map_err(Failure::usage)?.body;
@@ -153,6 +177,9 @@ fn run_scene(
     }
     // An impossible scene is refused before anything is measured or written.
     file.scene(COARSEST).map_err(Failure::usage)?;
+    let opened = args.device.as_ref().map(|name| device(args, name, &mut file, output));
+    let opened = opened.transpose()?;
+    let is_ending = ctrl_c_flag()?;
     let mut after = None;
     if file.nodes.is_none() {
         let curves = with_bar(output, |progress| measure_scene(TradeExtent::Quick, progress))?;
@@ -160,9 +187,18 @@ fn run_scene(
         file = scene_from_plan(&file, &plan);
         after = Some((curves, plan));
     }
+    let hand = match opened {
+        Some(device) => {
+            SceneHand::OnDevice { device: Box::new(device), seconds, is_ending: &is_ending }
+        }
+        None => {
+            let laps = seconds.map_or(1, |seconds| (seconds / args.path.seconds()).ceil() as u32);
+            SceneHand::Simulated(args.path, laps)
+        }
+    };
     let played = output
         .with_share_bar(|bar| {
-            play_scene(&file, (args.path, laps), record, &mut |share| {
+            play_scene(&file, hand, record, &mut |share| {
                 bar.share(share, "");
             })
         })
@@ -190,6 +226,22 @@ fn run_scene(
         lines.join("\n")
     });
     Ok(())
+}
+
+/// Opens the device, says what is to be known before the first touch, and gives its numbers to the scene.
+fn device(
+    args: &SceneRunArgs,
+    name: &DeviceName,
+    file: &mut SceneFile,
+    output: &Output,
+) -> Result<InverseDevice, Failure> {
+    let choice =
+        DeviceChoice { address: args.service, name: name.0.clone(), dead_man: DeadMan::IfPresent };
+    let settings = file.settings(COARSEST).map_err(Failure::usage)?;
+    let (device, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
+    file.device = *device.settings();
+    device_lines(&report).iter().for_each(|line| output.note(line));
+    Ok(device)
 }
 
 fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {

@@ -2,6 +2,7 @@ use super::*;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
+use palpate_model::rig::SensorValues;
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{DerivedValues, PauseView, Power};
@@ -78,6 +79,7 @@ impl Bench {
                 is_homed: false,
                 link: None,
                 link_error: None,
+                sensors: SensorValues::default(),
             },
             run,
             refusal: None,

@@ -3,13 +3,12 @@
 use crate::limits::{Rate, RateLimit};
 use crate::problem::Problem;
 use crate::shared::Shared;
-use crate::tokens::{Scope, StoredToken, Tokens};
+use crate::tokens::{Scope, Tokens};
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::Response;
 use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -22,9 +21,6 @@ const WRONG_TOKENS: Rate = Rate { burst: 10.0, per_second: 0.2 };
 /// Stops of an address that are passed on. The first is enough; the rig's queue of requests must stay free for the
 /// operator's own.
 const STOPS: Rate = Rate { burst: 8.0, per_second: 5.0 };
-
-/// Tokens are read again after this time, so that a removed one is of no use soon.
-const TOKENS_AGE: Duration = Duration::from_secs(1);
 
 /// What stands before a token in the list of a WebSocket's subprotocols: a browser can send no other header with it.
 const TOKEN_PROTOCOL: &str = "palpate-token.";
@@ -65,7 +61,6 @@ impl Caller {
 
 /// What access is decided by.
 pub(crate) struct Access {
-    library: PathBuf,
     /// Whether the socket can be reached from this computer alone.
     is_local: bool,
     is_tls: bool,
@@ -74,7 +69,6 @@ pub(crate) struct Access {
     requests: Mutex<RateLimit<IpAddr>>,
     wrong_tokens: Mutex<RateLimit<IpAddr>>,
     stops: Mutex<RateLimit<IpAddr>>,
-    tokens: Mutex<Option<(Duration, Arc<Tokens>)>>,
 }
 
 fn take(limit: &Mutex<RateLimit<IpAddr>>, key: IpAddr, now: Duration) -> bool {
@@ -82,40 +76,15 @@ fn take(limit: &Mutex<RateLimit<IpAddr>>, key: IpAddr, now: Duration) -> bool {
 }
 
 impl Access {
-    pub fn new(library: PathBuf, is_local: bool, is_tls: bool, names: Vec<String>) -> Self {
+    pub fn new(is_local: bool, is_tls: bool, names: Vec<String>) -> Self {
         Self {
-            library,
             is_local,
             is_tls,
             names,
             requests: Mutex::new(RateLimit::new(REQUESTS)),
             wrong_tokens: Mutex::new(RateLimit::new(WRONG_TOKENS)),
             stops: Mutex::new(RateLimit::new(STOPS)),
-            tokens: Mutex::new(None),
         }
-    }
-
-    /// The tokens, at most a second old. A file that cannot be read lets no one in.
-    fn tokens(&self, now: Duration) -> Arc<Tokens> {
-        let mut known = self.tokens.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((at, tokens)) = &*known
-            && now.saturating_sub(*at) < TOKENS_AGE
-        {
-            return Arc::clone(tokens);
-        }
-        let tokens = Arc::new(Tokens::read(&self.library).unwrap_or_else(|err| {
-            tracing::error!("{err}");
-            Tokens::default()
-        }));
-        *known = Some((now, Arc::clone(&tokens)));
-        tokens
-    }
-
-    /// Whether a caller may still do something: a token may have been removed.
-    pub fn is_still_allowed(&self, caller: &Caller, scope: Scope, now: Duration) -> bool {
-        let is_there =
-            |token: &StoredToken| token.name == caller.name && token.scopes.contains(&scope);
-        !caller.is_token || self.tokens(now).all().iter().any(is_there)
     }
 
     pub fn take_stop(&self, peer: Peer, now: Duration) -> Result<(), Problem> {
@@ -128,28 +97,17 @@ impl Access {
         }
     }
 
-    fn caller(&self, headers: &HeaderMap, peer: Peer, now: Duration) -> Result<Caller, Problem> {
-        let Some(secret) = secret(headers) else {
-            // A person at this computer could press the window's buttons as well. Runs need a token even so.
-            if self.is_local && peer.0.ip().is_loopback() {
-                return Ok(Caller {
-                    name: peer.0.ip().to_string(),
-                    scopes: vec![Scope::Watch, Scope::Stop],
-                    is_token: false,
-                });
-            }
-            return Err(self.unknown(peer, now, "a token is needed; make one at the rig"));
-        };
-        match self.tokens(now).find(secret) {
-            Some(token) => Ok(Caller {
-                name: token.name.clone(),
-                scopes: token.scopes.clone(),
-                is_token: true,
-            }),
-            None => {
-                Err(self.unknown(peer, now, "this token is not known; make a new one at the rig"))
-            }
+    /// Whoever sends a request without a token.
+    fn caller_without_token(&self, peer: Peer, now: Duration) -> Result<Caller, Problem> {
+        // A person at this computer could press the window's buttons as well. Runs need a token even so.
+        if self.is_local && peer.0.ip().is_loopback() {
+            return Ok(Caller {
+                name: peer.0.ip().to_string(),
+                scopes: vec![Scope::Watch, Scope::Stop],
+                is_token: false,
+            });
         }
+        Err(self.unknown(peer, now, "a token is needed; make one at the rig"))
     }
 
     fn unknown(&self, peer: Peer, now: Duration, sentence: &str) -> Problem {
@@ -221,6 +179,27 @@ fn secret(headers: &HeaderMap) -> Option<&str> {
     protocols.split(',').find_map(|one| one.trim().strip_prefix(TOKEN_PROTOCOL))
 }
 
+async fn caller(shared: &Shared, headers: &HeaderMap, peer: Peer) -> Result<Caller, Problem> {
+    let Some(secret) = secret(headers) else {
+        return shared.access.caller_without_token(peer, shared.now());
+    };
+    let known = |tokens: &Tokens| {
+        tokens.find(secret).map(|token| Caller {
+            name: token.name.clone(),
+            scopes: token.scopes.clone(),
+            is_token: true,
+        })
+    };
+    if let Some(caller) = known(&shared.library_facts.newest().tokens) {
+        return Ok(caller);
+    }
+    // It may have been made a moment ago.
+    known(&shared.library_facts.read_again().await.tokens).ok_or_else(|| {
+        let sentence = "this token is not known; make a new one at the rig";
+        shared.access.unknown(peer, shared.now(), sentence)
+    })
+}
+
 /// Checks a request to the API, and adds its caller.
 pub(crate) async fn check_caller(
     State(shared): State<Arc<Shared>>,
@@ -228,7 +207,7 @@ pub(crate) async fn check_caller(
     next: Next,
 ) -> Result<Response, Problem> {
     let peer = peer(&request)?;
-    let caller = shared.access.caller(request.headers(), peer, shared.now())?;
+    let caller = caller(&shared, request.headers(), peer).await?;
     request.extensions_mut().insert(caller);
     Ok(next.run(request).await)
 }
@@ -292,7 +271,7 @@ mod tests {
 
     fn access(names: &[&str]) -> Access {
         let names = names.iter().map(|&name| name.to_owned()).collect();
-        Access::new(PathBuf::new(), true, false, names)
+        Access::new(true, false, names)
     }
 
     fn headers(pairs: &[(header::HeaderName, &str)]) -> HeaderMap {

@@ -6,6 +6,7 @@
 #![cfg_attr(not(test), warn(clippy::too_many_lines))]
 
 mod access;
+mod library_facts;
 mod limits;
 mod live;
 mod problem;

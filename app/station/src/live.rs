@@ -171,7 +171,7 @@ async fn watch(shared: &Shared, caller: &Caller, mut socket: WebSocket, every: D
         tokio::select! {
             changed = newest.changed() => {
                 let published = Arc::clone(&newest.borrow_and_update());
-                let is_allowed = shared.access.is_still_allowed(caller, Scope::Watch, shared.now());
+                let is_allowed = shared.is_still_allowed(caller, Scope::Watch);
                 if changed.is_err() || !is_allowed {
                     break;
                 }

@@ -17,7 +17,6 @@ use palpate_analysis::catalog_search::{CatalogSearch, search, update};
 use palpate_analysis::progress::NoProgress;
 use palpate_runner::{RunView, RunnerRequest, wall_now};
 use palpate_sessions::catalog::{CatalogEntry, CatalogQuery};
-use palpate_sessions::folder::free_bytes;
 use palpate_sessions::specimen_queue::SpecimenQueue;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -121,7 +120,7 @@ async fn health(State(shared): State<Arc<Shared>>) -> Result<impl IntoResponse, 
         "is_runner_alive": is_alive,
         "uptime_s": shared.now().as_secs(),
         "watchers": shared.watchers.load(Ordering::Relaxed),
-        "free_bytes": free_bytes(&shared.library).ok(),
+        "free_bytes": shared.library_facts.newest().free_bytes,
     });
     Ok((status, Json(object)))
 }
@@ -251,7 +250,11 @@ async fn stop(
     let words = format!("stop over the network by {}", caller.words(peer));
     let passed = shared.runner.request(RunnerRequest::RemoteStop(words.clone()));
     tracing::warn!("{words}");
-    lock(&shared.desk).disarm(&words);
+    let must_repeat = lock(&shared.desk).disarm_for_stop(&words);
+    let passed = match must_repeat {
+        true => shared.runner.request(RunnerRequest::RemoteStop(words)),
+        false => passed,
+    };
     passed.map_err(Problem::unavailable)?;
     object(&json!({ "is_passed_on": true, "remark": BEST_EFFORT }))
 }

@@ -1,8 +1,10 @@
 //! What all connections share.
 
-use crate::access::Access;
+use crate::access::{Access, Caller};
+use crate::library_facts::LibraryFacts;
 use crate::live::Published;
 use crate::remote::{RemoteBench, RemoteDesk};
+use crate::tokens::{Scope, StoredToken};
 use palpate_analysis::station_settings::StationSettings;
 use palpate_runner::{RunnerHandle, Stopwatch};
 use std::path::PathBuf;
@@ -18,6 +20,7 @@ pub(crate) struct Shared {
     /// What runs over the network are made with; without it none is asked for.
     pub bench: Arc<Mutex<Option<RemoteBench>>>,
     pub library: PathBuf,
+    pub library_facts: LibraryFacts,
     /// Since the station was started.
     watch: Stopwatch,
     pub watchers: AtomicUsize,
@@ -37,27 +40,30 @@ impl Shared {
         runner: RunnerHandle,
         desk: Arc<Mutex<RemoteDesk>>,
         bench: Arc<Mutex<Option<RemoteBench>>>,
-    ) -> Self {
+    ) -> std::io::Result<Self> {
         let is_local = settings.address.ip().is_loopback();
-        let access = Access::new(
-            settings.library.clone(),
-            is_local,
-            settings.tls.is_some(),
-            settings.names.clone(),
-        );
+        let access = Access::new(is_local, settings.tls.is_some(), settings.names.clone());
         let (live, _) = watch::channel(Arc::new(Published::of(&runner.snapshot(), true, None)));
-        Self {
+        Ok(Self {
             runner,
             access,
             desk,
             bench,
             library: settings.library.clone(),
+            library_facts: LibraryFacts::of(settings.library.clone())?,
             watch: Stopwatch::start(),
             watchers: AtomicUsize::new(0),
             live,
             searches: Semaphore::new(1),
             searches_waiting: Semaphore::new(SEARCHES_WAITING),
-        }
+        })
+    }
+
+    /// Whether a caller may still do something: a token may have been removed.
+    pub fn is_still_allowed(&self, caller: &Caller, scope: Scope) -> bool {
+        let is_there =
+            |token: &StoredToken| token.name == caller.name && token.scopes.contains(&scope);
+        !caller.is_token || self.library_facts.newest().tokens.all().iter().any(is_there)
     }
 
     /// Time since the station was started.

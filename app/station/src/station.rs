@@ -2,7 +2,7 @@
 
 use crate::access::Peer;
 use crate::live::publish;
-use crate::remote::{RemoteBench, RemoteDesk, Starter};
+use crate::remote::{RemoteBench, RemoteDesk, RemoteQueue, RemoteRefusal, Starter, lock};
 use crate::routes::router;
 use crate::shared::Shared;
 use axum::Router;
@@ -10,7 +10,8 @@ use axum::extract::Extension;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use palpate_analysis::station_settings::{StationSettings, TlsFiles};
-use palpate_runner::RunnerHandle;
+use palpate_protocols::plans::Plan;
+use palpate_runner::{RunnerHandle, wall_now};
 use rustls::ServerConfig;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
@@ -68,6 +69,7 @@ pub enum StationError {
 pub struct Station {
     address: SocketAddr,
     is_tls: bool,
+    runner: RunnerHandle,
     desk: Arc<Mutex<RemoteDesk>>,
     bench: Arc<Mutex<Option<RemoteBench>>>,
     end: Option<oneshot::Sender<()>>,
@@ -107,8 +109,8 @@ impl BoundStation {
         let desk = Arc::new(Mutex::new(RemoteDesk::default()));
         let bench = Arc::new(Mutex::new(bench));
         let shared = Shared::new(&settings, runner.clone(), Arc::clone(&desk), Arc::clone(&bench));
-        let shared = Arc::new(shared);
-        let starter = Starter::new(Arc::clone(&desk), runner);
+        let shared = Arc::new(shared.map_err(StationError::Thread)?);
+        let starter = Starter::new(Arc::clone(&desk), runner.clone());
         let (end, ended) = oneshot::channel();
         let is_tls = tls.is_some();
         let own_bench = Arc::clone(&bench);
@@ -137,7 +139,7 @@ impl BoundStation {
         };
         let thread = std::thread::Builder::new().name("station".into()).spawn(serve);
         let thread = thread.map_err(StationError::Thread)?;
-        Ok(Station { address, is_tls, desk, bench, end: Some(end), thread: Some(thread) })
+        Ok(Station { address, is_tls, runner, desk, bench, end: Some(end), thread: Some(thread) })
     }
 }
 
@@ -165,6 +167,18 @@ impl Station {
     /// What is armed, and what is asked for.
     pub fn desk(&self) -> &Arc<Mutex<RemoteDesk>> {
         &self.desk
+    }
+
+    /// Arms a queue for a time, if the rig can run every combination of the ends of its ranges.
+    pub fn arm(&self, queue: RemoteQueue, time: Duration) -> Result<(), RemoteRefusal> {
+        let bench = self.bench.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let rig = &self.runner.snapshot().rig;
+        let check = |plan: &Plan| match &bench {
+            Some(bench) => bench.check(plan, rig),
+            None => Err("the rig has no calibration yet".into()),
+        };
+        queue.check(check)?;
+        lock(&self.desk).arm(queue, wall_now(), time)
     }
 
     /// Takes another calibration and other limits for runs over the network.

@@ -25,6 +25,19 @@ pub struct RigState {
     pub is_homed: bool,
     /// Whether the link to the rig was lost, and why.
     pub link_error: Option<String>,
+    /// Newest value of every sensor beside load cell and axis.
+    pub sensors: Vec<SensorState>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct SensorState {
+    pub name: String,
+    /// In `unit`; of a digital input 1 is high and 0 is low.
+    pub value: f64,
+    /// `1` where it has none.
+    pub unit: String,
+    /// As it is read.
+    pub words: String,
 }
 
 impl RigState {
@@ -37,6 +50,16 @@ impl RigState {
             signal_v: rig.reading.map(|reading| rounded(reading.volts.0, 1e6)),
             is_homed: rig.is_homed,
             link_error: rig.link_error.clone(),
+            sensors: rig
+                .sensor_facts()
+                .into_iter()
+                .map(|one| SensorState {
+                    words: one.words(),
+                    name: one.name,
+                    value: rounded(one.value, 1e6),
+                    unit: one.unit,
+                })
+                .collect(),
         }
     }
 }

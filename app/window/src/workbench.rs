@@ -331,7 +331,10 @@ impl Workbench {
         let passed = self.runner.send_choice(choice);
         self.keep_refusal(passed);
         if matches!(choice, Operator::Stop | Operator::Halt | Operator::Abort) {
-            self.station.disarm("a person at the rig stopped it");
+            if self.station.disarm_for_stop("a person at the rig stopped it") {
+                let passed = self.runner.send_choice(choice);
+                self.keep_refusal(passed);
+            }
         }
     }
 

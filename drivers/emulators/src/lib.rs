@@ -11,6 +11,7 @@ pub mod faults;
 pub mod galil;
 pub mod grbl;
 pub mod hx711;
+pub mod inverse;
 pub mod line_cell;
 pub mod mark10;
 pub mod orders;

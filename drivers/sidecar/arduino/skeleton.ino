@@ -126,14 +126,36 @@ void putWhole(int32_t value) {
   putUnsigned(value < 0 ? -(uint32_t)value : (uint32_t)value);
 }
 
-// With six decimals, which is enough for a pulse and a temperature.
+// With nine significant digits, which give a float back as it is. JSON has no number for what is none.
 void putReal(float value) {
+  if (!(value - value == 0)) return put("null");
   if (value < 0) put('-');
   value = fabs(value);
-  putUnsigned((uint32_t)value);
-  put('.');
-  unsigned long rest = (unsigned long)((value - (unsigned long)value) * 1e6f + 0.5f);
-  for (unsigned long unit = 100000; unit; unit /= 10) put('0' + rest / unit % 10);
+  int tens = 0;
+  for (; value >= 1e9f; tens++) value /= 10;
+  for (; value > 0 && value < 1e-9f; tens--) value *= 10;
+  // The value is whole * 2^-places exactly, and so is each of its digits: whole has 24 bits, and places are at most 54.
+  int exponent;
+  uint64_t whole = (uint64_t)ldexp(frexp(value, &exponent), 24);
+  int places = 24 - exponent;
+  for (; places < 0; places++) whole *= 2;
+  const uint32_t before = (uint32_t)(whole >> places);
+  uint64_t rest = whole - ((uint64_t)before << places);
+  putUnsigned(before);
+  int digits = 0;
+  for (uint32_t left = before; left; left /= 10) digits++;
+  if (rest && digits < 9) put('.');
+  while (rest && digits < 9) {
+    rest *= 10;
+    const char digit = (char)(rest >> places);
+    rest -= (uint64_t)digit << places;
+    put('0' + digit);
+    if (digit || digits) digits++;
+  }
+  if (tens) {
+    put('e');
+    putWhole(tens);
+  }
 }
 
 void begin(const char *text) {

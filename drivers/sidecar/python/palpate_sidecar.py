@@ -21,11 +21,16 @@ import time
 
 MOVING, STOPPING, HOME, FORWARD_LIMIT, REVERSE_LIMIT, MOTOR_ON = 1, 2, 4, 8, 16, 32
 LINE_MAX = 200  # characters of palpate's lines
+TCP_SILENCE = 2.0  # seconds; a peer that vanished is not waited for longer, so that a new one is served
 UNSENT_MAX = 65536  # bytes that wait for palpate; samples beyond are dropped, so that the watchdog never waits
 
 
 class Refused(Exception):
     """Raise it in move, sine or enable to refuse a command, with the reason as its text."""
+
+
+class _LinkEnd(Exception):
+    """Nothing can be written any more."""
 
 
 def crc16(data):
@@ -147,23 +152,24 @@ class Sidecar:
             while True:
                 client, _ = server.accept()
                 with client:
-                    client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                    self._serve(client.fileno(), client.fileno())
+                    with contextlib.suppress(OSError):
+                        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                    self._serve(client.fileno(), client.fileno(), TCP_SILENCE)
 
-    def _serve(self, source, sink):
-        """Talks until the link ends; whatever happens, the axis is stopped."""
+    def _serve(self, source, sink, patience=math.inf):
+        """Talks until the link ends or is silent for too long; whatever happens, the axis is stopped."""
         os.set_blocking(source, False)
         os.set_blocking(sink, False)
         self._sink, self._unsent, self._line = sink, b"", b""
         self._greeted, self._sending, self._frames, self._silent = False, False, False, True
-        self._heard = time.monotonic()
-        self._say({"boot": self.boot})
-        period, due = 1.0 / self.rate, time.monotonic()
+        period, self._heard, due = 1.0 / self.rate, time.monotonic(), time.monotonic()
         try:
+            self._say({"boot": self.boot})
             while True:
-                waits = [source], [sink] if self._unsent else []
-                readable, writable, _ = select.select(*waits, [], max(0.0, due - time.monotonic()))
-                if readable and not self._read(source):
+                wait = min(0.02, max(0.0, due - time.monotonic()))  # the watchdog is looked at in any case
+                readable, writable, _ = select.select([source], [sink] if self._unsent else [], [], wait)
+                is_over = not self._read(source) if readable else time.monotonic() - self._heard > patience
+                if is_over:
                     return
                 if writable:
                     self._flush()
@@ -175,10 +181,11 @@ class Sidecar:
                     due = max(due + period, now - 5 * period)
                     if self._sending:
                         self._send_sample()
-        except (BrokenPipeError, ConnectionError):
+        except _LinkEnd:
             return
         except Exception as error:
-            self._say({"fault": f"{type(error).__name__}: {error}"[:120]})
+            with contextlib.suppress(_LinkEnd):
+                self._say({"fault": f"{type(error).__name__}: {error}"[:120]})
             raise
         finally:
             self.stop()
@@ -189,24 +196,23 @@ class Sidecar:
         """Sends samples until the axis stands, for most of the time that palpate leaves a program to end."""
         until = time.monotonic() + 0.4
         while self.moving() and time.monotonic() < until:
-            time.sleep(1.0 / self.rate)
-            if self._sending:
-                self._send_sample()
+            time.sleep(min(0.05, 1.0 / self.rate))
+            with contextlib.suppress(Exception):  # the link may be gone, and the axis still brakes
+                if self._sending:
+                    self._send_sample()
 
     def _read(self, source):
         try:
             data = os.read(source, 4096)
-        except BlockingIOError:
-            return True
+        except OSError as error:
+            return isinstance(error, BlockingIOError)
         *lines, self._line = (self._line + data).split(b"\n")
-        for line in lines:
-            self._take(line.strip(b"\r"))
+        for line in filter(None, (line.strip(b"\r") for line in lines)):
+            self._take(line)
         self._line = self._line[: LINE_MAX + 100]  # a line without an end is cut, and garbled
         return bool(data)
 
     def _take(self, line):
-        if not line:
-            return
         try:
             if len(line) > LINE_MAX + 5:
                 raise ValueError("the line is too long")
@@ -241,8 +247,8 @@ class Sidecar:
             self._sending, self._frames = True, self.binary and message.get("binary", False)
         elif word == "beat":
             return {"t": self.ticks()}
-        elif word == "enable":
-            self.enable()
+        elif word in ("enable", "stop", "halt"):
+            getattr(self, word)()
         elif word == "move":
             to, speed, acceleration = int(message["to"]), float(message["speed"]), float(message["acceleration"])
             axis = self.axis or {}
@@ -253,10 +259,6 @@ class Sidecar:
             self.move(to, speed, acceleration)
         elif word == "sine":
             self.sine(message["amplitude"], message["period"], message["cycles"], message["acceleration"])
-        elif word == "stop":
-            self.stop()
-        elif word == "halt":
-            self.halt()
         elif word == "bye":
             self.stop()
             self._sending = False
@@ -292,5 +294,6 @@ class Sidecar:
     def _flush(self):
         try:
             self._unsent = self._unsent[os.write(self._sink, self._unsent) :]
-        except BlockingIOError:
-            pass
+        except OSError as error:
+            if not isinstance(error, BlockingIOError):
+                raise _LinkEnd from error

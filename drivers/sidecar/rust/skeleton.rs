@@ -219,7 +219,7 @@ fn say(message: &Value) -> io::Result<()> {
     out.flush()
 }
 
-fn main() -> io::Result<()> {
+fn main() {
     let now = Instant::now();
     let motion = Motion {
         start: 0.0,
@@ -253,36 +253,36 @@ fn main() -> io::Result<()> {
             }
         }
     });
-    say(&json!({"boot": sidecar.boot}))?;
     let period = Duration::from_secs_f64(1.0 / RATE);
     let mut due = Instant::now();
-    let mut is_open = true;
+    // The link has ended when its input ends, or when nothing can be written: then the axis brakes, and this goes on until it stands.
+    let mut is_open = say(&json!({"boot": sidecar.boot})).is_ok();
     loop {
         match lines.recv_timeout(due.saturating_duration_since(Instant::now())) {
             Ok(line) if !line.trim_ascii().is_empty() => {
-                if let Some(answer) = sidecar.take(line.trim_ascii()) {
-                    say(&answer)?;
-                }
+                let answer = if is_open { sidecar.take(line.trim_ascii()) } else { None };
+                is_open = is_open && answer.is_none_or(|answer| say(&answer).is_ok());
             }
             Ok(_) | Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
-                sidecar.stage.brake();
                 is_open = false;
                 std::thread::sleep(due.saturating_duration_since(Instant::now()));
             }
         }
-        if sidecar.heard.elapsed() >= SILENCE {
+        if !is_open || sidecar.heard.elapsed() >= SILENCE {
             sidecar.stage.brake();
         }
         if Instant::now() >= due {
             due = (due + period).max(Instant::now().checked_sub(5 * period).unwrap_or(due));
             if sidecar.is_sending {
                 let sample = sidecar.sample();
-                say(&sample)?;
+                let is_said = say(&sample).is_ok();
+                sidecar.is_sending = is_said;
+                is_open = is_open && is_said;
             }
         }
         if !is_open && !sidecar.stage.is_moving() {
-            return Ok(());
+            return;
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What a sidecar says of itself, and whether that can be.
 
 use super::protocol::VERSION;
+use crate::board_clock::BoardClock;
 use palpate_model::Nanos;
 use palpate_model::rig::{AdcDescription, RigSensors, SensorChannel};
 use serde::Deserialize;
@@ -111,6 +112,11 @@ impl SidecarDescription {
         let is_fine = 1e9 / self.rate >= self.tick_ns as f64 * (1.0 - 1e-9);
         if !is_fine {
             return Err("its rate is faster than its clock; give a shorter tick_ns".into());
+        }
+        if self.period() > BoardClock::step_max(self.tick_ns) {
+            return Err(
+                "its clock makes half a turn between two samples; give a longer tick_ns".into()
+            );
         }
         if let Some(axis) = &self.axis {
             axis.check()?;
@@ -235,6 +241,8 @@ mod tests {
             ("1000", "0"),
             ("500", "0"),
             ("500", "1e9"),
+            // A clock of a nanosecond makes half a turn within 2.1 s.
+            ("\"tick_ns\": 1000, \"rate\": 500", "\"tick_ns\": 1, \"rate\": 0.4"),
             ("\"silence_ms\": 200,", ""),
             ("200", "5"),
             ("0.0025", "0"),

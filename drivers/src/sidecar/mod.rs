@@ -4,6 +4,7 @@
 //! `session/`, the dialogue with a whole rig. [`cell`] is a load cell beside another axis, `sensor_line.rs` and
 //! `sensor_rig.rs` are sensors beside any rig.
 
+mod budget;
 mod cell;
 pub mod conform;
 pub mod connect;
@@ -41,6 +42,7 @@ const TITLE: &str = "a sidecar";
 const INTRODUCTION: &str = "sidecar, ";
 /// The number of the farewell: larger than any before it.
 const FAREWELL_NUMBER: u64 = u32::MAX as u64;
+const FLOODED: &str = "the sidecar sends far more than it promised";
 const BEYOND_RANGE: &str = "the load cell's signal is at the end of its converter's range; take the load off, or check the cell's wires";
 /// Step in which speeds are reported; a sidecar makes any.
 const SPEED_QUANTUM: MmPerS = MmPerS(0.001);

@@ -19,6 +19,8 @@ const FRAME_CONTENT: u8 = 13;
 const FRAME_REST: usize = FRAME_CONTENT as usize + 3;
 /// All bits of a status (`AxisStatus`).
 const STATUS_MAX: u32 = 0x3f;
+/// As far as a counter of 32 bits goes, which a frame has: with it no sum of positions overflows.
+const PULSES_MAX: u64 = i32::MAX as u64;
 
 /// What the host says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,6 +141,12 @@ pub struct SidecarSample {
 }
 
 impl SidecarSample {
+    /// Whether its position is one that a counter can have, if it has one.
+    #[must_use]
+    pub fn has_possible_pulses(&self) -> bool {
+        self.pulses.is_none_or(|pulses| pulses.unsigned_abs() <= PULSES_MAX)
+    }
+
     /// The line of a sample with its end.
     #[must_use]
     pub fn line(&self, has_checksum: bool) -> Vec<u8> {

@@ -1,12 +1,14 @@
 //! The dialogue with a sidecar that only measures, beside any rig.
 
+use super::FLOODED;
+use super::budget::{FaultLimit, LinkBudget};
 use super::connect::ConnectedSidecar;
 use super::protocol::{HostMessage, ReceivedItem, SidecarMessage, SidecarParser, SidecarSample};
 use super::sensors::SensorReports;
 use crate::board_clock::{BoardClock, BoardTime};
 use crate::rig::RigEventBody;
 use crate::split_rig::CellClock;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{Dialogue, LinkStats, Waiting};
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 use std::collections::VecDeque;
@@ -28,9 +30,11 @@ pub struct SensorLine {
     host_clock: CellClock,
     reports: SensorReports,
     silence_max: Nanos,
-    sampled_at: Nanos,
+    for_sample: Waiting,
     looked_at: Nanos,
     garbled_in_row: u32,
+    budget: LinkBudget,
+    fault_limit: FaultLimit,
     /// Why it can no longer be trusted.
     ending: Option<String>,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -52,9 +56,11 @@ impl SensorLine {
             host_clock: CellClock::default(),
             reports,
             silence_max: DEAD.max(Nanos(DEAD_PERIODS * about.period().0)),
-            sampled_at: now,
+            for_sample: Waiting::new(now),
             looked_at: now,
             garbled_in_row: 0,
+            budget: LinkBudget::new(about.rate, now),
+            fault_limit: FaultLimit::default(),
             ending: None,
             events: VecDeque::new(),
             stats: connected.stats,
@@ -65,11 +71,11 @@ impl SensorLine {
         let ReceivedItem::Message(message) = item else {
             return self.on_garbled();
         };
-        self.garbled_in_row = 0;
         match message {
             SidecarMessage::Sample(sample) => self.on_sample(now, &sample),
             SidecarMessage::Ok { number, .. } => {
                 if let Some((_, sent)) = self.beat.take_if(|(sent, _)| *sent == number) {
+                    self.garbled_in_row = 0;
                     self.stats.push(now.since(sent));
                 }
             }
@@ -78,8 +84,10 @@ impl SensorLine {
                 self.end(format!("the sidecar refuses to go on: {why}"));
             }
             SidecarMessage::Fault(why) => {
-                let why = format!("the sidecar reports: {why}");
-                self.events.push_back((now, RigEventBody::refusal(why)));
+                if self.fault_limit.allows(now) {
+                    let why = format!("the sidecar reports: {why}");
+                    self.events.push_back((now, RigEventBody::refusal(why)));
+                }
             }
             SidecarMessage::Boot(_) | SidecarMessage::Description(_) => {
                 self.end("the sidecar has restarted".into());
@@ -105,7 +113,8 @@ impl SensorLine {
             BoardTime::At(time) => time,
             BoardTime::Restarted(_) => return self.end("the sidecar's clock ran back".into()),
         };
-        self.sampled_at = now;
+        self.garbled_in_row = 0;
+        self.for_sample = Waiting::new(now);
         let mapped = self.host_clock.map(time, now);
         let half = Nanos(self.stats.round_trip_min.0 / 2);
         self.reports.take(now, now.since(mapped) + half, &sample.values);
@@ -113,6 +122,7 @@ impl SensorLine {
 
     fn write(&mut self, message: HostMessage) -> Vec<u8> {
         self.number += 1;
+        self.budget.note_written();
         message.line(self.number, self.has_checksum)
     }
 }
@@ -123,9 +133,17 @@ impl Dialogue for SensorLine {
     fn command(&mut self, _now: Nanos, _command: RigCommand) {}
 
     fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
+        self.budget.take_bytes(now, bytes.len());
         for byte in bytes {
+            if self.ending.is_some() {
+                return;
+            }
             if let Some(item) = self.parser.take(*byte) {
+                self.budget.take_item(now);
                 self.on_item(now, item);
+            }
+            if self.budget.is_exceeded() {
+                self.end(format!("{FLOODED}; correct its program"));
             }
         }
     }
@@ -134,7 +152,7 @@ impl Dialogue for SensorLine {
         // What this computer did not look at was not silence of the sidecar.
         let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > Nanos::from_millis(20) {
-            self.sampled_at = self.sampled_at + pause;
+            self.for_sample.excuse(pause);
         }
         if !std::mem::replace(&mut self.is_started, true) {
             return Some(self.write(HostMessage::Start { is_binary: false }));
@@ -157,12 +175,65 @@ impl Dialogue for SensorLine {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        let is_silent = now.since(self.sampled_at) > self.silence_max;
+        let is_silent = self.for_sample.time(now) > self.silence_max;
         let silent = || "the sidecar sends no samples; check its program and cable".to_owned();
         self.ending.clone().or_else(|| is_silent.then(silent))
     }
 
     fn stats(&self) -> LinkStats {
         self.stats
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sidecar::sensors::SharedValues;
+    use std::sync::Arc;
+
+    fn line(rate: u32, values: &SharedValues) -> SensorLine {
+        let text = format!(
+            r#"{{"ok":1,"sidecar":1,"name":"a","boot":1,"tick_ns":1000,"rate":{rate},"sensors":[{{"name":"one","unit":"1"}}]}}"#
+        );
+        let description = serde_json::from_str(&text).unwrap();
+        let reports = SensorReports::new(&description, (0, 0), Arc::clone(values));
+        let stats = LinkStats::default();
+        let connected = ConnectedSidecar { description, stats, number: 1, raw: Vec::new() };
+        SensorLine::new(&connected, reports, Nanos::ZERO)
+    }
+
+    /// Lines of a millisecond each turn, for so long; when the link has ended, and how many events there were.
+    fn turns(rate: u32, most: u64, lines: impl Fn(u64) -> String) -> (Option<u64>, usize) {
+        let values = SharedValues::default();
+        let mut line = line(rate, &values);
+        let mut events = 0;
+        let ended = (1..=most).find(|ms| {
+            let now = Nanos::from_millis(*ms);
+            while line.take_line(now).is_some() {}
+            line.handle_bytes(now, lines(*ms).as_bytes());
+            events += std::iter::from_fn(|| line.take_event()).count();
+            line.is_dead(now).is_some()
+        });
+        (ended, events)
+    }
+
+    #[test]
+    fn as_many_samples_as_promised_are_taken_and_a_flood_ends_the_link() {
+        let sample = |micros: u64| format!("{{\"t\":{micros},\"v\":[1]}}\n");
+        let (ended, _) = turns(1_000, 5_000, |ms| sample(ms * 1_000));
+        assert_eq!(ended, None);
+        // Ten are promised, and 10 000 a second come.
+        let many = |ms: u64| (0..10).map(|i| sample(ms * 1_000 + i * 100)).collect();
+        let (ended, _) = turns(10, 2_000, many);
+        assert!(ended.is_some_and(|ms| ms < 100), "{ended:?}");
+    }
+
+    #[test]
+    fn a_flood_of_faults_or_answers_ends_the_link_and_fills_nothing() {
+        for word in ["{\"ok\":0}\n", "{\"fault\":\"hot\"}\n", "{\"no\":null,\"why\":\"\"}\n"] {
+            let lines = |ms: u64| format!("{{\"t\":{}}}\n{}", ms * 1_000, word.repeat(20));
+            let (ended, events) = turns(1_000, 2_000, lines);
+            assert!(ended.is_some() && events <= 20, "{word}: {ended:?} {events}");
+        }
     }
 }

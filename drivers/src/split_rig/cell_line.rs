@@ -4,7 +4,7 @@ use super::cell_clock::CellClock;
 use super::track::AxisTrack;
 use crate::cell::CellDialogue;
 use crate::rig::RigEventBody;
-use crate::wire::{Dialogue, LinkStats, lock};
+use crate::wire::{Dialogue, LinkStats, Waiting, lock};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, RigCommand, SampleAge};
 use std::collections::VecDeque;
@@ -28,7 +28,7 @@ pub struct CellLine {
     /// Age of a sample when it is sent.
     delay: Nanos,
     last_tick: Option<u64>,
-    heard_at: Nanos,
+    for_sample: Waiting,
     looked_at: Nanos,
     silence: Nanos,
     is_silent: bool,
@@ -54,7 +54,7 @@ impl CellLine {
             period,
             delay,
             last_tick: None,
-            heard_at: start,
+            for_sample: Waiting::new(start),
             looked_at: start,
             silence: silence.max(SILENT_MIN),
             is_silent: false,
@@ -85,7 +85,7 @@ impl CellLine {
     fn take_samples(&mut self, now: Nanos) {
         let burst: Vec<_> = std::iter::from_fn(|| self.cell.take_sample()).collect();
         for (place, sample) in burst.iter().enumerate() {
-            self.heard_at = now;
+            self.for_sample = Waiting::new(now);
             self.is_silent = false;
             let newer = burst.len() - 1 - place;
             let (taken, within) = match sample.device_time {
@@ -133,10 +133,10 @@ impl Dialogue for CellLine {
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
         let pause = now.since(std::mem::replace(&mut self.looked_at, now));
         if pause > PAUSE {
-            self.heard_at = self.heard_at + pause;
+            self.for_sample.excuse(pause);
         }
-        if now.since(self.heard_at) > self.silence && !std::mem::replace(&mut self.is_silent, true)
-        {
+        let is_silent = self.for_sample.time(now) > self.silence;
+        if is_silent && !std::mem::replace(&mut self.is_silent, true) {
             let ms = self.silence.0 / 1_000_000;
             let words =
                 format!("the load cell has sent nothing for {ms} ms; check its cable and power");

@@ -11,6 +11,7 @@ mod link_thread;
 #[cfg(unix)]
 mod program;
 mod setup_console;
+mod waiting;
 
 pub use address::{DeviceAddress, WireError};
 pub(crate) use dialogue::{ATTENDED_MAX, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
@@ -21,6 +22,7 @@ pub use link_thread::LinkThread;
 #[cfg(unix)]
 pub use program::ProgramLink;
 pub use setup_console::SetupConsole;
+pub(crate) use waiting::Waiting;
 
 use palpate_model::Nanos;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

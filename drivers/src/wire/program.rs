@@ -1,23 +1,28 @@
 //! A program of this computer as a device: its standard input and output are the link.
 
 use super::link::{Link, SocketLink};
+use rustix::process::{
+    Pid, Signal, WaitId, WaitIdOptions, WaitIdStatus, kill_process_group, waitid,
+};
 use std::io::{self, ErrorKind, Read};
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// A program has so long to end by itself after the end of its input, before it is killed.
+/// A program and those that it has started have so long to end by themselves after the end of their input, before they
+/// are killed.
 const END_MAX: Duration = Duration::from_millis(500);
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Lines of its standard error that are logged, and their longest length.
 const LOG_LINES_MAX: usize = 1_000;
 const LOG_LINE_MAX: usize = 500;
 
-/// A child process on a pair of sockets. Dropping it closes its input, waits for its end, and kills it.
+/// A child process on a pair of sockets. Dropping it closes its input, waits for its end, and kills it with all that it
+/// has started.
 pub struct ProgramLink {
     /// `None` only while it is dropped.
     link: Option<SocketLink<UnixStream>>,
@@ -47,7 +52,7 @@ impl ProgramLink {
             .stdout(Stdio::from(output))
             .stderr(Stdio::from(OwnedFd::from(their_errors)))
             .spawn()?;
-        let log = ErrorLog { stream: errors, line: Vec::new(), lines: 0 };
+        let log = ErrorLog { stream: errors, line: Vec::new(), lines: 0, is_over: false };
         Ok(Self { link: Some(SocketLink::new_nonblocking(ours)), child, log })
     }
 
@@ -63,13 +68,19 @@ impl ProgramLink {
     /// What has become of a program that no longer talks.
     fn ending(&mut self, err: io::Error) -> io::Error {
         self.log.pass_on();
-        let status = self.child.try_wait().ok().flatten();
-        status.map_or(err, |status| io::Error::other(describe_end(status)))
+        self.end_of_child().map_or(err, |status| io::Error::other(describe_end(&status)))
+    }
+
+    /// How the child has ended, if it has. Its number stays its own until it is waited for, so that no other process gets
+    /// the signal for its group.
+    fn end_of_child(&self) -> Option<WaitIdStatus> {
+        let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        waitid(WaitId::Pid(Pid::from_child(&self.child)), options).ok().flatten()
     }
 }
 
-fn describe_end(status: ExitStatus) -> String {
-    match status.code() {
+fn describe_end(status: &WaitIdStatus) -> String {
+    match status.exit_status() {
         Some(code) => {
             format!(
                 "the program has ended with exit code {code}; its last words are in the program's log"
@@ -106,14 +117,20 @@ impl Drop for ProgramLink {
         let looks = END_MAX.as_millis() / LOOK_EVERY.as_millis();
         for _ in 0..looks {
             self.log.pass_on();
-            match self.child.try_wait() {
-                Ok(None) => std::thread::sleep(LOOK_EVERY),
-                _ => return,
+            // Whoever was started by the child has its standard error, unless it has closed it.
+            if self.log.is_over && self.end_of_child().is_some() {
+                break;
             }
+            std::thread::sleep(LOOK_EVERY);
         }
-        tracing::warn!("the program did not end by itself and is killed");
-        // It may have ended at this moment.
+        if self.end_of_child().is_none() {
+            tracing::warn!("the program did not end by itself and is killed");
+        } else if !self.log.is_over {
+            tracing::warn!("what the program has started did not end by itself and is killed");
+        }
+        // They may have ended at this moment, and the child may have left its group.
         let _ = self.child.kill();
+        let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
         let _ = self.child.wait();
         self.log.pass_on();
     }
@@ -124,6 +141,8 @@ struct ErrorLog {
     stream: UnixStream,
     line: Vec<u8>,
     lines: usize,
+    /// No process has the other end.
+    is_over: bool,
 }
 
 impl ErrorLog {
@@ -131,8 +150,10 @@ impl ErrorLog {
     /// waits either.
     fn pass_on(&mut self) {
         let mut buffer = [0_u8; 4096];
-        let Ok(count @ 1..) = self.stream.read(&mut buffer) else {
-            return;
+        let count = match self.stream.read(&mut buffer) {
+            Ok(count @ 1..) => count,
+            Ok(0) => return self.is_over = true,
+            Err(_) => return,
         };
         for byte in &buffer[..count] {
             match byte {
@@ -206,6 +227,47 @@ mod tests {
         assert!(has_process(process));
         drop(link);
         assert!(!has_process(process), "it is still there, perhaps as a zombie");
+    }
+
+    /// Whether a process runs; one that has ended and was not waited for by its new parent does not.
+    fn runs(process: u32) -> bool {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));
+        stat.is_ok_and(|text| !text.contains(") Z") && !text.contains(") X"))
+    }
+
+    #[test]
+    fn what_a_program_has_started_is_killed_with_it_also_after_its_own_end() {
+        if !cfg!(target_os = "linux") {
+            return;
+        }
+        for ending in ["exit 0", "while :; do sleep 1; done"] {
+            let mut link = start(&format!("(while :; do sleep 1; done) & echo $!; {ending}"));
+            let text = read_until(&mut link, b"\n");
+            let grandchild: u32 = String::from_utf8(text).unwrap().trim().parse().unwrap();
+            if ending == "exit 0" {
+                palpate_test_support::wait::until(
+                    || link.end_of_child().map(|_| ()),
+                    || "it does not end".into(),
+                );
+            }
+            assert!(runs(grandchild));
+            drop(link);
+            // The signal is sent; the system ends it when it next has its turn.
+            palpate_test_support::wait::until(
+                || (!runs(grandchild)).then_some(()),
+                || format!("{ending}: {grandchild} still runs"),
+            );
+        }
+    }
+
+    #[test]
+    fn a_program_that_closes_its_errors_is_waited_for() {
+        let mut link = start("exec 2>&-; cat; sleep 0.1; echo end");
+        link.write(b"one\n").unwrap();
+        assert_eq!(read_until(&mut link, b"\n"), b"one\n");
+        link.close_input().unwrap();
+        assert_eq!(read_until(&mut link, b"end\n"), b"end\n");
+        drop(link);
     }
 
     #[test]

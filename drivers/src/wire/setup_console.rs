@@ -20,6 +20,8 @@ pub struct SetupConsole<'a, P, T> {
     parse: fn(&mut P, u8) -> Option<T>,
     /// Items with their arrival, not taken yet.
     waiting: VecDeque<(Nanos, T)>,
+    received: usize,
+    received_max: usize,
     /// All bytes in both directions.
     pub raw: Vec<RawBytes>,
 }
@@ -39,6 +41,8 @@ impl<'a, P: Default, T> SetupConsole<'a, P, T> {
             parser: P::default(),
             parse,
             waiting: VecDeque::new(),
+            received: 0,
+            received_max: usize::MAX,
             raw: Vec::new(),
         }
     }
@@ -58,9 +62,9 @@ impl<'a, P: Default, T> SetupConsole<'a, P, T> {
         Ok(())
     }
 
-    /// The next item with its arrival, if one comes until then.
+    /// The next item with its arrival, if one comes until then, and within the allowed bytes.
     pub fn next(&mut self, until: Nanos) -> io::Result<Option<(Nanos, T)>> {
-        while self.waiting.is_empty() && self.now() < until {
+        while self.waiting.is_empty() && self.now() < until && !self.is_flooded() {
             self.read_chunk()?;
         }
         Ok(self.waiting.pop_front())
@@ -88,6 +92,21 @@ impl<'a, P: Default, T> SetupConsole<'a, P, T> {
         Ok(all)
     }
 
+    /// Waits for nothing more once so many further bytes have come.
+    pub fn allow(&mut self, count: usize) {
+        self.received_max = self.received.saturating_add(count);
+    }
+
+    /// Whether more has come than was allowed.
+    pub fn is_flooded(&self) -> bool {
+        self.received > self.received_max
+    }
+
+    /// Count of all bytes of the device.
+    pub fn received(&self) -> usize {
+        self.received
+    }
+
     /// The newest bytes of the device, at most `count`.
     pub fn last_received(&self, count: usize) -> Vec<u8> {
         let received = self.raw.iter().filter(|piece| !piece.is_sent);
@@ -99,6 +118,7 @@ impl<'a, P: Default, T> SetupConsole<'a, P, T> {
         let mut buffer = [0_u8; 1024];
         let count = self.link.read(&mut buffer, READ_MAX)?;
         let bytes = &buffer[..count];
+        self.received += count;
         self.record(false, bytes);
         let at = self.now();
         for byte in bytes {

@@ -9,6 +9,10 @@ use palpate_drivers::rig_file::RigFile;
 use palpate_drivers::sidecar::conform::{
     ConformBench, ConformOptions, ConformReport, Verdict, run,
 };
+use palpate_drivers::sidecar::connect;
+use palpate_drivers::sidecar::protocol::{
+    HostMessage, ReceivedItem, SidecarMessage, SidecarParser,
+};
 use palpate_drivers::sidecar::skeleton::{SkeletonLanguage, skeleton};
 use palpate_drivers::wire::{DeviceAddress, HostClock};
 use palpate_model::Nanos;
@@ -120,6 +124,41 @@ fn drive(file: &RigFile) -> Result<(), String> {
     Ok(())
 }
 
+/// Runs a script of this folder, with words behind it; what fails there fails here.
+fn run_script(script: &str, words: &[&str], folder: &Path) {
+    if skip::lacks_program("python3") {
+        return;
+    }
+    let output = Command::new("python3")
+        .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite").join(script))
+        .args(words)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_python_skeleton_brakes_and_ends_well_when_only_its_output_is_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    run_script("closed_output.py", &["python3", "stage.py"], folder.path());
+}
+
+#[test]
+fn a_python_sidecar_on_tcp_is_not_kept_by_a_peer_that_vanished() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), SkeletonLanguage::Python);
+    run_script("tcp_sidecar.py", &["."], folder.path());
+}
+
+/// With a motor of the test's own: neither ophyd-async nor its packages are needed.
+#[test]
+fn the_ophyd_example_never_moves_after_a_stop() {
+    run_script("ophyd_axis.py", &["sidecar/python"], Path::new(env!("CARGO_MANIFEST_DIR")));
+}
+
 /// The sketch on this computer, behind a pseudo-terminal.
 struct EmulatedBoard(std::process::Child);
 
@@ -131,17 +170,20 @@ impl Drop for EmulatedBoard {
     }
 }
 
-#[test]
+/// Compiles the sketch, with some texts of it replaced, and switches the board on.
 #[cfg(unix)]
-fn the_arduino_skeleton_keeps_to_the_protocol() {
-    if skip::lacks_program("g++") {
-        return;
+fn switch_on(folder: &Path, edits: &[(&str, &str)]) -> (EmulatedBoard, DeviceAddress) {
+    write(folder, SkeletonLanguage::Arduino);
+    let file = folder.join("stage.ino");
+    let mut text = std::fs::read_to_string(&file).unwrap();
+    for (from, to) in edits {
+        assert_eq!(text.matches(from).count(), 1, "{from}");
+        text = text.replace(from, to);
     }
-    let folder = tempfile::tempdir().unwrap();
-    write(folder.path(), SkeletonLanguage::Arduino);
+    std::fs::write(&file, text).unwrap();
     let host = Path::new(env!("CARGO_MANIFEST_DIR")).join("sidecar/arduino/host");
-    let program = folder.path().join("board");
-    let sketch = format!("-DSKETCH=\"{}\"", folder.path().join("stage.ino").display());
+    let program = folder.join("board");
+    let sketch = format!("-DSKETCH=\"{}\"", file.display());
     let compiled = Command::new("g++")
         .args(["-std=c++11", "-O1", "-Wall", "-Wextra", "-Wno-unused-function", &sketch, "-I"])
         .arg(&host)
@@ -152,15 +194,62 @@ fn the_arduino_skeleton_keeps_to_the_protocol() {
         .unwrap();
     let errors = String::from_utf8_lossy(&compiled.stderr);
     assert!(compiled.status.success() && errors.is_empty(), "{errors}");
-    let port = folder.path().join("port");
+    let port = folder.join("port");
     let child =
         Command::new(&program).arg(&port).stdin(Stdio::piped()).stderr(Stdio::null()).spawn();
-    let _board = EmulatedBoard(child.unwrap());
+    let board = EmulatedBoard(child.unwrap());
     until(|| port.exists().then_some(()), || "no port".into());
-    let place = DeviceAddress::Serial {
-        port: port.display().to_string(),
-        baud: 115_200,
-        has_handshake: false,
-    };
+    let port = port.display().to_string();
+    (board, DeviceAddress::Serial { port, baud: 115_200, has_handshake: false })
+}
+
+#[test]
+#[cfg(unix)]
+fn the_arduino_skeleton_keeps_to_the_protocol() {
+    if skip::lacks_program("g++") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (_board, place) = switch_on(folder.path(), &[]);
     check_all(&place);
+}
+
+#[test]
+#[cfg(unix)]
+fn the_arduino_skeleton_says_the_pulse_with_which_it_moves_and_null_for_no_number() {
+    if skip::lacks_program("g++") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let edits = [
+        ("MM_PER_PULSE = 0.0025f", "MM_PER_PULSE = 0.0003125f"),
+        ("return 21.5f;", "static int n = 0; return n++ % 2 ? -INFINITY : NAN;"),
+    ];
+    let (_board, place) = switch_on(folder.path(), &edits);
+    let mut link = place.open().unwrap();
+    let connected = connect(link.as_mut(), &clock(), &"board".into(), None).unwrap();
+    let pulse = connected.description.axis.unwrap().mm_per_pulse;
+    // A float of 24 bits is right to 6e-8.
+    assert!((pulse / 0.000_312_5 - 1.0).abs() < 6e-8, "{pulse}");
+    link.write(&HostMessage::Start { is_binary: false }.line(connected.number + 1, true)).unwrap();
+    let mut parser = SidecarParser::new(true, false);
+    let mut values = Vec::new();
+    let mut buffer = [0_u8; 256];
+    until(
+        || {
+            let count = link.read(&mut buffer, Duration::from_millis(10)).unwrap();
+            for item in buffer[..count].iter().filter_map(|byte| parser.take(*byte)) {
+                match item {
+                    ReceivedItem::Message(SidecarMessage::Sample(sample)) => {
+                        values.extend(sample.values);
+                    }
+                    ReceivedItem::Message(_) => {}
+                    ReceivedItem::Garbled => panic!("a garbled line"),
+                }
+            }
+            (values.len() >= 2).then_some(())
+        },
+        || "no values".into(),
+    );
+    assert_eq!(values[..2], [None, None]);
 }

@@ -35,6 +35,7 @@ mod setting_error;
 pub mod simulation;
 pub mod surface;
 mod torque;
+pub mod triangles;
 
 pub use buzz::{Buzz, BuzzDetector, BuzzSettings};
 pub use calibrate::{BiasBranch, BiasCalibration, BiasError, BiasPoint};

@@ -1,6 +1,7 @@
 //! Sampling of the signal, and aliases that may appear in it.
 
 use super::description::RigDescription;
+use crate::units::Seconds;
 use serde::{Deserialize, Serialize};
 
 /// Mains frequencies in Hz.
@@ -28,9 +29,13 @@ pub struct SignalFacts {
 }
 
 impl RigDescription {
-    /// Samples come a controller tick apart, or further where the rig says so.
+    /// Time between two samples: a tick of the controller, or as many as the rig says.
+    pub fn sample_interval(&self) -> Seconds {
+        Seconds(self.tick().0 * self.ticks_per_sample.max(1.0))
+    }
+
     pub fn signal(&self) -> SignalFacts {
-        let rate = 1.0 / (self.tick().0 * self.ticks_per_sample.max(1.0));
+        let rate = 1.0 / self.sample_interval().0;
         let filter = if self.settings.is_empty() {
             "not known: the rig does not state whether a filter is ahead of the converter"
         } else {

@@ -16,7 +16,7 @@ use super::watch::HostWatch;
 use arc_swap::ArcSwap;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription, SensorValues};
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{EngineInput, Operator};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -160,6 +160,7 @@ pub(super) struct MainLoop {
     reading: Option<Reading>,
     is_homed: bool,
     link_error: Option<String>,
+    sensors: SensorValues,
     pub(super) run: Option<ActiveRun>,
     refusal: Option<String>,
     faults: FaultLog,
@@ -181,6 +182,7 @@ impl MainLoop {
             reading: None,
             is_homed: false,
             link_error: None,
+            sensors: SensorValues::default(),
             run: None,
             refusal: None,
             faults: FaultLog::default(),
@@ -300,6 +302,7 @@ impl MainLoop {
     fn feed_sensors(&mut self) {
         for value in self.rig.take_sensors() {
             if value.is_possible() {
+                self.sensors.update(&value);
                 self.feed(EngineInput::Sensor { value });
             }
         }
@@ -468,6 +471,7 @@ impl MainLoop {
                 is_homed: self.is_homed,
                 link: self.rig.link().map(str::to_owned),
                 link_error: self.link_error.clone(),
+                sensors: self.sensors,
             },
             run: self.run.as_ref().and_then(ActiveRun::view),
             refusal: self.refusal.clone(),

@@ -4,7 +4,7 @@ use crate::base::FoundBase;
 use palpate_model::Nanos;
 use palpate_model::calibration::SettleProgress;
 use palpate_model::estimate::LiveEstimate;
-use palpate_model::rig::{Phase, Reading, RigDescription};
+use palpate_model::rig::{Phase, Reading, RigDescription, SensorValues};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Newtons, Position, Seconds};
 use palpate_protocols::engine::{
@@ -35,6 +35,62 @@ pub struct RigView {
     /// How fast it was when it was opened, in words; none on a simulated rig.
     pub link: Option<String>,
     pub link_error: Option<String>,
+    /// Newest values of what it measures beside force and position.
+    pub sensors: SensorValues,
+}
+
+/// The newest value of a sensor beside load cell and axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorFact {
+    pub name: String,
+    /// In `unit`; of a digital input 1 is high and 0 is low.
+    pub value: f64,
+    /// `1` where it has none.
+    pub unit: String,
+    pub is_digital: bool,
+}
+
+impl SensorFact {
+    /// The value as it is read.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match (self.is_digital, self.value > 0.0, self.unit.as_str()) {
+            (true, true, _) => "high".into(),
+            (true, false, _) => "low".into(),
+            (false, _, "1") => format!("{:.2}", self.value),
+            (false, _, unit) => format!("{:.2} {unit}", self.value),
+        }
+    }
+}
+
+impl RigView {
+    /// What its sensors reported last, in the order of the rig's description; a sensor that has reported nothing is left out.
+    #[must_use]
+    pub fn sensor_facts(&self) -> Vec<SensorFact> {
+        let known = &self.description.sensors;
+        let mut facts = Vec::new();
+        for number in 1..=known.digital_inputs {
+            facts.extend(self.sensors.is_high(number).map(|is_high| SensorFact {
+                name: format!("input {number}"),
+                value: f64::from(u8::from(is_high)),
+                unit: "1".into(),
+                is_digital: true,
+            }));
+        }
+        let is_digital = false;
+        facts.extend(self.sensors.bath_celsius().map(|value| SensorFact {
+            name: "bath".into(),
+            value,
+            unit: "°C".into(),
+            is_digital,
+        }));
+        for (number, channel) in (1..=u8::MAX).zip(&known.channels) {
+            let (name, unit) = (channel.name.clone(), channel.unit.clone());
+            let value = self.sensors.channel(number);
+            facts.extend(value.map(|value| SensorFact { name, value, unit, is_digital }));
+        }
+        facts
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -150,4 +206,49 @@ pub struct LogLine {
     pub at: Nanos,
     pub text: String,
     pub is_alarm: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_drivers::Rig;
+    use palpate_drivers::sim::{SimRig, SimSettings};
+    use palpate_model::rig::{SensorChannel, SensorReading};
+
+    #[test]
+    fn what_sensors_reported_last_has_names_and_units() {
+        let mut about = SimRig::new(SimSettings::default()).description().clone();
+        let channel =
+            |name: &str, unit: &str| SensorChannel { name: name.into(), unit: unit.into() };
+        about.sensors.digital_inputs = 2;
+        about.sensors.has_bath = true;
+        about.sensors.channels =
+            vec![channel("room.temperature", "°C"), channel("silent", "%"), channel("frame", "1")];
+        let mut sensors = SensorValues::default();
+        for reading in [
+            SensorReading::DigitalInput { number: 2, is_high: true },
+            SensorReading::Bath { celsius: 36.5 },
+            SensorReading::Channel { number: 1, value: 21.304, age: Nanos::ZERO },
+            SensorReading::Channel { number: 3, value: 12.0, age: Nanos::ZERO },
+        ] {
+            sensors.update(&reading);
+        }
+        let rig = RigView {
+            description: Arc::new(about),
+            reading: None,
+            is_homed: false,
+            link: None,
+            link_error: None,
+            sensors,
+        };
+        let words: Vec<(String, String)> =
+            rig.sensor_facts().into_iter().map(|one| (one.name.clone(), one.words())).collect();
+        let expected = [
+            ("input 2", "high"),
+            ("bath", "36.50 °C"),
+            ("room.temperature", "21.30 °C"),
+            ("frame", "12.00"),
+        ];
+        assert_eq!(words, expected.map(|(name, words)| (name.to_owned(), words.to_owned())));
+    }
 }

@@ -296,6 +296,11 @@ impl EngineState {
         self.tare
     }
 
+    /// The newest value of each sensor beside load cell and axis.
+    pub fn sensors(&self) -> &SensorValues {
+        &self.sensors
+    }
+
     pub fn live(&self) -> Option<&LiveEstimate> {
         self.live.as_ref()
     }

@@ -144,7 +144,7 @@ fn walk(
         ));
     }
     let preview = Preview {
-        storage_bytes: (longest.0 / rig.tick().0 * BYTES_PER_SAMPLE) as u64,
+        storage_bytes: (longest.0 / rig.sample_interval().0 * BYTES_PER_SAMPLE) as u64,
         steps,
         expected,
         longest,

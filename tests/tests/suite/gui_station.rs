@@ -10,7 +10,7 @@ use palpate_window::screens::rig;
 use palpate_window::window::WindowOptions;
 
 const QUEUE: &str = "format = \"palpate-remote-queue 1\"\nname = \"speeds of gel 7\"\nprotocol = \"ramp-hold\"\nruns = 3\n\
-    [choose.speed]\nfrom = \"1 mm/s\"\nto = \"8 mm/s\"\n";
+    [choose.speed]\nfrom = \"0.6 mm/s\"\nto = \"7.8 mm/s\"\n";
 
 const ARMED: &str = "Runs may start over the network: queue 'speeds of gel 7'";
 
@@ -35,6 +35,12 @@ fn a_queue_is_armed_in_sight_and_taken_back() {
     flow.type_into("remote queue", "/there/is/no/such/file.toml");
     flow.click("Arm the remote queue");
     flow.wait_for_words("cannot be read");
+    // The motor has no step rate for 1 mm/s: that is said where it can be mended.
+    let between = file.with_file_name("between.toml");
+    std::fs::write(&between, QUEUE.replace("0.6 mm/s", "1 mm/s")).unwrap();
+    flow.type_into("remote queue", &between.display().to_string());
+    flow.click("Arm the remote queue");
+    flow.wait_for_words("speed = 1 mm/s cannot be run");
     flow.type_into("remote queue", &file.display().to_string());
     flow.click("Arm the remote queue");
     flow.wait_for_words(ARMED);

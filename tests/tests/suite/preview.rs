@@ -244,3 +244,19 @@ fn random_plans_last_as_long_as_previewed_and_begin() {
     println!("{ended} plans ran, {refused} refused, {compared} steps compared");
     assert!(ended > PLANS / 2 && compared > 60, "{ended} ran, {compared} compared");
 }
+
+#[test]
+fn storage_counts_samples_not_ticks() {
+    let plan = plan(vec![retract()]);
+    let (rig, curve) = bench(3);
+    let limits = Limits::for_travel(rig.description().travel);
+    let of = |tick_nanos, ticks_per_sample| {
+        let mut about = rig.description().clone();
+        (about.tick_nanos, about.ticks_per_sample) = (tick_nanos, ticks_per_sample);
+        preview(&plan, &about, &limits, &curve, false).storage_bytes as f64
+    };
+    // A board that counts microseconds and samples every millisecond records as much as one that counts milliseconds. How long the
+    // moves take differs by less than a tick each.
+    let (of_ms, of_us) = (of(1_000_000, 1.0), of(1_000, 1000.0));
+    assert!((of_us / of_ms - 1.0).abs() < 0.01, "{of_us} B, {of_ms} B");
+}

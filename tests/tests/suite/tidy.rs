@@ -15,6 +15,7 @@ const PACKAGES: [&str; 20] = [
     "model/population",
     "drivers",
     "drivers/emulators",
+    "drivers/haptic-devices",
     "sessions",
     "sessions/store",
     "sessions/tables",

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 32] = [
+const PROPER_NAMES: [&str; 33] = [
     // Programs, libraries, repositories and formats.
     "AppImage",
     "CarbonFiberData",
@@ -38,6 +38,7 @@ const PROPER_NAMES: [&str; 32] = [
     // Makers of rheometers and haptic devices.
     "RheoCompass",
     "SensAble",
+    "VerseGrip",
     // Gibson's algorithm and the names that his paper gives its parameters.
     "ChainMail",
     "MaxDist",

@@ -3,6 +3,7 @@
 use super::haptics::run_text;
 use crate::scene::SceneRun;
 use crate::scene_bench::SceneBench;
+use crate::scene_device::DeviceReport;
 use palpate_haptics::surface::ScenePlan;
 
 #[must_use]
@@ -20,6 +21,12 @@ pub fn played_text(played: &SceneRun) -> String {
     for (why, share) in &played.why {
         lines.push(format!("{:>4.0} %  {why}", 100.0 * share));
     }
+    if let Some(device) = &played.device {
+        lines.push(format!(
+            "device: {} reports, {} that could not be, connection lost {} times; at the end {}",
+            device.reports, device.faults, device.losses, device.stop
+        ));
+    }
     lines.push(run_text(&played.paced));
     let work = 1e6 * played.paced.statistics.work.p99_9.0;
     lines.push(if played.is_within_budget {
@@ -35,6 +42,22 @@ pub fn played_text(played: &SceneRun) -> String {
     });
     lines.push(format!("surface {}", played.surface_hash));
     lines.join("\n")
+}
+
+/// What is to be known of a device before the first touch.
+#[must_use]
+pub fn device_lines(report: &DeviceReport) -> Vec<String> {
+    let grip = report.grip.as_ref().map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
+    let mut lines = vec![format!(
+        "device {}, {grip}, service {}: a round trip takes {:.2} ms, 99 % at most {:.2} ms; the loop is {:.1} ticks late",
+        report.name,
+        report.service,
+        report.round_trip_median_ms,
+        report.round_trip_p99_ms,
+        report.delay_ticks
+    )];
+    lines.extend(report.sentences.iter().cloned());
+    lines
 }
 
 /// A plan in words: what is taken, what that costs, what was left out.

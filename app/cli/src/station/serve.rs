@@ -8,7 +8,7 @@ use super::super::terminal::{ctrl_c_flag, read_lines};
 use super::{StationArgs, parse_address, remote_bench, start, usual_address};
 use clap::Args;
 use palpate_protocols::engine::Operator;
-use palpate_runner::{Runner, RunnerRequest, wall_now};
+use palpate_runner::{Runner, RunnerRequest};
 use palpate_station::Station;
 use palpate_station::remote::{RemoteQueue, RemoteRunState};
 use std::collections::BTreeMap;
@@ -92,9 +92,7 @@ pub(crate) fn run(args: &ServeArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn arm(station: &Station, queue: RemoteQueue, minutes: u64) -> Result<(), Failure> {
-    let mut desk = station.desk().lock().unwrap_or_else(PoisonError::into_inner);
-    let time = Duration::from_secs(minutes.saturating_mul(60));
-    desk.arm(queue, wall_now(), time).map_err(Failure::usage)
+    station.arm(queue, Duration::from_secs(minutes.saturating_mul(60))).map_err(Failure::usage)
 }
 
 /// Does what a person at the rig has typed. A stop comes before everything else.
@@ -103,10 +101,14 @@ fn obey(line: &str, station: &Station, runner: &Runner, library: &Path, output: 
     let mut words = line.split_whitespace();
     match (words.next(), words.next(), words.next(), words.next()) {
         (Some("stop"), None, ..) => {
-            if let Err(reason) = runner.request(RunnerRequest::Operator(Operator::Stop)) {
+            let stop = || runner.request(RunnerRequest::Operator(Operator::Stop));
+            let mut passed = stop();
+            if desk().disarm_for_stop("a person at the rig stopped it") {
+                passed = stop();
+            }
+            if let Err(reason) = passed {
                 output.note(&reason);
             }
-            desk().disarm("a person at the rig stopped it");
         }
         (Some("disarm"), None, ..) => desk().disarm("a person at the rig took it back"),
         (Some("arm"), Some(file), Some(minutes), None) => {

@@ -4,6 +4,7 @@ use super::{ATTEMPT_MAX, SendError, with_causes};
 use crate::notice::Notice;
 use crate::target::{EmailTarget, Security};
 use crate::tls;
+use lettre::address::Envelope;
 use lettre::message::Mailbox;
 use lettre::message::header::ContentType;
 use lettre::transport::smtp::authentication::Credentials;
@@ -43,27 +44,42 @@ impl EmailSender {
     }
 
     pub async fn send(&self, notice: &Notice) -> Result<(), SendError> {
-        let message = self.message(notice).map_err(|err| SendError::refused(err.to_string()))?;
-        match self.transport.send(message).await {
-            Ok(_) => Ok(()),
-            Err(err) => {
-                let hint = match err.status().map(|code| code.to_string()) {
-                    // RFC 4954, section 6: authentication needed, too weak or refused.
-                    Some(code) if ["530", "534", "535", "538"].contains(&code.as_str()) => {
-                        if self.is_login {
-                            "; check user and password"
-                        } else {
-                            "; add user and password_file"
-                        }
-                    }
-                    _ => "",
-                };
-                let reason = format!("{}{hint}", with_causes(&err));
-                match err.is_permanent() {
-                    true => Err(SendError::refused(reason)),
-                    false => Err(SendError::passing(reason)),
-                }
+        let refused = |err: lettre::error::Error| SendError::refused(err.to_string());
+        let message = self.message(notice).map_err(refused)?;
+        let (envelope, text) = (message.envelope().clone(), message.formatted());
+        let Err(err) = self.transport.send_raw(&envelope, &text).await else { return Ok(()) };
+        let code = err.status().map(|code| code.to_string()).unwrap_or_default();
+        // RFC 5321, section 4.2.3: this mailbox is not available, not local, or has no such name.
+        let is_of_one = ["550", "551", "553"].contains(&code.as_str());
+        if !is_of_one || self.to.len() == 1 {
+            return Err(self.error(&err, &code));
+        }
+        // One of them is refused, and with it the message to all: the others get theirs alone.
+        let mut failures = Vec::new();
+        for one in &self.to {
+            let alone = Envelope::new(Some(self.from.email.clone()), vec![one.email.clone()]);
+            if let Err(err) = self.transport.send_raw(&alone.map_err(refused)?, &text).await {
+                failures.push(format!("{}: {}", one.email, with_causes(&err)));
             }
+        }
+        match failures.is_empty() {
+            true => Ok(()),
+            // Not tried again: who has it would get it twice.
+            false => Err(SendError::refused(failures.join("; "))),
+        }
+    }
+
+    fn error(&self, err: &lettre::transport::smtp::Error, code: &str) -> SendError {
+        // RFC 4954, section 6: authentication needed, too weak or refused.
+        let hint = match (["530", "534", "535", "538"].contains(&code), self.is_login) {
+            (true, true) => "; check user and password",
+            (true, false) => "; add user and password_file",
+            (false, _) => "",
+        };
+        let reason = format!("{}{hint}", with_causes(err));
+        match err.is_permanent() {
+            true => SendError::refused(reason),
+            false => SendError::passing(reason),
         }
     }
 

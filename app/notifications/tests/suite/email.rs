@@ -145,3 +145,21 @@ fn no_text_of_a_session_adds_a_header_or_a_recipient() {
     assert!(!evil["subject"].as_str().unwrap().contains(['\r', '\n']));
     assert!(evil["text"].as_str().unwrap().contains('é'));
 }
+
+#[test]
+fn who_has_left_keeps_an_alarm_from_no_one_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(files) = certificates(folder.path()).filter(|_| !lacks_mail_server()) else { return };
+    let server = MailServer::start(Security::StartTls, &files, &[]);
+    let mut target = server.target(Security::StartTls, &files, None);
+    let TargetAddress::Email(email) = &mut target.address else { panic!() };
+    email.to.insert(1, "former@example.org".parse().unwrap());
+    let notifier = Notifier::start(vec![target], Patience::default()).unwrap();
+    notifier.send(&notice(NoticeKind::Alarm));
+    let unsent = notifier.finish();
+    let reached = [server.object(), server.object()].map(|object| object["to"].clone());
+    assert_eq!(reached, ["ada@example.org", "bob@example.org"].map(|one| serde_json::json!([one])));
+    assert_eq!(unsent.len(), 1);
+    let reason = &unsent[0].reason;
+    assert!(reason.starts_with("former@example.org: ") && reason.contains("550"), "{reason}");
+}

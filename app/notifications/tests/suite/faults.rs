@@ -5,7 +5,11 @@ use palpate_notifications::{
     EmailTarget, MqttTarget, NoticeKind, Notifier, Patience, SILENCE_MAX, Security, Target,
     TargetAddress, UNSENT_MAX, WAITING_MAX,
 };
+use palpate_test_support::wait::until;
+use std::io::{Read, Write};
 use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// A port whose connections are taken and never answered, for as long as the listener lives.
@@ -118,4 +122,41 @@ fn an_alarm_does_not_wait_for_the_next_attempt_of_another_notice() {
     }
     notifier.send(&notice(NoticeKind::Alarm));
     assert_eq!(server.request().object["kind"], "alarm");
+}
+
+/// Connections of a broker that refuses every login: `CONNACK` with code 5 (MQTT 3.1.1, section 3.2).
+fn refusing_broker() -> (u16, Arc<AtomicUsize>) {
+    let (listener, port) = silent_port();
+    let count = Arc::new(AtomicUsize::new(0));
+    let own = Arc::clone(&count);
+    let refuse = move || {
+        for mut stream in listener.incoming().flatten() {
+            let _ = stream.read(&mut [0; 256]);
+            own.fetch_add(1, Ordering::SeqCst);
+            let _ = stream.write_all(&[0x20, 2, 0, 5]);
+        }
+    };
+    std::thread::Builder::new().name("refusing".into()).spawn(refuse).unwrap();
+    (port, count)
+}
+
+#[test]
+fn a_refused_login_is_tried_again_only_for_the_next_notice() {
+    let (port, count) = refusing_broker();
+    let mqtt = targets(port).remove(2);
+    let patience = Patience { silence: Duration::from_millis(10), ..SHORT };
+    let notifier = Notifier::start(vec![mqtt], patience).unwrap();
+    notifier.send(&notice(NoticeKind::Failed));
+    let logins = || count.load(Ordering::SeqCst);
+    // One of the notice, and perhaps one before it, when the connection was to be kept.
+    let before = until(|| (logins() > 0).then(logins), || "no login".into());
+    let pause = 30 * patience.silence;
+    std::thread::sleep(pause);
+    let after = logins();
+    assert!(after <= before + 1 && after <= 2, "{before}, then {after}");
+    std::thread::sleep(pause);
+    assert_eq!(logins(), after);
+    notifier.send(&notice(NoticeKind::Alarm));
+    until(|| (logins() == after + 1).then_some(()), || "no login for the alarm".into());
+    assert_eq!(notifier.finish().len(), 2);
 }

@@ -80,6 +80,14 @@ function show(message) {
   byId("alarm").hidden = !alarm;
   put("alarm", alarm);
   put("position", number(run && !run.outcome ? run.position_mm : rig.position_mm, 2, "mm"));
+  byId("sensors").hidden = rig.sensors.length === 0;
+  byId("sensors").replaceChildren(...rig.sensors.map((one) => {
+    const pair = document.createElement("div");
+    for (const [kind, text] of [["dt", one.name], ["dd", one.words]]) {
+      pair.appendChild(document.createElement(kind)).textContent = text;
+    }
+    return pair;
+  }));
   put("armed", armedText(message.armed));
   if (!run) return;
   put("protocol", run.protocol);

@@ -84,6 +84,9 @@ pub struct RemoteRun {
     pub fit: Option<Value>,
     #[serde(skip)]
     folder: Option<PathBuf>,
+    /// Whether the runner was asked to begin it.
+    #[serde(skip)]
+    is_sent: bool,
 }
 
 /// What a run asked for.
@@ -110,6 +113,8 @@ pub enum RemoteRefusal {
     Unknown(u64),
     #[error("run {0} does not wait any more, so it cannot be withdrawn; stop the rig to end it")]
     NotWaiting(u64),
+    #[error("{queue}: {values} cannot be run: {reason}; change the file of the queue")]
+    Corner { queue: String, values: String, reason: String },
     #[error("an arming lasts from a minute to 24 hours; give a time in between")]
     Time,
 }
@@ -147,8 +152,8 @@ pub struct ArmedState {
 }
 
 impl RemoteDesk {
-    /// Arms a queue, in place of any other.
-    pub fn arm(
+    /// Arms a queue that was [checked](RemoteQueue::check), in place of any other.
+    pub(crate) fn arm(
         &mut self,
         queue: RemoteQueue,
         now: SystemTime,
@@ -164,16 +169,40 @@ impl RemoteDesk {
         Ok(())
     }
 
-    /// Takes the arming back; what waits is withdrawn. A run in progress goes on.
+    /// Takes the arming back; what the runner was not asked for yet is withdrawn. A run in progress goes on.
     pub fn disarm(&mut self, reason: &str) {
         if self.arming.take().is_none() {
             return;
         }
         self.disarmed = Some(reason.to_owned());
-        for run in self.runs.iter_mut().filter(|run| run.state == RemoteRunState::Waiting) {
+        let is_withdrawn = |run: &RemoteRun| match run.state {
+            RemoteRunState::Waiting => true,
+            RemoteRunState::Running => !run.is_sent,
+            _ => false,
+        };
+        for run in self.runs.iter_mut().filter(|run| is_withdrawn(run)) {
             run.state = RemoteRunState::Withdrawn;
             run.reason = Some(format!("the arming was taken back: {reason}"));
         }
+    }
+
+    /// Takes the arming back behind a stop that was passed on. Where a run was begun at the same time, its start may stand behind
+    /// that stop: then it is true, and the stop must be passed on once more.
+    #[must_use]
+    pub fn disarm_for_stop(&mut self, reason: &str) -> bool {
+        self.disarm(reason);
+        self.running().is_some_and(|run| run.session.is_none())
+    }
+
+    /// Lets `send` ask the runner for a run, unless it was withdrawn meanwhile: whoever takes the arming back does it before this
+    /// or after it.
+    fn send(&mut self, id: u64, send: impl FnOnce() -> Result<(), String>) -> Result<(), String> {
+        let run = self.run_mut(id).ok_or("the run is forgotten")?;
+        if run.state != RemoteRunState::Running {
+            return Err(run.reason.clone().unwrap_or_default());
+        }
+        run.is_sent = true;
+        send()
     }
 
     /// Says whether the front end needs the rig for itself, and for what.
@@ -276,6 +305,7 @@ impl RemoteDesk {
             reason: None,
             fit: None,
             folder: None,
+            is_sent: false,
         });
         self.run(self.last_id)
     }
@@ -322,7 +352,7 @@ impl RemoteDesk {
     }
 
     fn refused(&mut self, id: u64, reason: String) {
-        if let Some(run) = self.run_mut(id) {
+        if let Some(run) = self.run_mut(id).filter(|run| run.state == RemoteRunState::Running) {
             run.state = RemoteRunState::Refused;
             run.reason = Some(reason);
         }

@@ -1,6 +1,7 @@
 //! What may be asked from outside: a remote queue, a file written by a person at the rig. It names one protocol and says
 //! which of its parameters may be chosen, and between which values.
 
+use super::RemoteRefusal;
 use palpate_analysis::protocol_sources::find_protocol;
 use palpate_model::metadata::{SessionLabels, SessionMetadata};
 use palpate_protocols::file::{
@@ -20,6 +21,9 @@ const BYTES_MAX: u64 = 64 * 1024;
 
 /// Runs of one arming. Whoever wants more arms again, and looks at the specimen before.
 const RUNS_MAX: u32 = 1000;
+
+/// Parameters that may be chosen: a plan is made for every combination of their ends.
+const CHOSEN_MAX: usize = 6;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -73,7 +77,7 @@ pub struct RemoteQueue {
 }
 
 impl RemoteQueue {
-    /// Reads a file and checks that both ends of every range make a plan.
+    /// Reads a file and checks that every combination of the ends of its ranges makes a plan.
     pub fn read(file: &Path, library: Option<&Path>) -> Result<Self, RemoteQueueError> {
         let error = |reason: String| RemoteQueueError { file: file.display().to_string(), reason };
         let size = file
@@ -146,11 +150,38 @@ impl RemoteQueue {
         for (name, range) in document.choose {
             queue.allow(&name, range)?;
         }
-        for end in 0..2 {
-            let chosen = queue.ends.iter().map(|(name, ends)| (name.clone(), ends[end].clone()));
-            queue.plan(&chosen.collect())?;
+        if queue.allowed.len() > CHOSEN_MAX {
+            return Err(format!("choose: let at most {CHOSEN_MAX} parameters be chosen"));
+        }
+        for chosen in queue.corners() {
+            queue.plan(&chosen)?;
         }
         Ok(queue)
+    }
+
+    /// Whether the rig can run every combination of the ends of the ranges: at the rig is someone who can mend the file.
+    pub(crate) fn check(
+        &self,
+        check: impl Fn(&Plan) -> Result<(), String>,
+    ) -> Result<(), RemoteRefusal> {
+        for chosen in self.corners() {
+            self.plan(&chosen).and_then(|plan| check(&plan)).map_err(|reason| {
+                let values: Vec<String> =
+                    chosen.iter().map(|(name, value)| format!("{name} = {value}")).collect();
+                let values =
+                    if values.is_empty() { "its protocol".into() } else { values.join(", ") };
+                RemoteRefusal::Corner { queue: self.name.clone(), values, reason }
+            })?;
+        }
+        Ok(())
+    }
+
+    fn corners(&self) -> impl Iterator<Item = BTreeMap<String, String>> {
+        (0..1_usize << self.ends.len()).map(|corner| {
+            let ends = self.ends.iter().enumerate();
+            ends.map(|(index, (name, ends))| (name.clone(), ends[corner >> index & 1].clone()))
+                .collect()
+        })
     }
 
     fn allow(&mut self, name: &str, range: RangeDocument) -> Result<(), String> {

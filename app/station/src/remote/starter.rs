@@ -158,9 +158,11 @@ impl Starter {
             )
         };
         let (reply, answer) = sync_channel(1);
-        self.runner.request(RunnerRequest::Run(Box::new(request), reply))?;
-        // Served right behind the start, so that a run at full pace has it too.
-        self.runner.request(RunnerRequest::Note(audit.clone()))?;
+        lock(&self.desk).send(id, || {
+            self.runner.request(RunnerRequest::Run(Box::new(request), reply))?;
+            // Served right behind the start, so that a run at full pace has it too.
+            self.runner.request(RunnerRequest::Note(audit.clone()))
+        })?;
         tracing::info!("{audit}");
         Ok(Begun { id, folder, answer: Some(answer), audit })
     }

@@ -49,6 +49,48 @@ fn nothing_runs_that_is_not_armed() {
 }
 
 #[test]
+fn a_range_with_an_end_that_the_rig_cannot_run_is_named() {
+    let (desk, _) = desk(3);
+    let queue = &desk.arming.as_ref().unwrap().queue;
+    assert!(queue.check(any).is_ok());
+    for end in ["1 mm/s", "8 mm/s"] {
+        let check = |plan: &Plan| match plan.source.as_ref().unwrap().values["speed"] == end {
+            true => Err("the motor cannot do this speed".to_owned()),
+            false => Ok(()),
+        };
+        let refusal = queue.check(check).unwrap_err();
+        let words = format!("speed = {end} cannot be run: the motor cannot do this speed");
+        assert!(refusal.to_string().contains(&words), "{refusal}");
+    }
+}
+
+#[test]
+fn a_stop_beside_a_start_is_before_it_or_passed_on_again() {
+    let begin = || {
+        let (mut desk, now) = desk(3);
+        desk.ask(request("2 mm/s"), "a", now, any).unwrap();
+        let (id, _, _) = desk.next(now).unwrap();
+        (desk, id)
+    };
+    // The stop comes while the start is prepared: the runner is never asked.
+    let (mut desk, id) = begin();
+    assert!(!desk.disarm_for_stop("a stop"));
+    let refusal = desk.send(id, || panic!("asked for behind the stop")).unwrap_err();
+    assert!(refusal.contains("taken back: a stop"), "{refusal}");
+    assert_eq!(desk.run(id).unwrap().state, RemoteRunState::Withdrawn);
+    // The start was asked for between the stop and the taking back: it stands behind the stop.
+    let (mut desk, id) = begin();
+    desk.send(id, || Ok(())).unwrap();
+    assert!(desk.disarm_for_stop("a stop"));
+    // The run is known to be in progress: the stop has reached it.
+    let (mut desk, id) = begin();
+    desk.send(id, || Ok(())).unwrap();
+    desk.begun(id, PathBuf::from("session"));
+    assert!(!desk.disarm_for_stop("a stop"));
+    assert_eq!(desk.run(id).unwrap().state, RemoteRunState::Running);
+}
+
+#[test]
 fn every_ending_but_finish_takes_the_arming_back() {
     use EndingKind::{Abort, Finish, Halt, Interlock, Stop};
     for ending in [Finish, Stop, Abort, Halt, Interlock] {

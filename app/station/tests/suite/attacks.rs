@@ -1,7 +1,7 @@
 //! What an attacker on the network can try: `docs/station-threats.md` names each of these tests.
 
 use super::client::{Lab, connect, exchange, next, ramp_hold, request, rig};
-use palpate_analysis::station_settings::{StationSettings, TlsFiles};
+use palpate_analysis::station_settings::{StationSettings, TOKENS_FILE, TlsFiles};
 use palpate_runner::{Runner, RunnerRequest, TimeScale};
 use palpate_sessions::Session;
 use palpate_station::{Station, StationError};
@@ -221,4 +221,23 @@ fn a_watcher_that_talks_is_sent_away() {
         },
         || "places are not given back".into(),
     );
+}
+
+/// A pipe that no one writes to answers as a network disk that has gone.
+#[test]
+#[cfg(unix)]
+fn a_disk_that_does_not_answer_makes_no_stop_wait() {
+    let lab = Lab::new(TimeScale::Factor(1.0));
+    let tokens = lab.library.path().join(TOKENS_FILE);
+    let made = std::process::Command::new("mkfifo").arg(&tokens).status().unwrap();
+    assert!(made.success());
+    let mut waiting = connect(lab.address());
+    let asked = format!(
+        "GET /api/v1/state HTTP/1.1\r\nHost: {}\r\nAuthorization: Bearer {}\r\n\r\n",
+        lab.address(),
+        "f".repeat(64)
+    );
+    waiting.write_all(asked.as_bytes()).unwrap();
+    assert_eq!(lab.get("/api/v1/health").status, 200);
+    assert_eq!(lab.ask("POST", "/api/v1/stop", &[], "").status, 200);
 }

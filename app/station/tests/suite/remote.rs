@@ -2,7 +2,7 @@
 
 use super::client::{Answer, Lab};
 use palpate_drivers::sim::SimSettings;
-use palpate_runner::{TimeScale, wall_now};
+use palpate_runner::TimeScale;
 use palpate_sessions::Session;
 use palpate_station::remote::RemoteQueue;
 use palpate_station::tokens::{Scope, Tokens};
@@ -12,7 +12,7 @@ use std::time::Duration;
 
 const QUEUE: &str = "format = \"palpate-remote-queue 1\"\nname = \"speeds\"\nprotocol = \"ramp-hold\"\nruns = 3\n\
     [labels]\nspecimen = \"gel 7\"\n[set]\ndepth = \"6 mm\"\nhold = \"20 s\"\n\
-    [choose.speed]\nfrom = \"1 mm/s\"\nto = \"8 mm/s\"\n";
+    [choose.speed]\nfrom = \"0.6 mm/s\"\nto = \"7.8 mm/s\"\n";
 
 /// A lab with a token that may ask for runs.
 fn lab(scale: TimeScale) -> (Lab, String) {
@@ -31,8 +31,7 @@ fn arm(lab: &Lab, text: &str) {
     let file = lab.library.path().join("queue.toml");
     std::fs::write(&file, text).unwrap();
     let queue = RemoteQueue::read(&file, Some(lab.library.path())).unwrap();
-    let mut desk = lab.station.desk().lock().unwrap();
-    desk.arm(queue, wall_now(), Duration::from_hours(1)).unwrap();
+    lab.station.arm(queue, Duration::from_hours(1)).unwrap();
 }
 
 fn ask(lab: &Lab, token: &str, speed: &str) -> Answer {

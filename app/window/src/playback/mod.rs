@@ -152,7 +152,8 @@ impl eframe::App for PlaybackApp {
             .show(ui, |ui| {
                 let area = ScrollArea::vertical().id_salt("results");
                 area.auto_shrink(false).show(ui, |ui| {
-                    findings_ui(ui, self.snapshot.run.as_ref(), self.plots.cycles());
+                    let RunnerSnapshot { rig, run, .. } = &*self.snapshot;
+                    findings_ui(ui, rig, run.as_ref(), self.plots.cycles());
                 });
             });
         CentralPanel::default().frame(frame(ui, true)).show(ui, |ui| self.plots.ui(ui, None));

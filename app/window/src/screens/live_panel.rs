@@ -1,6 +1,7 @@
 //! What is known of a run while it goes on: parameters, measured values, its steps.
 
 use super::parameters::parameters_ui;
+use super::rig_panel::sensors_ui;
 use crate::widgets::{
     STEP_HEIGHT, StepState, fact_ui, placeholder_ui, quiet_ui, section_ui, step_ui,
 };
@@ -8,7 +9,7 @@ use eframe::egui::{ScrollArea, Ui};
 use palpate_analysis::report::live::LiveCycle;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
-use palpate_runner::RunView;
+use palpate_runner::{RigView, RunView};
 use std::path::PathBuf;
 
 /// Cycles listed; the session has them all.
@@ -20,7 +21,7 @@ const STEPS_BEFORE: usize = 4;
 const STEP_GAP: f32 = 2.0;
 
 /// Draws what is known of a run so far.
-pub fn findings_ui(ui: &mut Ui, run: Option<&RunView>, cycles: &[LiveCycle]) {
+pub fn findings_ui(ui: &mut Ui, rig: &RigView, run: Option<&RunView>, cycles: &[LiveCycle]) {
     if run.is_none_or(may_indent) {
         section_ui(ui, "Live parameters");
         parameters_ui(ui, run);
@@ -32,6 +33,7 @@ pub fn findings_ui(ui: &mut Ui, run: Option<&RunView>, cycles: &[LiveCycle]) {
             placeholder_ui(ui, "no run yet");
         }
     }
+    sensors_ui(ui, rig);
     cycles_ui(ui, cycles);
     if let Some(run) = run {
         section_ui(ui, "Steps");

@@ -31,7 +31,19 @@ pub fn rig_ui(
         Some(reading) => reading_ui(ui, rig, &reading),
         None => fact_ui(ui, "signal", "no sample yet"),
     }
+    sensors_ui(ui, rig);
     ports_ui(ui, ports, commands);
+}
+
+/// Draws the newest value of every sensor beside load cell and axis; nothing where there is none.
+pub fn sensors_ui(ui: &mut Ui, rig: &RigView) {
+    let facts = rig.sensor_facts();
+    if !facts.is_empty() {
+        section_ui(ui, "Sensors");
+    }
+    for fact in facts {
+        fact_ui(ui, &fact.name, fact.words());
+    }
 }
 
 fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {

@@ -184,7 +184,7 @@ impl Screen for RunScreen {
         }
         // Of the run whose curves are drawn: a move by hand leaves both as they are.
         let (run, latest) = (workbench.measured_run(), &workbench.latest_run);
-        findings_ui(ui, run, latest.plots().cycles());
+        findings_ui(ui, &workbench.snapshot.rig, run, latest.plots().cycles());
     }
 
     fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {

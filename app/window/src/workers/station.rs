@@ -5,7 +5,7 @@ use super::Job;
 use crate::screens::form::RunSetup;
 use eframe::egui::Context;
 use palpate_analysis::station_settings::{STATION_PORT, StationSettings};
-use palpate_runner::{Runner, wall_now};
+use palpate_runner::Runner;
 use palpate_station::Station;
 use palpate_station::remote::{ArmedState, RemoteBench, RemoteDesk, RemoteQueue};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -90,6 +90,12 @@ impl StationDesk {
         }
     }
 
+    /// As [`RemoteDesk::disarm_for_stop`].
+    #[must_use]
+    pub fn disarm_for_stop(&self, reason: &str) -> bool {
+        self.desk().is_some_and(|mut desk| desk.disarm_for_stop(reason))
+    }
+
     pub fn act(&mut self, ctx: &Context, command: &StationCommand, rig: (&Runner, RemoteBench)) {
         self.refusal = None;
         match command {
@@ -128,8 +134,9 @@ impl StationDesk {
         if let Some(read) = self.reading.poll() {
             let time = Duration::from_secs(self.minutes.saturating_mul(60));
             let armed = read.and_then(|queue| {
-                let mut desk = self.desk().ok_or("the rig is not served; serve it first")?;
-                desk.arm(queue, wall_now(), time).map_err(|err| err.to_string())
+                let station =
+                    self.station.as_ref().ok_or("the rig is not served; serve it first")?;
+                station.arm(queue, time).map_err(|err| err.to_string())
             });
             self.refusal = armed.err();
         }

@@ -11,7 +11,7 @@ pub enum SidecarLie {
     Jump(i64),
     /// Its clock runs back by so many microseconds, once.
     ClockBack(u32),
-    /// Its clock stands still.
+    /// Its clock stands still from now on.
     ClockStuck,
     /// It acknowledges motions and does not move.
     Lazy,
@@ -33,6 +33,7 @@ impl EmulatedSidecar {
     pub(super) fn begin_lie(&mut self) {
         match self.lie {
             Some(SidecarLie::Jump(pulses)) => self.pulse_error += pulses,
+            Some(SidecarLie::ClockStuck) => self.stuck_tick = self.ticks(),
             Some(SidecarLie::ClockBack(micros)) => self.tick_error -= i64::from(micros),
             _ => {}
         }
@@ -63,7 +64,7 @@ impl EmulatedSidecar {
 
     pub(super) fn falsify(&self, sample: &mut SidecarSample) {
         match self.lie {
-            Some(SidecarLie::ClockStuck) => sample.ticks = self.settings.first_tick,
+            Some(SidecarLie::ClockStuck) => sample.ticks = self.stuck_tick,
             Some(SidecarLie::WrongUnits(times)) => {
                 sample.pulses = sample.pulses.map(|pulses| pulses * times);
             }

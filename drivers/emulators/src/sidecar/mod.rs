@@ -101,6 +101,8 @@ pub struct EmulatedSidecar {
     pulse_error: i64,
     /// Ticks that its clock has jumped.
     tick_error: i64,
+    /// Where its clock stands still.
+    stuck_tick: u32,
 }
 
 impl EmulatedSidecar {
@@ -130,6 +132,7 @@ impl EmulatedSidecar {
             lie: None,
             pulse_error: 0,
             tick_error: 0,
+            stuck_tick: 0,
         };
         sidecar.say_boot();
         sidecar
@@ -415,7 +418,7 @@ impl EmulatedSidecar {
         let mut sample = SidecarSample {
             ticks: self.ticks(),
             counts: Some((counts as i32).clamp(-COUNTS_MAX - 1, COUNTS_MAX)),
-            pulses: Some(pulses + self.pulse_error),
+            pulses: Some(pulses.saturating_add(self.pulse_error)),
             status: self.status().0,
             values: if has_values { self.values() } else { Vec::new() },
         };

@@ -5,5 +5,6 @@ mod cells;
 mod galil;
 mod galil_driver;
 mod grbl;
+mod inverse;
 mod sidecar;
 mod stand;

@@ -260,6 +260,11 @@ impl Talk {
             ReceivedItem::Message(SidecarMessage::Description(about)) => {
                 self.description = Some(*about);
             }
+            ReceivedItem::Message(SidecarMessage::Sample(sample))
+                if !sample.has_possible_pulses() =>
+            {
+                self.garbled += 1;
+            }
             ReceivedItem::Message(SidecarMessage::Sample(sample)) => {
                 match self.board_clock.take(now, sample.ticks) {
                     BoardTime::At(time) => self.samples.push(TimedSample { at: now, time, sample }),

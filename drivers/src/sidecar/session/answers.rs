@@ -3,6 +3,7 @@
 use super::{AwaitedMotion, PendingAnswer, Request, SidecarSession};
 use crate::rig::RigEventBody;
 use crate::sidecar::protocol::{ReceivedItem, SidecarMessage};
+use crate::wire::Waiting;
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
 
@@ -16,7 +17,6 @@ impl SidecarSession {
         let ReceivedItem::Message(message) = item else {
             return self.on_garbled(now);
         };
-        self.garbled_in_row = 0;
         match message {
             SidecarMessage::Sample(sample) => self.on_sample(now, &sample),
             SidecarMessage::Ok { number, .. } => self.on_ok(now, number),
@@ -54,23 +54,37 @@ impl SidecarSession {
         Some(self.pending.remove(index))
     }
 
+    /// An answer that was waited for has come.
+    fn note_answer(&mut self, now: Nanos) {
+        self.for_answer = Waiting::new(now);
+        self.garbled_in_row = 0;
+    }
+
     fn on_ok(&mut self, now: Nanos, number: u64) {
         let Some(pending) = self.take_pending(number) else {
             return;
         };
-        self.answered_at = now;
+        self.note_answer(now);
         // Of a stop that was repeated it is not known which line is answered.
         if pending.numbers.len() == 1 {
-            self.stats.push(now.since(pending.sent));
+            self.stats.push(pending.sent.time(now));
         }
         let Request::Command(command) = pending.request else {
             return;
         };
+        // A stop behind it may end it before a sample shows it.
+        let (is_stopped, since) = (self.is_stop_under_way(), Waiting::new(now));
+        self.stop_accepted = match command {
+            stop if stop.is_stopping() => Some(since),
+            motion if motion.is_motion() => None,
+            _ => self.stop_accepted,
+        };
         self.awaited = match command {
+            motion if motion.is_motion() && is_stopped => None,
             RigCommand::MoveTo(to) => {
-                Some(AwaitedMotion { since: now, end: Some(to.target_pulses + self.zero) })
+                Some(AwaitedMotion { since, end: Some(to.target_pulses + self.zero) })
             }
-            RigCommand::Oscillate(_) => Some(AwaitedMotion { since: now, end: None }),
+            RigCommand::Oscillate(_) => Some(AwaitedMotion { since, end: None }),
             _ => self.awaited,
         };
         if let Some(owed) = pending.owed {
@@ -90,7 +104,7 @@ impl SidecarSession {
         let Some(pending) = self.take_pending(number) else {
             return;
         };
-        self.answered_at = now;
+        self.note_answer(now);
         match pending.request {
             // Nothing but a device that does not know this host refuses these.
             Request::Start | Request::Beat => self.on_restart(now),

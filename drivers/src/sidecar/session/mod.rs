@@ -4,6 +4,7 @@ mod answers;
 mod samples;
 mod watch;
 
+use super::budget::{FaultLimit, LinkBudget};
 use super::connect::ConnectedSidecar;
 use super::description::{SidecarAxis, SidecarCell, SidecarDescription};
 use super::protocol::{HostMessage, SidecarParser};
@@ -12,7 +13,9 @@ use super::{SidecarSettings, worst_case_mm};
 use crate::board_clock::BoardClock;
 use crate::rig::RigEventBody;
 use crate::split_rig::CellClock;
-use crate::wire::{AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS};
+use crate::wire::{
+    AnswerQueue, Dialogue, LinkStats, ORDERS_MAX, OVERTAKEN, TOO_MANY_COMMANDS, Waiting,
+};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, MoveTo, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
@@ -42,7 +45,7 @@ struct PendingAnswer {
     request: Request,
     /// Numbers of its lines: a stop is repeated.
     numbers: Vec<u64>,
-    sent: Nanos,
+    sent: Waiting,
     repeated: Nanos,
     /// The command's number among those that the rig's owner waits for.
     owed: Option<u64>,
@@ -51,7 +54,7 @@ struct PendingAnswer {
 /// A motion that was acknowledged and has not been seen.
 #[derive(Clone, Copy, Debug)]
 struct AwaitedMotion {
-    since: Nanos,
+    since: Waiting,
     /// Pulses of its end; `None` for a sine.
     end: Option<i64>,
 }
@@ -75,7 +78,6 @@ struct Facts {
     has_checksum: bool,
     has_frames: bool,
     tick_ns: u64,
-    rate: f64,
     period: Nanos,
     beat_every: Nanos,
     worst_case_mm: f64,
@@ -97,7 +99,6 @@ impl Facts {
             has_checksum: about.crc,
             has_frames: about.binary,
             tick_ns: about.tick_ns,
-            rate: about.rate,
             period: about.period(),
             beat_every: Nanos(about.silence().0 / BEATS_PER_SILENCE).min(BEAT_MAX),
             worst_case_mm: worst_case_mm(speed_max, acceleration, about.silence()),
@@ -123,19 +124,22 @@ pub struct SidecarSession {
     /// Offset of the caller's pulses from the device's.
     zero: i64,
     awaited: Option<AwaitedMotion>,
+    /// Since a stop was accepted that no sample has shown.
+    stop_accepted: Option<Waiting>,
     /// Why no command but a stop is passed on.
     locked: Option<String>,
     sensors: SensorReports,
     attended_at: Nanos,
-    sampled_at: Nanos,
-    answered_at: Nanos,
+    /// For the next sample that is good, and for the next answer.
+    for_sample: Waiting,
+    for_answer: Waiting,
     looked_at: Nanos,
     is_silent: bool,
     is_beyond: bool,
+    /// Lines and samples that mean nothing since the last one that was good.
     garbled_in_row: u32,
-    /// Samples beyond twice the promised rate, and when that was counted.
-    excess: f64,
-    counted_at: Nanos,
+    budget: LinkBudget,
+    fault_limit: FaultLimit,
     is_flooded: bool,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
@@ -167,17 +171,18 @@ impl SidecarSession {
             newest: None,
             zero: 0,
             awaited: None,
+            stop_accepted: None,
             locked: None,
             sensors,
             attended_at: now,
-            sampled_at: now,
-            answered_at: now,
+            for_sample: Waiting::new(now),
+            for_answer: Waiting::new(now),
             looked_at: now,
             is_silent: false,
             is_beyond: false,
             garbled_in_row: 0,
-            excess: 0.0,
-            counted_at: now,
+            budget: LinkBudget::new(about.rate, now),
+            fault_limit: FaultLimit::default(),
             is_flooded: false,
             events: VecDeque::new(),
             stats: connected.stats,
@@ -201,17 +206,23 @@ impl SidecarSession {
     /// Something is wrong: the axis is stopped, and the rig's owner learns why.
     fn fail(&mut self, now: Nanos, why: &str) {
         self.stop_axis(now, why);
-        self.report(now, [RigEventBody::refusal(why)]);
+        if self.fault_limit.allows(now) {
+            self.report(now, [RigEventBody::refusal(why)]);
+        }
     }
 
     /// Stops the axis without a command, unless a stop is on its way.
     fn stop_axis(&mut self, now: Nanos, why: &str) {
         self.refuse_waiting(now, why, RigCommand::is_motion);
         self.awaited = None;
-        let is_under_way = self.pending.iter().any(|pending| pending.request.is_stop());
-        if self.stops.is_empty() && !is_under_way {
+        if !self.is_stop_under_way() {
             self.stops.push_back((None, RigCommand::Stop));
         }
+    }
+
+    /// Whether a stop is to be written or answered.
+    fn is_stop_under_way(&self) -> bool {
+        !self.stops.is_empty() || self.pending.iter().any(|pending| pending.request.is_stop())
     }
 
     fn refuse_waiting(&mut self, now: Nanos, why: &str, is_refused: fn(&RigCommand) -> bool) {
@@ -247,8 +258,10 @@ impl SidecarSession {
         message: HostMessage,
     ) -> Vec<u8> {
         self.number += 1;
+        self.budget.note_written();
         let numbers = vec![self.number];
-        self.pending.push(PendingAnswer { request, numbers, sent: now, repeated: now, owed });
+        let sent = Waiting::new(now);
+        self.pending.push(PendingAnswer { request, numbers, sent, repeated: now, owed });
         message.line(self.number, self.facts.has_checksum)
     }
 
@@ -361,13 +374,19 @@ impl Dialogue for SidecarSession {
     }
 
     fn handle_bytes(&mut self, now: Nanos, bytes: &[u8]) {
+        self.budget.take_bytes(now, bytes.len());
         for byte in bytes {
             let mut item = self.parser.take(*byte);
             while let Some(received) = item {
+                self.budget.take_item(now);
+                if self.check_flood(now) {
+                    return;
+                }
                 self.on_item(now, received);
                 item = self.parser.next_ready();
             }
         }
+        self.check_flood(now);
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {

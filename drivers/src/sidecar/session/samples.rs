@@ -3,8 +3,9 @@
 use super::{NewestSample, SidecarSession};
 use crate::board_clock::BoardTime;
 use crate::rig::RigEventBody;
-use crate::sidecar::BEYOND_RANGE;
 use crate::sidecar::protocol::SidecarSample;
+use crate::sidecar::{BEYOND_RANGE, FLOODED};
+use crate::wire::Waiting;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, SampleAge};
 use palpate_model::units::Volts;
@@ -13,21 +14,19 @@ use palpate_model::units::Volts;
 const JUMP_SPEED: f64 = 1.5;
 /// And so many pulses may come to that: one of rounding at each end.
 const JUMP_PULSES: f64 = 2.0;
-/// So many times the promised samples are a flood.
-const FLOOD: f64 = 2.0;
-/// So much may come at once after a link has kept it back: half a second of samples, and some.
-const FLOOD_SECONDS: f64 = 0.5;
-const FLOOD_MORE: f64 = 50.0;
 
 impl SidecarSession {
     pub(super) fn on_sample(&mut self, now: Nanos, sample: &SidecarSample) {
-        self.count_sample(now);
         let (Some(counts), Some(pulses)) = (sample.counts, sample.pulses) else {
             return self.on_garbled(now);
         };
         let cell = self.facts.cell;
         if !(cell.counts_min..=cell.counts_max).contains(&counts) {
             let why = "the sidecar sends counts beyond its converter; correct its program";
+            return self.on_impossible(now, why);
+        }
+        if !sample.has_possible_pulses() {
+            let why = "the sidecar sends a position beyond 2147483647 pulses; correct its program";
             return self.on_impossible(now, why);
         }
         let time = match self.board_clock.take(now, sample.ticks) {
@@ -38,11 +37,14 @@ impl SidecarSession {
                 time
             }
         };
+        self.garbled_in_row = 0;
         self.check_jump(now, time, pulses);
-        self.sampled_at = now;
+        self.for_sample = Waiting::new(now);
         self.is_silent = false;
         self.check_range(now, counts);
         let status = self.shown_status(sample, pulses);
+        let is_obeyed = !status.has(AxisStatus::MOVING) || status.has(AxisStatus::STOPPING);
+        self.stop_accepted = self.stop_accepted.filter(|_| !is_obeyed);
         self.newest = Some(NewestSample { time, pulses, status: AxisStatus(sample.status) });
         let age = self.age(now, time);
         let reading = Reading {
@@ -121,18 +123,11 @@ impl SidecarSession {
         self.is_beyond = is_beyond;
     }
 
-    /// Samples that come faster than a flood begins fill a bucket.
-    fn count_sample(&mut self, now: Nanos) {
-        let drained = FLOOD * self.facts.rate * now.since(self.counted_at).seconds().0;
-        self.counted_at = now;
-        // What is below zero is kept for what a pause has held back.
-        self.excess = (self.excess - drained).max(self.excess.min(0.0)) + 1.0;
-        let most = FLOOD_SECONDS * self.facts.rate + FLOOD_MORE;
-        if self.excess > most && !std::mem::replace(&mut self.is_flooded, true) {
-            self.fail(
-                now,
-                "the sidecar sends far more samples than it promised; correct its program",
-            );
+    /// Whether far too much has come: then nothing is read any more, so that the stop is written.
+    pub(super) fn check_flood(&mut self, now: Nanos) -> bool {
+        if self.budget.is_exceeded() && !std::mem::replace(&mut self.is_flooded, true) {
+            self.fail(now, &format!("{FLOODED}; correct its program"));
         }
+        self.is_flooded
     }
 }

@@ -2,6 +2,7 @@
 
 use super::answers::GARBLED_MAX;
 use super::{PendingAnswer, Request, SidecarSession, stop_message};
+use crate::sidecar::FLOODED;
 use crate::wire::ATTENDED_MAX;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
@@ -34,13 +35,13 @@ impl SidecarSession {
         }
         self.watch_answers(now);
         let periods = Nanos(SILENT_PERIODS * self.facts.period.0);
-        if now.since(self.sampled_at) > periods.max(SILENT_MIN)
+        if self.for_sample.time(now) > periods.max(SILENT_MIN)
             && !std::mem::replace(&mut self.is_silent, true)
         {
             self.fail(now, "the sidecar sends no samples; check its program and cable");
         }
         let seen_by = MOTION_MAX + Nanos(2 * self.facts.period.0);
-        if self.awaited.is_some_and(|awaited| now.since(awaited.since) > seen_by) {
+        if self.awaited.is_some_and(|awaited| awaited.since.time(now) > seen_by) {
             self.fail(
                 now,
                 "the sidecar has acknowledged a motion but does not move; check its drive",
@@ -50,22 +51,23 @@ impl SidecarSession {
     }
 
     fn excuse(&mut self, pause: Nanos) {
-        // What was sent meanwhile comes at once.
-        self.excess -= self.facts.rate * pause.seconds().0;
-        for at in [&mut self.sampled_at, &mut self.answered_at] {
-            *at = *at + pause;
+        for waiting in [&mut self.for_sample, &mut self.for_answer] {
+            waiting.excuse(pause);
         }
         for pending in &mut self.pending {
-            pending.sent = pending.sent + pause;
+            pending.sent.excuse(pause);
         }
         if let Some(awaited) = &mut self.awaited {
-            awaited.since = awaited.since + pause;
+            awaited.since.excuse(pause);
+        }
+        if let Some(accepted) = &mut self.stop_accepted {
+            accepted.excuse(pause);
         }
     }
 
     fn watch_answers(&mut self, now: Nanos) {
         let is_late = |pending: &PendingAnswer| {
-            !pending.request.is_stop() && now.since(pending.sent) > ANSWER_MAX
+            !pending.request.is_stop() && pending.sent.time(now) > ANSWER_MAX
         };
         let is_moving = self.is_moving();
         let late: Vec<PendingAnswer> = self.pending.extract_if(.., |one| is_late(one)).collect();
@@ -90,8 +92,7 @@ impl SidecarSession {
             return;
         }
         let has_motion = self.orders.iter().any(|(_, command)| command.is_motion());
-        let is_stopped = !self.stops.is_empty() || self.pending.iter().any(|p| p.request.is_stop());
-        if has_motion || self.is_moving() && !is_stopped {
+        if has_motion || self.is_moving() && !self.is_stop_under_way() {
             self.attended_at = now;
             self.fail(now, "no samples were taken for half a second, so the axis is stopped");
         }
@@ -107,6 +108,7 @@ impl SidecarSession {
             return None;
         };
         self.number += 1;
+        self.budget.note_written();
         pending.numbers.push(self.number);
         pending.repeated = now;
         Some(stop_message(command).line(self.number, self.facts.has_checksum))
@@ -119,26 +121,29 @@ impl SidecarSession {
         }
         let far = self.facts.worst_case_mm;
         let by_itself = format!("if the axis moves, it stops by itself within {far:.1} mm");
-        let is_unstopped =
-            |one: &PendingAnswer| one.request.is_stop() && now.since(one.sent) > DEAD;
+        let is_unstopped = |one: &PendingAnswer| one.request.is_stop() && one.sent.time(now) > DEAD;
         let silence = DEAD.max(Nanos(DEAD_PERIODS * self.facts.period.0));
         if self.pending.iter().any(is_unstopped) {
             return Some("the sidecar has not accepted a stop for 1 s, so the axis may still move; use the emergency stop".into());
         }
-        if self.is_flooded {
+        if self.stop_accepted.is_some_and(|accepted| accepted.time(now) > silence) {
+            // Without beats its own watchdog brakes.
             return Some(format!(
-                "the sidecar sends far more samples than it promised; {by_itself}"
+                "the sidecar has accepted a stop, but the axis moves on; {by_itself}; use the emergency stop"
             ));
+        }
+        if self.is_flooded {
+            return Some(format!("{FLOODED}; {by_itself}"));
         }
         if self.garbled_in_row >= GARBLED_MAX {
             return Some(format!("the sidecar sends nothing that means anything; {by_itself}"));
         }
-        if now.since(self.sampled_at) > silence {
+        if self.for_sample.time(now) > silence {
             return Some(format!(
                 "the sidecar sends no samples; {by_itself}; check its program and cable"
             ));
         }
-        let is_mute = now.since(self.answered_at) > DEAD;
+        let is_mute = self.for_answer.time(now) > DEAD;
         is_mute.then(|| {
             format!("the sidecar does not answer; {by_itself}; check its program and cable")
         })

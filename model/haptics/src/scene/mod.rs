@@ -8,26 +8,27 @@
 
 mod device;
 mod hand_led;
+mod mesh;
 mod no_force_reason;
 mod path;
+mod rendering;
 mod settings;
 
 pub use device::{DeviceSettings, HandPose, Pose, SimulatedDevice};
 pub use hand_led::HandLedScene;
+pub use mesh::{HandLedMeshScene, MeshScene, MeshSceneError, MeshSceneSettings};
 pub use no_force_reason::NoForceReason;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
 
+use crate::Flags;
 use crate::surface::{
     ContactSide, GridRect, HeightField, Proxy, ProxyTouch, Surface, SurfaceContact,
-    SurfaceRecovery, TouchState, dot,
+    SurfaceRecovery, TouchState,
 };
-use crate::{
-    BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
-    PassivityObserver,
-};
-use device::length;
-use palpate_model::units::{Depth, Newtons, Seconds};
+use crate::triangles::FIRST_ALONE;
+use palpate_model::units::Seconds;
+use rendering::ForceRendering;
 
 /// Ticks of a stall that device and law are led through; after longer ones they stand where they were.
 const LED_MAX: u64 = 1000;
@@ -79,13 +80,7 @@ pub struct Scene {
     settings: SceneSettings,
     surface: Surface,
     proxy: Proxy,
-    law: ForceLaw,
-    guard: ForceGuard,
-    controller: Option<PassivityController>,
-    observer: PassivityObserver,
-    buzz: BuzzDetector,
-    /// Depth of the stylus below the surface at rest in mm; negative above it.
-    below: f64,
+    rendering: ForceRendering,
     last: SceneTick,
     dirty: GridRect,
     moved: usize,
@@ -98,18 +93,12 @@ impl Scene {
         let pose = SimulatedDevice::of(&settings)?.pose();
         let recovery = SurfaceRecovery::new(Seconds(settings.recovery_s), period.seconds())?;
         let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut);
-        let law = LawSettings { scheme: settings.scheme, ..LawSettings::of(settings.body, period) };
         let below = -settings.start()[2];
-        let buzz_settings = BuzzSettings::of(settings.device.step_mm);
+        let rendering = ForceRendering::new(&settings, &[settings.body], below)?;
         Ok(Self {
             surface,
             proxy: Proxy::new(settings.friction)?,
-            law: ForceLaw::new(law, Depth(below))?,
-            guard: ForceGuard::new(&settings.guard, period),
-            controller: settings.controller.map(|one| PassivityController::new(&one, period)),
-            observer: PassivityObserver::default(),
-            buzz: BuzzDetector::new(&buzz_settings, period, below),
-            below,
+            rendering,
             last: SceneTick {
                 device: pose.at,
                 turn: pose.turn,
@@ -156,9 +145,8 @@ impl Scene {
         let elapsed = elapsed.max(1);
         let tick = self.last.tick.saturating_add(elapsed);
         let touch = self.proxy.follow(self.surface.field().at_rest(), pose.at);
-        let is_contact = touch.is_contact();
-        let before = self.below;
-        self.below = match touch.state {
+        let before = self.rendering.below();
+        let below = match touch.state {
             TouchState::Sticks | TouchState::Slides => touch.depth,
             TouchState::Free => {
                 let [x, y, z] = pose.at;
@@ -169,82 +157,15 @@ impl Scene {
             TouchState::Outside => before.min(0.0),
             TouchState::NotANumber => before,
         };
-        let (target, mut flags) = self.advance_law(before, elapsed);
-        let guarded = self.guard.tick(target, is_contact, elapsed);
-        flags |= guarded.flags;
-        // What the loop makes of it, along the normal.
-        let counts = ((self.below - before) / self.settings.device.step_mm).round() as i64;
-        self.observer.record_move(self.below - before);
-        let energy = self.observer.energy();
-        let buzz = self.buzz.tick(self.below, elapsed, energy);
-        flags |= Flags::BUZZ.when(buzz.is_some());
-        let mut along = guarded.force;
-        let mut injected_damping = 0.0;
-        if let Some(controller) = &mut self.controller {
-            if buzz.is_some() {
-                controller.report_buzz();
-            }
-            let step = self.settings.device.step_mm;
-            let one = controller.tick((counts, step), elapsed, along, is_contact);
-            along = one.force;
-            injected_damping = one.damping;
-            flags |= one.flags;
-        }
-        let requested = self.force_on_hand(&touch, along);
-        let (force, is_saturated) = self.settings.device.limit_force(requested);
-        let rendered = Newtons(dot(force, touch.normal));
-        if let Some(controller) = &mut self.controller {
-            controller.set_rendered_force(rendered);
-        }
-        self.observer.hold(rendered.0);
+        let rendered = self.rendering.tick(&touch, below, &FIRST_ALONE, elapsed);
         self.press(&touch);
-        let is_saturated = is_saturated || flags.has(Flags::FORCE_MAX);
-        let device = &self.settings.device;
-        let why = NoForceReason::of(touch.state, flags, is_saturated, length(force), device);
-        let span = self.settings.period.seconds().0 * elapsed as f64;
         self.last = SceneTick {
             tick,
-            device: pose.at,
-            turn: pose.turn,
-            proxy: touch.point,
-            normal: touch.normal,
-            depth: touch.depth,
-            speed: (self.below - before) / span,
-            force,
-            is_saturated,
-            no_force_reason: why,
-            injected_damping,
-            energy,
-            is_buzzing: buzz.is_some(),
             moved: self.moved,
             row_hash: self.row_hash(tick),
-            flags,
+            ..rendered.scene_tick(pose, &touch)
         };
         self.last
-    }
-
-    /// The law's force, after it was led straight through what was missed.
-    fn advance_law(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
-        let steps = elapsed.min(LED_MAX);
-        let way = (self.below - before) / steps as f64;
-        let mut flags = Flags::NONE;
-        let mut force = Newtons(0.0);
-        for step in 1..=steps {
-            let depth = if step == steps { self.below } else { before + way * step as f64 };
-            let one = self.law.tick(Depth(depth));
-            flags |= one.flags;
-            force = one.force;
-        }
-        (force, flags)
-    }
-
-    /// The force on the hand where `along` is what there is along the normal: friction goes with what the model gives, and damping
-    /// has none.
-    fn force_on_hand(&self, touch: &ProxyTouch, along: Newtons) -> [f64; 3] {
-        let push = along.0.max(0.0);
-        let with_friction = touch.force(push);
-        let pull = along.0 - if touch.is_contact() { push } else { 0.0 };
-        [0, 1, 2].map(|axis| with_friction[axis] + pull * touch.normal[axis])
     }
 
     /// The surface follows the stylus from the contact point down.

@@ -2,6 +2,7 @@
 
 use super::device::DeviceSettings;
 use crate::surface::{Cut, Grid, HeightField, MeshError, SurfaceMethod};
+use crate::triangles::{BlendError, MaterialError};
 use crate::{ControllerSettings, GuardSettings, LawError, Period, SettingError};
 use palpate_model::units::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -116,7 +117,19 @@ pub enum SceneError {
     Mesh(#[from] MeshError),
     #[error(transparent)]
     Law(#[from] LawError),
+    /// The number of its force models.
+    #[error(transparent)]
+    Materials(#[from] MaterialError),
     /// A number of its device, its friction or its recovery.
     #[error(transparent)]
     Setting(#[from] SettingError),
+}
+
+impl From<BlendError> for SceneError {
+    fn from(error: BlendError) -> Self {
+        match error {
+            BlendError::Law(law) => Self::Law(law),
+            BlendError::Materials(materials) => Self::Materials(materials),
+        }
+    }
 }

@@ -37,7 +37,7 @@ pub use shape_error::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
 use chain::Chain;
 use contact::Poke;
 use envelope::Envelope;
-pub(crate) use proxy::dot;
+pub(crate) use proxy::{FRICTION_MOST, dot};
 
 palpate_model::named! {
     /// Algorithm that computes the shape.

@@ -20,7 +20,7 @@ const STILL_MM: f64 = 1e-9;
 /// Halvings of a device's way through the surface: of a metre, 1e-9 mm are left.
 const HALVINGS: usize = 40;
 /// Most friction: beyond, a contact point practically sticks.
-const MOST_FRICTION: f64 = 10.0;
+pub(crate) const FRICTION_MOST: f64 = 10.0;
 
 /// A contact point and how it moves.
 #[derive(Clone, Debug)]
@@ -86,7 +86,7 @@ impl Proxy {
     /// With a friction coefficient.
     pub fn new(friction: f64) -> Result<Self, SettingError> {
         let settings = [("friction coefficient", friction, "")];
-        SettingRange::UpTo(MOST_FRICTION).check("a contact point", &settings)?;
+        SettingRange::UpTo(FRICTION_MOST).check("a contact point", &settings)?;
         Ok(Self { friction, at: None, last: None })
     }
 

@@ -50,7 +50,7 @@ impl SurfaceRecovery {
 
     /// A height one tick later.
     #[inline(always)]
-    pub(super) fn step(&self, now: f64, rest: f64) -> f64 {
+    pub(crate) fn step(&self, now: f64, rest: f64) -> f64 {
         let free = now + self.share * (rest - now);
         // Comparisons rather than `min` and `max`, which would look for NaN where none can be.
         let (above, below) = (free + self.creep, free - self.creep);

@@ -144,6 +144,7 @@ impl Player {
                 is_homed: state.is_homed(),
                 link: None,
                 link_error: None,
+                sensors: *state.sensors(),
             },
             run: Some(board.view(state, log)),
             refusal: None,

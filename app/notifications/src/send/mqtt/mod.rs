@@ -32,6 +32,8 @@ pub(crate) struct MqttSender {
     topic_notice: String,
     topic_state: String,
     connection: Option<Connection>,
+    /// Whether the broker has refused the login: tried again and again, it would lock the account.
+    is_refused: bool,
 }
 
 struct Connection {
@@ -50,6 +52,7 @@ impl MqttSender {
             topic_state: format!("{}/state", target.topic),
             target: target.clone(),
             connection: None,
+            is_refused: false,
         })
     }
 
@@ -78,6 +81,9 @@ impl MqttSender {
     /// Tries whether the broker is still there, and connects where it was not. A failure is passed over: the next notice
     /// tries again, and says why it fails.
     pub async fn keep_alive(&mut self) {
+        if self.is_refused {
+            return;
+        }
         let Ok(connection) = self.connected().await else { return };
         if connection.ping().await.is_err() {
             self.connection = None;
@@ -100,7 +106,11 @@ impl MqttSender {
     async fn connected(&mut self) -> Result<&mut Connection, SendError> {
         let connection = match self.connection.take() {
             Some(connection) => connection,
-            None => self.connect().await?,
+            None => {
+                let connected = self.connect().await;
+                self.is_refused = connected.as_ref().is_err_and(|err| err.is_final);
+                connected?
+            }
         };
         Ok(self.connection.insert(connection))
     }

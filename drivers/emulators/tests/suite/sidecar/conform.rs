@@ -70,6 +70,7 @@ fn each_lie_fails_its_check_and_takes_the_trust_away() {
         (SidecarLie::DeafToStops, "stop"),
         (SidecarLie::Lazy, "path"),
         (SidecarLie::WrongUnits(3), "path"),
+        (SidecarLie::Jump(i64::MAX), "start"),
         (SidecarLie::ClockStuck, "rate"),
     ] {
         let wire = Shared::new(Emulated::default());

@@ -85,6 +85,8 @@ impl Trouble {
         match self {
             // What has no samples is noticed after 250 ms, or the silence of the host stops it.
             Self::Lie(SidecarLie::Mute | SidecarLie::Flood(_)) | Self::Noise => NOTICED,
+            // The link is given up after a second, and silence stops the axis.
+            Self::Lie(SidecarLie::DeafToStops) => 1.0 + silence + AT_ONCE,
             Self::OwnerHangs => 0.5 + AT_ONCE,
             Self::Cut | Self::Deaf | Self::HostHangs => silence + AT_ONCE,
             _ => 0.31,
@@ -132,12 +134,29 @@ fn run(seed: u64) -> Result<(), String> {
     } else {
         host.pass(1.0);
     }
-    // An owner gives up a link whose axis moves on after a stop.
-    let is_disobedient = matches!(trouble, Trouble::Lie(SidecarLie::DeafToStops));
-    let given_up = if is_disobedient { 1.0 + silence } else { 0.0 };
-    host.wire.lock().is_cut |= is_disobedient;
     host.pass(2.0);
-    check(&host, trouble, from, (speed, acceleration), (silence, given_up))
+    if matches!(trouble, Trouble::Lie(SidecarLie::Lazy)) {
+        return check_lazy(&host, from, is_lazy_to_come, is_stop_asked);
+    }
+    check(&host, trouble, from, (speed, acceleration), silence)
+}
+
+/// A motion that is to come is not made, and that is reported unless a stop has taken it back. One under way goes on.
+fn check_lazy(host: &Host, from: f64, is_to_come: bool, is_stop_asked: bool) -> Result<(), String> {
+    let wire = host.wire.lock();
+    let far = wire.emulator.position_mm() - from;
+    let what = format!("lazy: {far:.3} mm, {:?} {:?}", host.faults, host.ending);
+    let is_missed = host.faults.iter().any(|one| one.to_string().contains("does not move"));
+    let has_stopped = host.acks.contains(&RigCommand::Stop);
+    let is_right = if is_to_come {
+        far == 0.0 && is_missed != is_stop_asked && has_stopped == is_stop_asked
+    } else {
+        far >= 0.0 && host.faults.is_empty() && has_stopped == is_stop_asked
+    };
+    let stands = !is_stop_asked || !wire.emulator.is_moving();
+    let is_quiet = host.ending.is_none() && host.path_errors.is_empty();
+    let is_well = is_right && stands && is_quiet;
+    if is_well { Ok(()) } else { Err(format!("{what} {:?} {:?}", host.acks, host.path_errors)) }
 }
 
 /// The oracle is the emulated axis itself: where it truly is, and whether it stands.
@@ -146,30 +165,27 @@ fn check(
     trouble: Trouble,
     from: f64,
     (speed, acceleration): (MmPerS, MmPerS2),
-    (silence, given_up): (f64, f64),
+    silence: f64,
 ) -> Result<(), String> {
     let wire = host.wire.lock();
     let far = wire.emulator.position_mm() - from;
-    let is_unnoticed = matches!(trouble, Trouble::Lie(SidecarLie::Lazy));
     let is_at_target = (wire.emulator.position_mm() - 30.0).abs() < 0.01;
     // Two ways of 0.7 ms and the reaction of up to 5 ms come to it, and a slow sample.
-    let time = trouble.noticed_within(silence) + given_up + 0.03;
+    let time = trouble.noticed_within(silence) + 0.03;
     let most = speed.0 * time + speed.0 * speed.0 / (2.0 * acceleration.0) + 0.01;
     let reports = (!host.faults.is_empty(), host.ending.is_some(), !host.path_errors.is_empty());
     let what =
         format!("{trouble:?} at {speed}: {far:.3} mm of {most:.3}, {reports:?} {:?}", host.faults);
-    // A slow move is not finished by the lazy; a quick one may be at its target.
-    if wire.emulator.is_moving() && !is_unnoticed {
+    if wire.emulator.is_moving() {
         return Err(format!("it still moves: {what}"));
     }
-    if far > most && !is_unnoticed && !is_at_target {
+    // A quick move may be at its target.
+    if far > most && !is_at_target {
         return Err(format!("it went too far: {what}"));
     }
     let is_reported = reports != (false, false, false);
-    let must_be_reported =
-        !matches!(trouble, Trouble::Lie(SidecarLie::Lazy | SidecarLie::DeafToStops));
     let is_host = matches!(trouble, Trouble::HostHangs | Trouble::OwnerHangs);
-    if must_be_reported && !is_host && !is_reported {
+    if !is_host && !is_reported {
         return Err(format!("no one is informed: {what}"));
     }
     Ok(())

@@ -1,0 +1,91 @@
+//! What the margin before play needs to know about a device: its mechanics, and the delay measured on its own wire.
+
+use palpate_haptics::Period;
+use palpate_haptics::margin::LoopDevice;
+use palpate_haptics::scene::DeviceSettings;
+use palpate_model::Nanos;
+use palpate_model::units::Newtons;
+use serde::{Deserialize, Serialize};
+
+/// Round trips of messages to a device's service and back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoundTrip {
+    /// Messages measured.
+    pub count: usize,
+    pub median: Nanos,
+    /// 99 of 100 are at most this long.
+    pub p99: Nanos,
+    pub max: Nanos,
+}
+
+impl RoundTrip {
+    /// Of measured times; all zero without any.
+    #[must_use]
+    pub fn of(mut times: Vec<Nanos>) -> Self {
+        times.sort_unstable();
+        let rank = |share: f64| {
+            let rank = (share * times.len() as f64).ceil() as usize;
+            times.get(rank.saturating_sub(1)).copied().unwrap_or_default()
+        };
+        Self { count: times.len(), median: rank(0.5), p99: rank(0.99), max: rank(1.0) }
+    }
+}
+
+/// A device as its owner knows it, in its own millimetres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InverseFigures {
+    /// Mechanics, steps and bounds.
+    pub device: DeviceSettings,
+    /// Time between sensing and the service's report, and between its order and the force on the hand, in s. Not seen in a
+    /// round trip.
+    pub hidden_delay_s: f64,
+}
+
+impl Default for InverseFigures {
+    /// The Inverse3. Only the reach is Haply's: its tutorial 06 (service 3.5) keeps the stylus within 0.1 m of the middle, and
+    /// the cube in that sphere is taken. Haply's public pages give neither mass, friction, step nor largest force. Those are
+    /// assumed, on the side that makes the margin smaller: little damping and friction, a coarse step. The largest force is what
+    /// palpate asks for, not what the device has.
+    fn default() -> Self {
+        // The cube in a sphere of 100 mm: 2 * 100 / sqrt(3).
+        let side_mm = 115.0;
+        Self {
+            device: DeviceSettings {
+                mass_kg: 0.1,
+                damping_n_s_per_mm: 0.0002,
+                friction_n: 0.1,
+                step_mm: 0.05,
+                turn_step_rad: 0.002,
+                force_max_n: 3.0,
+                force_continuous_n: 1.0,
+                stiffness_max_n_per_mm: 0.7,
+                workspace_mm: [side_mm; 3],
+                ..DeviceSettings::default()
+            },
+            // One exchange of a USB device that is served each millisecond.
+            hidden_delay_s: 0.001,
+        }
+    }
+}
+
+impl InverseFigures {
+    /// What the margin sees of a device with `settings` in the scene. A pose is taken at one tick and used at the next, and
+    /// force and pose meet at the service half a round trip away: one tick, the round trip (its 99th percentile) and the
+    /// hidden delay.
+    #[must_use]
+    pub fn loop_device(
+        &self,
+        settings: &DeviceSettings,
+        round_trip: &RoundTrip,
+        period: Period,
+    ) -> LoopDevice {
+        let wire_s = round_trip.p99.seconds().0 + self.hidden_delay_s.max(0.0);
+        LoopDevice {
+            damping: settings.damping_n_s_per_mm,
+            friction: Newtons(settings.friction_n),
+            count_mm: settings.step_mm,
+            delay_ticks: 1.0 + wire_s / period.seconds().0,
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! The WebSocket to the service: opened with a limit, then never waited for.
+
+use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, TcpStream};
+use std::time::Duration;
+use tungstenite::{Error, Message, WebSocket};
+
+/// Longest time to connect, to agree on WebSocket and to get the inventory.
+const OPENING_MAX: Duration = Duration::from_millis(500);
+
+/// An open connection.
+pub struct Link {
+    socket: WebSocket<TcpStream>,
+}
+
+fn wrong(text: impl ToString) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, text.to_string())
+}
+
+impl Link {
+    /// Connects and takes the inventory, the first message of the service.
+    pub fn open(address: SocketAddr) -> io::Result<(Self, String)> {
+        let stream = TcpStream::connect_timeout(&address, OPENING_MAX)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(OPENING_MAX))?;
+        stream.set_write_timeout(Some(OPENING_MAX))?;
+        let url = format!("ws://{address}/");
+        let (mut socket, _) = tungstenite::client(url, stream).map_err(wrong)?;
+        let inventory = loop {
+            if let Message::Text(text) = socket.read().map_err(wrong)? {
+                break text.to_string();
+            }
+        };
+        socket.get_ref().set_nonblocking(true)?;
+        Ok((Self { socket }, inventory))
+    }
+
+    /// The next message if one is there.
+    pub fn receive(&mut self) -> io::Result<Option<String>> {
+        loop {
+            match self.socket.read() {
+                Ok(Message::Text(text)) => return Ok(Some(text.to_string())),
+                Ok(Message::Close(_)) => return Err(ErrorKind::ConnectionAborted.into()),
+                Ok(_) => {}
+                Err(Error::Io(err)) if err.kind() == ErrorKind::WouldBlock => return Ok(None),
+                Err(err) => return Err(wrong(err)),
+            }
+        }
+    }
+
+    /// Sends a message; what the system has no room for waits for the next call.
+    pub fn send(&mut self, text: &str) -> io::Result<()> {
+        match self.socket.send(Message::text(text)) {
+            Ok(()) => Ok(()),
+            Err(Error::Io(err)) if err.kind() == ErrorKind::WouldBlock => Ok(()),
+            Err(err) => Err(wrong(err)),
+        }
+    }
+
+    /// Says goodbye. The service needs no answer, and none is waited for.
+    pub fn close(mut self) {
+        let _ = self.socket.close(None);
+        let _ = self.socket.flush();
+    }
+}
