@@ -1,4 +1,9 @@
 //! Normals, depths and sizes in pixels against the reference.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and print as tests do"
+)]
 
 use super::off_screen;
 use super::ray_caster::{Hit, HitKind, Reference, angle};
@@ -229,7 +234,8 @@ fn thinned_nodes_stay_where_they_are() {
     picture.level = DetailLevel { every: 3, ..LEVELS[1] };
     let image = off_screen.normals(&picture, SIZE).unwrap();
     // Every third node of 61 is a mesh of 21 that has the same corners; its normals are still those of the full heights.
-    let nodes = (0..SIDE * SIDE).filter(|index| index % SIDE % 3 == 0 && index / SIDE % 3 == 0);
+    let nodes = (0..SIDE * SIDE)
+        .filter(|index| (index % SIDE).is_multiple_of(3) && (index / SIDE).is_multiple_of(3));
     let heights = nodes.map(|index| reference.heights[index]).collect();
     let thin = Reference { side: 21, spacing: 3.0, heights, finger: None };
     let wanted = thin.picture(&picture.camera, Eye::Single, SIZE);
