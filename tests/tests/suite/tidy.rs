@@ -7,7 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 /// Every package of the product.
-const PACKAGES: [&str; 20] = [
+const PACKAGES: [&str; 21] = [
     "model",
     "model/rheology",
     "model/haptics",

@@ -42,7 +42,7 @@ impl PictureGraphics {
         }
         match &self.renderer {
             PictureRenderer::Made(abilities) => Ok(*abilities),
-            PictureRenderer::Refused(reason) => Err(reason),
+            PictureRenderer::Refused(reason) => Err(reason.as_str()),
             PictureRenderer::NotYet => Err(NO_ADAPTER),
         }
     }
