@@ -83,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             all[1],
             handed[0],
             handed[1],
-            bench.off_screen.renderer().possible(level)
+            bench.off_screen.abilities().possible(level)
         );
     }
     let first = bench.off_screen.abilities().first_level;

@@ -19,7 +19,7 @@ mod surface;
 
 pub use callback::TissueCallback;
 pub use camera::{Camera, Eye, FIELD_OF_VIEW, ProjectedPoint, Vec3};
-pub use gpu::{AdapterAbilities, TissueRenderer};
+pub use gpu::{AdapterAbilities, RefusedError, TissueRenderer};
 pub use legend::{Legend, LegendTick};
 pub use level::{DetailLevel, LEVELS, LevelChooser, Shading};
 pub use look::{ColourRamp, Look, Rgb, SurfaceColours};

@@ -44,7 +44,9 @@ impl OffScreen {
             })?;
         let window = wgpu::TextureFormat::Rgba8Unorm;
         let abilities = AdapterAbilities::of(&adapter);
-        let renderer = TissueRenderer::new(&device, window, abilities);
+        let renderer = TissueRenderer::checked(&device, window, abilities).map_err(|err| {
+            OffScreenError::NoDevice { adapter: name.clone(), reason: err.to_string() }
+        })?;
         Ok(Self { device, queue, renderer, abilities, adapter: name })
     }
 
@@ -57,11 +59,6 @@ impl OffScreen {
     #[must_use]
     pub fn abilities(&self) -> AdapterAbilities {
         self.abilities
-    }
-
-    #[must_use]
-    pub fn renderer(&self) -> &TissueRenderer {
-        &self.renderer
     }
 
     /// A picture of so many pixels as red, green, blue and opacity (sRGB), row by row from the top. A level of less

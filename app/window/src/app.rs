@@ -221,6 +221,7 @@ impl WorkbenchApp {
         };
         new.form.set_label("operator", old.form.label_text("operator"));
         new.form.folder.clone_from(&old.form.folder);
+        new.graphics = std::mem::take(&mut self.workbench.graphics);
         let old = std::mem::replace(&mut self.workbench, new);
         // Closing a link may take a moment, for which no frame waits.
         let closing = std::thread::Builder::new().name("rig-closing".into());
@@ -394,6 +395,8 @@ impl eframe::App for WorkbenchApp {
         self.workbench.occupation = self.screens.occupation();
         let is_watched = self.screens.shown_mut().is_watched();
         let frame_s = frame.info().cpu_usage;
+        self.workbench.graphics.take(frame.wgpu_render_state());
+        self.workbench.graphics.frame_ms = self.pace.frame_ms(ctx, frame_s);
         self.pace.next(ctx, frame_s, !self.workbench.is_quiet(), is_watched);
     }
 

@@ -5,6 +5,7 @@ mod station;
 
 use crate::command::{ManualMove, UiCommand};
 use crate::latest_run::LatestRun;
+use crate::scene::graphics::PictureGraphics;
 use crate::screens::form::{CheckedPlan, ProtocolForm, RunSetup};
 use crate::shell::activity::{Intent, is_motion_possible, run_in_progress};
 use crate::widgets::require;
@@ -96,6 +97,8 @@ pub struct Workbench {
     /// The queue of specimens.
     pub queue: QueueDesk,
     pub latest_run: LatestRun,
+    /// For the picture of a scene.
+    pub graphics: PictureGraphics,
     start: Start,
     /// The run that begins once every loop of the window has stopped.
     next_run: Option<RunRequest>,
@@ -143,6 +146,7 @@ impl Workbench {
         let mut workbench = Self {
             station,
             latest_run: LatestRun::new(&request.calibration),
+            graphics: PictureGraphics::default(),
             snapshot: runner.snapshot(),
             measured: runner.snapshot(),
             runner,

@@ -6,6 +6,7 @@ use palpate_haptics::scene::NoForceReason;
 use palpate_runner::TimeScale;
 use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::screen::Screen;
 use palpate_window::screens::trade::TradeScreen;
 use std::path::Path;
 
@@ -70,6 +71,24 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     flow.window.run_steps(3);
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
     assert!(flow.says("stopped; the last picture"));
+}
+
+#[test]
+fn switches_of_the_picture_are_kept_and_without_an_adapter_a_sentence_stands_in_its_place() {
+    let mut flow = open();
+    flow.wait("the path", |window| screen_of::<SceneScreen>(window).computed_path().is_some());
+    flow.window.run_steps(3);
+    assert!(flow.says("This window is drawn without a graphics adapter"));
+    assert!(flow.says("drawn with a radius of 1.5 mm"));
+    assert_eq!(screen_of::<SceneScreen>(&flow.window).layout(), None);
+    for name in ["depth", "finger", "lines of equal depth", "two eyes, side by side"] {
+        flow.click(name);
+    }
+    assert!(flow.says("drawn with a radius of 3.6 mm"));
+    let kept = screen_of::<SceneScreen>(&flow.window).layout().unwrap();
+    let mut other = SceneScreen::default();
+    other.take_layout(&kept);
+    assert_eq!(other.layout(), Some(kept));
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod uniforms;
 pub(crate) use pipelines::Output;
 
 use crate::camera::Eye;
-use crate::level::{DetailLevel, Shading};
+use crate::level::{DetailLevel, LEVELS, Shading};
 use crate::look::linear;
 use crate::picture::Picture;
 use crate::surface::SurfaceData;
@@ -16,6 +16,12 @@ use buffers::{SceneBuffers, Triangles, side_vertices};
 use egui_wgpu::wgpu;
 use pipelines::{Part, PipelineKey, Pipelines};
 use targets::{CopyPipeline, Targets};
+use thiserror::Error;
+
+/// The adapter's reason why it cannot draw pictures.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the graphics adapter refuses the picture: {0}")]
+pub struct RefusedError(String);
 
 /// Draws pictures with an adapter, and keeps what is on it from one to the next.
 ///
@@ -26,7 +32,7 @@ pub struct TissueRenderer {
     buffers: SceneBuffers,
     targets: Option<Targets>,
     copy: CopyPipeline,
-    samples: u32,
+    abilities: AdapterAbilities,
     /// How the share of the sky was computed last; `None` before.
     openness: Option<Shading>,
     drawn: Option<DrawnPicture>,
@@ -71,6 +77,18 @@ impl AdapterAbilities {
             },
         }
     }
+
+    /// What every adapter of WebGPU can.
+    #[must_use]
+    pub const fn least() -> Self {
+        Self { samples: 1, has_views: false, first_level: 0 }
+    }
+
+    /// A level with the samples that the adapter allows: what is drawn, and what the user is shown.
+    #[must_use]
+    pub fn possible(self, level: DetailLevel) -> DetailLevel {
+        DetailLevel { samples: level.samples.min(self.samples).max(1), ..level }
+    }
 }
 
 /// A software renderer takes a second for a picture of the best level.
@@ -90,16 +108,30 @@ impl TissueRenderer {
             pipelines,
             targets: None,
             copy: CopyPipeline::new(device, window, abilities.has_views),
-            samples: abilities.samples,
+            abilities,
             openness: None,
             drawn: None,
         }
     }
 
-    /// A level with the samples that the adapter allows: what is drawn, and what the user is shown.
-    #[must_use]
-    pub fn possible(&self, level: DetailLevel) -> DetailLevel {
-        DetailLevel { samples: level.samples.min(self.samples).max(1), ..level }
+    /// The same, once the adapter has taken everything that a picture at its first level needs.
+    pub fn checked(
+        device: &wgpu::Device,
+        window: wgpu::TextureFormat,
+        abilities: AdapterAbilities,
+    ) -> Result<Self, RefusedError> {
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let mut renderer = Self::new(device, window, abilities);
+        let DetailLevel { samples, shading, .. } =
+            abilities.possible(LEVELS[abilities.first_level.min(LEVELS.len() - 1)]);
+        for part in [Part::Probe, Part::Field, Part::Sides] {
+            let key = PipelineKey { part, samples, shading, output: Output::Colours };
+            renderer.pipelines.make(device, key);
+        }
+        match pollster::block_on(scope.pop()) {
+            None => Ok(renderer),
+            Some(err) => Err(RefusedError(one_line(&err.to_string()))),
+        }
     }
 
     /// Uploads what changed and draws a picture for so many pixels into an own texture.
@@ -129,7 +161,7 @@ impl TissueRenderer {
         picture: &Picture,
         (size_px, output): ([u32; 2], Output),
     ) {
-        let level = self.possible(picture.level);
+        let level = self.abilities.possible(picture.level);
         let samples = if output == Output::Normals { 1 } else { level.samples };
         let divisor = level.divisor.max(1);
         let most = device.limits().max_texture_dimension_2d;
@@ -224,6 +256,11 @@ impl TissueRenderer {
     pub(crate) fn targets(&self) -> Option<&wgpu::Texture> {
         self.targets.as_ref().map(|targets| &targets.picture)
     }
+}
+
+/// Words of several lines in one.
+fn one_line(words: &str) -> String {
+    words.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The probe first: what it hides is not shaded.

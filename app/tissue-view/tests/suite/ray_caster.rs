@@ -67,29 +67,35 @@ impl Reference {
         unit([-slope((west, row), (east, row)), -slope((column, south), (column, north)), 1.0])
     }
 
+    /// Places and normals of the corners of all triangles.
+    fn triangles(&self) -> Vec<[[Vec3; 3]; 2]> {
+        let cells =
+            (0..self.side - 1).flat_map(|row| (0..self.side - 1).map(move |column| (column, row)));
+        let nodes = cells.flat_map(|(column, row)| {
+            let [a, b] = [(column, row), (column + 1, row)];
+            let [c, d] = [(column + 1, row + 1), (column, row + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        nodes
+            .map(|nodes| {
+                let place = nodes.map(|(column, row)| self.place(column, row));
+                [place, nodes.map(|(column, row)| self.normal(column, row))]
+            })
+            .collect()
+    }
+
     /// What a ray meets first.
-    fn first_hit(&self, from: Vec3, way: Vec3) -> Option<Hit> {
+    fn first_hit(&self, triangles: &[[[Vec3; 3]; 2]], from: Vec3, way: Vec3) -> Option<Hit> {
         let mut first = self.finger.and_then(|finger| finger_hit(finger, from, way));
-        for row in 0..self.side - 1 {
-            for column in 0..self.side - 1 {
-                let corners =
-                    [(column, row), (column + 1, row), (column + 1, row + 1), (column, row + 1)];
-                for [a, b, c] in [[0, 1, 2], [0, 2, 3]] {
-                    let nodes = [corners[a], corners[b], corners[c]];
-                    let places = nodes.map(|(column, row)| self.place(column, row));
-                    let Some((distance, shares)) = triangle_hit(places, from, way) else {
-                        continue;
-                    };
-                    if first.is_some_and(|hit| hit.distance <= distance) {
-                        continue;
-                    }
-                    let normals = nodes.map(|(column, row)| self.normal(column, row));
-                    let mixed = [0, 1, 2].map(|axis| {
-                        (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>()
-                    });
-                    first = Some(Hit { kind: HitKind::Tissue, normal: unit(mixed), distance });
-                }
+        for [places, normals] in triangles {
+            let Some((distance, shares)) = triangle_hit(*places, from, way) else { continue };
+            if first.is_some_and(|hit| hit.distance <= distance) {
+                continue;
             }
+            let mixed = [0, 1, 2].map(|axis| {
+                (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>()
+            });
+            first = Some(Hit { kind: HitKind::Tissue, normal: unit(mixed), distance });
         }
         first
     }
@@ -98,6 +104,7 @@ impl Reference {
     pub fn picture(&self, camera: &Camera, eye: Eye, [wide, high]: [u32; 2]) -> Vec<Option<Hit>> {
         let from = camera.eye(eye);
         let half = [wide, high].map(|side| f64::from(side) / 2.0);
+        let triangles = self.triangles();
         let pixels = (0..high).flat_map(|row| (0..wide).map(move |column| (column, row)));
         pixels
             .map(|(column, row)| {
@@ -105,7 +112,7 @@ impl Reference {
                     (f64::from(column) + 0.5 - half[0]) / half[1],
                     (half[1] - f64::from(row) - 0.5) / half[1],
                 ];
-                self.first_hit(from, camera.ray(at, eye))
+                self.first_hit(&triangles, from, camera.ray(at, eye))
             })
             .collect()
     }

@@ -1,4 +1,9 @@
 //! Normals, depths and sizes in pixels against the reference.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail and print as tests do"
+)]
 
 use super::off_screen;
 use super::ray_caster::{Hit, HitKind, Reference, angle};
@@ -12,7 +17,7 @@ const SIDE: usize = 61;
 const SPACING: f64 = 1.0;
 const SIZE: [u32; 2] = [240, 150];
 /// A finger that stands in the dent, its tip below the surface at rest.
-const FINGER: ([f64; 3], f64) = ([30.0, 30.0, 1.2], 6.0);
+const FINGER: ([f64; 3], f64) = ([30.0, 30.0, -0.2], 5.5);
 
 /// A dent with a steep wall and waves on it, so that normals point everywhere.
 fn reference(finger: Option<([f64; 3], f64)>) -> Reference {
@@ -105,7 +110,7 @@ fn compare(wanted: &[Option<Hit>], image: &Image<[f32; 4]>, name: &str) {
         "{name}: {} pixels, mean {mean:.5}, 99 % {late:.5} degrees, {above} above",
         errors.len()
     );
-    assert!(errors.len() > wanted.len() / 2, "{name}: {} pixels", errors.len());
+    assert!(errors.len() > wanted.len() / 4, "{name}: {} pixels", errors.len());
     assert_eq!(kinds, 0, "{name}: tissue and probe are exchanged");
     // A facet of the probe's polygon is up to 0.0005 of the radius inside, which moves its edges.
     assert!(above * 100 <= errors.len(), "{name}: {above} of {}", errors.len());
@@ -151,7 +156,9 @@ fn a_mesh_of_the_same_triangles_gives_the_same_picture() {
 fn the_probe_is_behind_the_near_rim_of_its_dent_and_before_the_far_one() {
     let Some(mut off_screen) = off_screen() else { return };
     let reference = reference(Some(FINGER));
-    let picture = picture(&reference, EyeLayout::Single);
+    let mut picture = picture(&reference, EyeLayout::Single);
+    // So low that the near rim is in front of the tip.
+    picture.camera.orbit(0.0, -0.3);
     let wanted = reference.picture(&picture.camera, Eye::Single, SIZE);
     let bare = Reference { side: 2, spacing: 60.0, heights: vec![-100.0; 4], finger: Some(FINGER) };
     let alone = bare.picture(&picture.camera, Eye::Single, SIZE);
@@ -227,7 +234,8 @@ fn thinned_nodes_stay_where_they_are() {
     picture.level = DetailLevel { every: 3, ..LEVELS[1] };
     let image = off_screen.normals(&picture, SIZE).unwrap();
     // Every third node of 61 is a mesh of 21 that has the same corners; its normals are still those of the full heights.
-    let nodes = (0..SIDE * SIDE).filter(|index| index % SIDE % 3 == 0 && index / SIDE % 3 == 0);
+    let nodes = (0..SIDE * SIDE)
+        .filter(|index| (index % SIDE).is_multiple_of(3) && (index / SIDE).is_multiple_of(3));
     let heights = nodes.map(|index| reference.heights[index]).collect();
     let thin = Reference { side: 21, spacing: 3.0, heights, finger: None };
     let wanted = thin.picture(&picture.camera, Eye::Single, SIZE);

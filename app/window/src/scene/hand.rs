@@ -1,7 +1,8 @@
 //! Where the pointer and the keys want the tool, and how a stylus stands.
 
-use super::camera::{Camera, Vec3};
+use super::camera::ground;
 use eframe::egui::Key;
+use palpate_tissue_view::{Camera, Vec3};
 
 /// How high above the surface the tool waits, in mm.
 const ABOVE: f64 = 3.0;
@@ -54,7 +55,7 @@ impl ToolTarget {
 
     /// What a key asks for; directions are those of the picture. False for keys that ask for nothing.
     pub fn key(&mut self, key: Key, camera: &Camera) -> bool {
-        let [right, away] = camera.ground();
+        let [right, away] = ground(camera);
         let (direction, length) = match key {
             Key::ArrowRight => (right, STEP[0]),
             Key::ArrowLeft => (right, -STEP[0]),
@@ -94,15 +95,19 @@ pub fn stylus([yaw, pitch, roll]: Vec3) -> [Vec3; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::dot;
+    use super::super::camera::Lens;
     use super::*;
+
+    fn dot(a: Vec3, b: Vec3) -> f64 {
+        a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    }
 
     #[test]
     fn keys_move_the_tool_as_the_picture_has_it() {
         let mut camera = Camera::of([60.0, 60.0]);
         camera.orbit(0.7, 0.0);
         let picture = eframe::egui::Rect::from_min_max([0.0, 0.0].into(), [400.0, 400.0].into());
-        let lens = camera.lens(picture);
+        let lens = Lens::single(camera, picture);
         let seen = |hand: &ToolTarget| lens.see(hand.at()).unwrap().at;
         let hand = ToolTarget::above([60.0, 60.0]);
         let moved = |key| {

@@ -1,10 +1,13 @@
-//! A surface in three dimensions as egui draws it: triangles with a colour at each corner, back to front.
+//! The picture of a scene: `palpate-tissue-view` draws surface and probe, egui the force and the words above them.
 //!
-//! [`camera`] says where points are in a picture and what is under the pointer, [`facets`] makes triangles of heights,
-//! [`hand`] moves the tool as the picture has it; all three are pure. [`view`] draws them, with the contact point, the
-//! stylus and the force.
+//! [`camera`] says where points are on the screen and what is under the pointer, [`hand`] moves the tool as the picture
+//! has it, [`look`] has the switches, [`detail`] the time of frames; all are pure. [`graphics`] reaches the adapter,
+//! [`overlay`] paints above the picture, and [`view`] brings them together.
 
 pub mod camera;
-pub mod facets;
+pub mod detail;
+pub mod graphics;
 pub mod hand;
+pub mod look;
+mod overlay;
 pub mod view;

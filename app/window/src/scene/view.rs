@@ -1,36 +1,36 @@
-//! The picture of a scene: surface, contact point, stylus and force, and what the pointer and the keys do in it.
+//! The picture of a scene, and what the pointer and the keys do in it.
 
-use super::camera::{Camera, Lens, Vec3, along};
-use super::facets::{SurfaceStyle, colour_depth, facets};
+use super::camera::Lens;
+use super::detail::PictureDetail;
+use super::graphics::PictureGraphics;
 use super::hand::{ToolTarget, stylus};
-use crate::theme::Tokens;
-use crate::widgets::{NamedControl, tokens_of};
-use eframe::egui::epaint::Mesh;
+use super::look::{SceneLook, deepest_of};
+use super::overlay::OverlayPainter;
+use crate::widgets::{NamedControl, quiet_ui, tokens_of};
 use eframe::egui::{
-    Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
-    Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
+    Event, EventFilter, Key, Label, PointerButton, Pos2, Rect, Response, RichText, Role, Sense,
+    Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, vec2,
 };
-use palpate_figures::tokens::viridis;
+use eframe::egui_wgpu::Callback;
 use palpate_haptics::surface::Heights;
+use palpate_tissue_view::{
+    AdapterAbilities, Camera, DetailLevel, EyeLayout, Picture, Probe, SurfaceData, TissueCallback,
+    Vec3,
+};
+use std::sync::Arc;
 
 /// Name of the picture, for the palette and for who reads the screen aloud.
 pub const NAME: &str = "scene picture";
-/// The force whose arrow is as long as a quarter of the scene, in N: what an Omni-class device gives at most.
-const ARROW_NEWTONS: f64 = 3.3;
-/// Forces below this have no arrow, in N.
-const ARROW_MIN: f64 = 0.005;
-/// Length of the stylus and radius of the contact point, in lengths of the scene.
-const STYLUS: f64 = 0.3;
-const CONTACT: f64 = 0.012;
 /// Radians per point of a drag and per press of a key.
 const ORBIT: [f64; 2] = [0.008, 0.1];
 /// Zoom per point of the wheel and per press of a key.
 const ZOOM: [f64; 2] = [0.002, 1.15];
 /// Depth per point of the wheel, in mm.
 const WHEEL_MM: f64 = 0.02;
-/// Size of the colour bar, and its distance from the edges.
-const BAR: [f32; 2] = [12.0, 160.0];
-const EDGE: f32 = 12.0;
+/// How much nearer than where all of the surface is seen from the camera begins.
+const NEARER: f64 = 1.3;
+/// Room for the line below the picture.
+const FOOT: f32 = 20.0;
 
 /// The scene at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +46,8 @@ pub struct ScenePicture<'a> {
     pub contact: Option<Vec3>,
     /// Force on the hand, in N.
     pub force: Vec3,
+    /// Whether the scene runs, so that one picture follows the other.
+    pub is_running: bool,
 }
 
 /// Camera and hand of a scene.
@@ -54,10 +56,16 @@ pub struct SceneView {
     camera: Camera,
     extent: [f64; 2],
     hand: ToolTarget,
-    /// Whether the lines of the mesh are drawn.
-    pub has_lines: bool,
+    pub look: SceneLook,
+    detail: PictureDetail,
     /// The deepest depth since the scene began: colours do not change their meaning while one looks.
     deepest: f64,
+}
+
+fn first_camera(extent: [f64; 2]) -> Camera {
+    let mut camera = Camera::of(extent);
+    camera.zoom(NEARER);
+    camera
 }
 
 impl SceneView {
@@ -65,12 +73,19 @@ impl SceneView {
     #[must_use]
     pub fn of(extent: [f64; 2]) -> Self {
         Self {
-            camera: Camera::of(extent),
+            camera: first_camera(extent),
             extent,
             hand: ToolTarget::above(extent),
-            has_lines: false,
+            look: SceneLook::default(),
+            detail: PictureDetail::default(),
             deepest: 0.0,
         }
+    }
+
+    /// The same of a surface of other lengths in mm, looked at from the start.
+    pub fn resize(&mut self, extent: [f64; 2]) {
+        let (look, detail) = (self.look, self.detail.clone());
+        *self = Self { look, detail, ..Self::of(extent) };
     }
 
     /// Where the pointer and the keys want the tool.
@@ -78,27 +93,129 @@ impl SceneView {
         &self.hand
     }
 
-    pub fn reset(&mut self) {
-        self.camera = Camera::of(self.extent);
+    /// The longer side in mm.
+    pub fn side_mm(&self) -> f64 {
+        self.extent[0].max(self.extent[1])
     }
 
-    /// Draws the scene in the space there is; the hand follows pointer and keys.
-    pub fn ui(&mut self, ui: &mut Ui, shown: &ScenePicture) -> Response {
-        let size = ui.available_size().max(vec2(80.0, 80.0));
+    pub fn reset(&mut self) {
+        self.camera = first_camera(self.extent);
+    }
+
+    /// Draws the scene in the space there is, and below it how; the hand follows pointer and keys.
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        shown: &ScenePicture,
+        graphics: &mut PictureGraphics,
+    ) -> Response {
+        let size = (ui.available_size() - vec2(0.0, FOOT)).max(vec2(80.0, 80.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let response = response.named(NAME);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, NAME));
         self.take_pointer(ui, &response, rect);
         self.take_keys(ui, &response);
-        if ui.is_rect_visible(rect) {
-            let painter = ui.painter().with_clip_rect(rect);
-            self.paint(&painter, ui, rect, shown);
-            if response.has_focus() {
-                let focus = Stroke::new(1.5, tokens_of(ui).focus);
-                painter.rect_stroke(rect.shrink(1.0), 2.0, focus, eframe::egui::StrokeKind::Inside);
+        self.deepest = self.deepest.max(deepest_of(shown.now, shown.rest));
+        let frame_ms = graphics.frame_ms.filter(|_| shown.is_running);
+        let drawn = graphics
+            .abilities()
+            .map_err(str::to_owned)
+            .and_then(|abilities| self.draw(ui, rect, shown, (abilities, frame_ms)));
+        match drawn {
+            Ok(level) => self.foot_ui(ui, level, frame_ms),
+            Err(reason) => {
+                let ink = tokens_of(ui).text_quiet;
+                let words = RichText::new(reason).color(ink);
+                // The pointer reaches the picture through the words.
+                ui.put(rect.shrink(24.0), Label::new(words).wrap().selectable(false));
             }
         }
+        if response.has_focus() {
+            let focus = Stroke::new(1.5, tokens_of(ui).focus);
+            ui.painter().rect_stroke(rect.shrink(1.0), 2.0, focus, StrokeKind::Inside);
+        }
         response
+    }
+
+    /// Draws the scene at the level that it returns, or says why not.
+    fn draw(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        shown: &ScenePicture,
+        (abilities, frame_ms): (AdapterAbilities, Option<f64>),
+    ) -> Result<DetailLevel, String> {
+        let level = self.detail.next(abilities, frame_ms, self.look.has_full_detail);
+        let picture = self.picture(shown, level, ui)?;
+        let (look, lenses) = (self.look, self.lenses(rect));
+        let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+        let size_px = pixels(rect, ui.pixels_per_point());
+        painter.add(Callback::new_paint_callback(rect, TissueCallback { picture, size_px }));
+        for lens in lenses {
+            let above = OverlayPainter {
+                painter: &painter.with_clip_rect(lens.rect.intersect(painter.clip_rect())),
+                tokens: tokens_of(ui),
+                font: TextStyle::Small.resolve(ui.style()),
+            };
+            above.touch(&lens, shown, self.side_mm());
+            if let Some(legend) = look.legend(self.deepest) {
+                above.legend(lens.rect, &legend);
+            }
+        }
+        Ok(level)
+    }
+
+    /// The heights and the probe as the loop computed them.
+    fn picture(
+        &self,
+        shown: &ScenePicture,
+        level: DetailLevel,
+        ui: &Ui,
+    ) -> Result<Picture, String> {
+        let surface = self.look.field(shown.now, shown.rest).map_err(|err| err.to_string())?;
+        let [length, _] = stylus(shown.turn);
+        let drawn = self.look.probe;
+        let probe = Probe::new([0.0; 3], drawn.radius_mm(self.side_mm()))
+            .and_then(|probe| probe.of_kind(drawn.kind()).with_axis(length))
+            .and_then(|probe| probe.with_tip_at(shown.device));
+        Ok(Picture {
+            surface: Arc::new(SurfaceData::Field(surface)),
+            // A device that is lost has no place.
+            probe: probe.ok(),
+            camera: self.camera,
+            eyes: match self.look.has_two_eyes {
+                true => EyeLayout::SideBySide,
+                false => EyeLayout::Single,
+            },
+            look: self.look.look(self.side_mm(), self.deepest, tokens_of(ui)),
+            level,
+        })
+    }
+
+    /// How the picture was drawn.
+    fn foot_ui(&self, ui: &mut Ui, level: DetailLevel, frame_ms: Option<f64>) {
+        let parts = [
+            frame_ms.map(|frame_ms| format!("{frame_ms:.0} ms a frame")),
+            Some(level.to_string()),
+            self.look.contour_words(self.deepest),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        quiet_ui(ui, parts.join("; "));
+    }
+
+    /// What is seen, and where: one picture or one for each eye.
+    fn lenses(&self, rect: Rect) -> Vec<Lens> {
+        match self.look.has_two_eyes {
+            true => Lens::pair(self.camera, rect).into(),
+            false => vec![Lens::single(self.camera, rect)],
+        }
+    }
+
+    /// The place on the surface at rest under a point of the screen.
+    fn pick(&self, rect: Rect, at: Pos2) -> Option<[f64; 2]> {
+        let lenses = self.lenses(rect);
+        let under = lenses.iter().find(|lens| lens.rect.contains(at)).or(lenses.first())?;
+        under.pick(at, 0.0)
     }
 
     fn take_pointer(&mut self, ui: &Ui, response: &Response, rect: Rect) {
@@ -118,7 +235,7 @@ impl SceneView {
             events.any(|event| matches!(event, Event::PointerMoved(_)))
         });
         if let Some(at) = pointer.filter(|_| presses || is_moved)
-            && let Some(place) = self.camera.lens(rect).pick(at, 0.0)
+            && let Some(place) = self.pick(rect, at)
         {
             self.hand.go(place);
         }
@@ -171,130 +288,21 @@ impl SceneView {
             }
         }
     }
-
-    fn paint(&mut self, painter: &Painter, ui: &Ui, rect: Rect, shown: &ScenePicture) {
-        let tokens = tokens_of(ui);
-        let font = TextStyle::Small.resolve(ui.style());
-        let lens = self.camera.lens(rect);
-        let size = self.extent[0].max(self.extent[1]);
-        let look = SurfaceStyle {
-            deepest: colour_depth(self.deepest),
-            // White in both themes: the colours before which they stand are the same.
-            lines: self.has_lines.then_some(tokens.on_alarm.gamma_multiply(0.5)),
-        };
-        let [x, y, _] = shown.contact.unwrap_or(shown.device);
-        let tool = shown.now.grid().nearest(x, y);
-        let drawn = facets(shown.now, shown.rest, &lens, look, rect.height(), tool);
-        self.deepest = self.deepest.max(drawn.deepest);
-        painter.add(Shape::mesh(drawn.mesh));
-        // The stylus is above what it touches; the force is drawn before both.
-        stylus_shape(painter, &lens, shown, size, tokens);
-        if let Some(seen) = shown.contact.and_then(|contact| lens.see(contact)) {
-            let radius = (CONTACT * size * lens.points_per_mm(seen.distance)) as f32;
-            painter.circle(seen.at, radius.max(3.0), tokens.canvas, Stroke::new(1.5, tokens.text));
-        }
-        force_shape(painter, &lens, shown, size, tokens, &font);
-        bar_shape(painter, rect, look.deepest, tokens, &font);
-        if drawn.every > 1 {
-            let words =
-                format!("the picture shows one of every {} nodes along each side", drawn.every);
-            let at = rect.left_bottom() + vec2(EDGE, -EDGE);
-            painter.text(at, Align2::LEFT_BOTTOM, words, font, tokens.text_quiet);
-        }
-    }
 }
 
-/// A stylus: a cone from the tip, its button to one side.
-fn stylus_shape(painter: &Painter, lens: &Lens, shown: &ScenePicture, size: f64, tokens: &Tokens) {
-    let [length, button] = stylus(shown.turn);
-    let end = along(shown.device, length, STYLUS * size);
-    let (Some(tip), Some(top)) = (lens.see(shown.device), lens.see(end)) else { return };
-    let thick = |radius: f64, distance: f64| (radius * size * lens.points_per_mm(distance)) as f32;
-    let aside = (top.at - tip.at).normalized().rot90();
-    let (thin, wide) = (thick(0.003, tip.distance), thick(0.014, top.distance));
-    let corners = [
-        tip.at - aside * thin,
-        tip.at + aside * thin,
-        top.at + aside * wide,
-        top.at - aside * wide,
-    ];
-    let edge = Stroke::new(1.0, tokens.canvas);
-    painter.add(Shape::convex_polygon(corners.to_vec(), tokens.active_fill, edge));
-    painter.circle(top.at, wide, tokens.active_fill, edge);
-    let middle = along(shown.device, length, 0.6 * STYLUS * size);
-    if let Some(seen) = lens.see(along(middle, button, 0.012 * size)) {
-        painter.circle(seen.at, thick(0.005, seen.distance), tokens.canvas, Stroke::NONE);
-    }
-}
-
-/// The force as an arrow from where the device touches, with its size in words.
-fn force_shape(
-    painter: &Painter,
-    lens: &Lens,
-    shown: &ScenePicture,
-    size: f64,
-    tokens: &Tokens,
-    font: &FontId,
-) {
-    let newtons = super::camera::dot(shown.force, shown.force).sqrt();
-    if newtons.is_nan() || newtons < ARROW_MIN {
-        return;
-    }
-    let from = shown.contact.unwrap_or(shown.device);
-    let to = along(from, shown.force, size / 4.0 / ARROW_NEWTONS);
-    if let (Some(from), Some(to)) = (lens.see(from), lens.see(to)) {
-        painter.arrow(from.at, to.at - from.at, Stroke::new(3.0, tokens.limit));
-        let beside = to.at + vec2(8.0, 0.0);
-        let words = format!("{newtons:.2} N");
-        label(painter, beside, &words, tokens, font);
-    }
-}
-
-/// Words on a ground of their own, so that they are readable before anything.
-fn label(painter: &Painter, at: Pos2, words: &str, tokens: &Tokens, font: &FontId) {
-    let text = painter.layout_no_wrap(words.to_owned(), font.clone(), tokens.text);
-    let rect = Align2::LEFT_CENTER.anchor_size(at, text.size());
-    painter.rect_filled(rect.expand(3.0), 2.0, tokens.canvas);
-    painter.galley(rect.min, text, tokens.text);
-}
-
-/// The colours and the depths that they stand for.
-fn bar_shape(painter: &Painter, rect: Rect, deepest: f64, tokens: &Tokens, font: &FontId) {
-    let [wide, high] = [BAR[0], BAR[1].min(rect.height() - 4.0 * EDGE)];
-    let top = pos2(rect.right() - EDGE - wide - 40.0, rect.top() + 2.5 * EDGE);
-    let mut mesh = Mesh::default();
-    const STEPS: u32 = 64;
-    for step in 0..=STEPS {
-        let share = step as f32 / STEPS as f32;
-        let colour = viridis(share);
-        let y = top.y + share * high;
-        mesh.colored_vertex(pos2(top.x, y), colour);
-        mesh.colored_vertex(pos2(top.x + wide, y), colour);
-        if step > 0 {
-            let first = 2 * (step - 1);
-            mesh.add_triangle(first, first + 1, first + 2);
-            mesh.add_triangle(first + 1, first + 3, first + 2);
-        }
-    }
-    painter.add(Shape::mesh(mesh));
-    let text = |at: Pos2, align: Align2, words: String| {
-        painter.text(at, align, words, font.clone(), tokens.text_quiet);
+/// Width and height in pixels, with the edges where egui has them.
+fn pixels(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
+    let side = |low: f32, high: f32| {
+        let [low, high] = [low, high].map(|edge| (edge * pixels_per_point).round());
+        (high - low).max(1.0) as u32
     };
-    text(
-        pos2(rect.right() - EDGE, rect.top() + EDGE),
-        Align2::RIGHT_CENTER,
-        "depth (mm)".to_owned(),
-    );
-    for share in [0.0_f32, 0.5, 1.0] {
-        let at = pos2(top.x + wide + 6.0, top.y + share * high);
-        text(at, Align2::LEFT_CENTER, format!("{}", f64::from(share) * deepest));
-    }
+    [side(rect.left(), rect.right()), side(rect.top(), rect.bottom())]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use eframe::egui::{CentralPanel, Context, Modifiers, RawInput};
+    use eframe::egui::{CentralPanel, Context, Modifiers, RawInput, pos2};
     use palpate_haptics::surface::Grid;
 
     /// One frame of a picture of 800 by 600 points.
@@ -308,6 +316,7 @@ mod tests {
             turn: [0.0, 0.5, 0.0],
             contact: None,
             force: [0.0, 0.0, f64::NAN],
+            is_running: false,
         };
         let input = RawInput {
             screen_rect: Some(Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0))),
@@ -321,7 +330,7 @@ mod tests {
             let content = |ui: &mut Ui| {
                 // Something that the arrows would lead to.
                 let _ = ui.button("beside");
-                view.ui(ui, &shown)
+                view.ui(ui, &shown, &mut PictureGraphics::default())
             };
             response = Some(panel.show(ui, content).inner);
         });
@@ -346,7 +355,7 @@ mod tests {
         let rect = frame(&ctx, &mut view, 0.0, Vec::new()).rect;
         frame(&ctx, &mut view, 0.1, vec![Event::PointerMoved(at)]);
         assert!(view.hand().at()[2] > 0.0);
-        let picked = view.camera.lens(rect).pick(at, 0.0).unwrap();
+        let picked = view.pick(rect, at).unwrap();
         assert!((view.hand().at()[0] - picked[0]).abs() < 1e-9);
         let before = view.camera;
         frame(&ctx, &mut view, 0.2, vec![button(at, PointerButton::Primary, true)]);

@@ -1,5 +1,6 @@
 //! How often the window is drawn: as often as an eye needs, and rarely while no key or pointer is used.
 
+use crate::scene::detail::frame_ms;
 use eframe::egui::Context;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,6 +27,8 @@ pub struct FramePace {
     is_unused: Arc<AtomicBool>,
     /// Whether another thread has asked since the last frame: each time wakes the window's thread.
     is_asked: Arc<AtomicBool>,
+    /// How long after the last frame the next one was wanted, while something moves.
+    moving: Option<Duration>,
 }
 
 impl FramePace {
@@ -38,7 +41,16 @@ impl FramePace {
         let is_unused = now > self.used_at + UNUSED_S;
         self.is_unused.store(is_unused, Ordering::Relaxed);
         self.is_asked.store(false, Ordering::Relaxed);
-        ctx.request_repaint_after(if is_moving { moving(frame_s) } else { resting(is_unused) });
+        self.moving = is_moving.then(|| moving(frame_s));
+        ctx.request_repaint_after(self.moving.unwrap_or(resting(is_unused)));
+    }
+
+    /// What the last frame took in ms, where this one follows it because something moves. `frame_s` is the work of this
+    /// thread for it, in s.
+    pub fn frame_ms(&self, ctx: &Context, frame_s: Option<f32>) -> Option<f64> {
+        let apart_s = f64::from(ctx.input(|input| input.unstable_dt));
+        let [wanted_s, work_s] = [self.moving?.as_secs_f64(), f64::from(frame_s?)];
+        Some(frame_ms(1e3 * apart_s, 1e3 * wanted_s, 1e3 * work_s))
     }
 
     /// Requests a frame from another thread.
@@ -93,7 +105,12 @@ mod tests {
         let unused = next(&mut pace, &ctx, 10.0, Vec::new(), [false; 2]);
         assert!(unused > RESTING && unused <= UNUSED, "{unused:?}");
         assert!(next(&mut pace, &ctx, 20.0, Vec::new(), [false, true]) <= RESTING);
+        assert_eq!(pace.frame_ms(&ctx, Some(0.005)), None, "at rest frames follow from nothing");
         assert!(next(&mut pace, &ctx, 30.0, Vec::new(), [true, false]) <= MOVING);
+        assert!(
+            pace.frame_ms(&ctx, Some(0.005)).is_some_and(|took| took > 9e3),
+            "ten seconds late"
+        );
         let key = Event::Key {
             key: Key::F12,
             physical_key: None,

@@ -2,8 +2,9 @@
 
 use super::SceneScreen;
 use crate::plots::figure::strip_ui;
+use crate::scene::graphics::PictureGraphics;
 use crate::scene::view::ScenePicture;
-use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui, tick_box};
+use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui};
 use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene, SceneInstant};
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Ui, vec2};
@@ -18,7 +19,7 @@ pub(super) enum PictureSource {
 }
 
 /// Share of the height that the picture gets.
-const PICTURE_SHARE: f32 = 0.52;
+const PICTURE_SHARE: f32 = 0.6;
 /// Room for a legend.
 const HEAD: f32 = 32.0;
 
@@ -70,7 +71,7 @@ fn shown_scene<'a>(
 }
 
 impl SceneScreen {
-    pub fn draw_middle(&mut self, ui: &mut Ui) {
+    pub fn draw_middle(&mut self, ui: &mut Ui, graphics: &mut PictureGraphics) {
         ui.horizontal(|ui| {
             for (side, name) in
                 [(PictureSource::Computed, "Computed"), (PictureSource::Live, "Live")]
@@ -78,7 +79,6 @@ impl SceneScreen {
                 ui.selectable_value(&mut self.side, side, name).named(name);
             }
             ui.separator();
-            tick_box(ui, &mut self.view.has_lines, "mesh lines");
             if ui.button("Reset camera").clicked() {
                 self.view.reset();
             }
@@ -109,10 +109,12 @@ impl SceneScreen {
             turn: tick.turn,
             contact: tick.is_contact().then_some(tick.proxy),
             force: tick.force,
+            is_running: self.side == PictureSource::Live
+                && self.live.as_ref().is_some_and(LiveScene::is_running),
         };
         let height = PICTURE_SHARE * ui.available_height();
         let size = vec2(ui.available_width(), height);
-        ui.allocate_ui(size, |ui| self.view.ui(ui, &picture));
+        ui.allocate_ui(size, |ui| self.view.ui(ui, &picture, graphics));
         let curve = |name, ink, of: fn(&ForcePoint) -> f64| {
             PlotSeries::line(
                 name,

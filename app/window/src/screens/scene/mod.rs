@@ -8,6 +8,7 @@ mod right;
 
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::tape::{TapePanel, loop_button_ui};
+use crate::scene::look::SceneLook;
 use crate::scene::view::SceneView;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
 use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, compute_path};
@@ -22,6 +23,7 @@ use palpate_haptics::scene::{HandPose, SceneSettings};
 use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
 use plan::PlannedScene;
+use serde_json::Value;
 use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
@@ -158,9 +160,7 @@ impl SceneScreen {
     fn look_at(&mut self, settings: &SceneSettings) {
         if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
             self.viewed_mm = settings.side_mm;
-            let has_lines = self.view.has_lines;
-            self.view = SceneView::of([settings.side_mm; 2]);
-            self.view.has_lines = has_lines;
+            self.view.resize([settings.side_mm; 2]);
         }
     }
 
@@ -203,13 +203,16 @@ impl Screen for SceneScreen {
             }
         };
         quiet_ui(ui, words);
+        section_ui(ui, "Picture");
+        let side_mm = self.view.side_mm();
+        self.view.look.ui(ui, side_mm);
         ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
         self.plan_ui(ui, is_running, commands);
         self.tape.ui(ui, is_running, replay);
     }
 
-    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
-        self.draw_middle(ui);
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, _commands: &mut Commands) {
+        self.draw_middle(ui, &mut workbench.graphics);
     }
 
     fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
@@ -292,6 +295,14 @@ impl Screen for SceneScreen {
     fn close(&mut self) {
         self.stop();
         self.tape.settle();
+    }
+
+    fn layout(&self) -> Option<Value> {
+        self.view.look.kept()
+    }
+
+    fn take_layout(&mut self, kept: &Value) {
+        self.view.look = SceneLook::from_kept(kept);
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
