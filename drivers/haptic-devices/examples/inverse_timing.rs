@@ -104,11 +104,11 @@ fn time_ticks(
     println!("delay for the margin: {:.2} ticks of 1 ms", device.loop_device().delay_ticks);
     let settings = SceneSettings::default().with_device(*device.settings());
     let mut scene = Scene::new(settings)?;
-    let (mut beat, mut lates, mut works) = (Beat::new(), Vec::new(), Vec::new());
+    let (mut beat, mut latenesses, mut works) = (Beat::new(), Vec::new(), Vec::new());
     let (mut touching, mut stale, mut before) = (0_u64, 0_u64, 0);
     let monitor = device.monitor();
     for _ in 0..1000 * seconds {
-        lates.push(beat.wait());
+        latenesses.push(beat.wait());
         let begin = Instant::now();
         let pose = device.sense(1);
         let tick = scene.render(pose, 1);
@@ -120,7 +120,7 @@ fn time_ticks(
         before = reports;
     }
     print_percentiles("tick: sense, scene, give", works);
-    print_percentiles("lateness of the tick", lates);
+    print_percentiles("lateness of the tick", latenesses);
     println!(
         "in contact in {touching} ticks; ticks without a new report: {stale}; {:?}",
         monitor.report()

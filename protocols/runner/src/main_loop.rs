@@ -34,7 +34,7 @@ const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
 const STRIDE_AT_REST: Nanos = Nanos::from_millis(50);
 
 /// A counter at rest may flicker by so much.
-const DISPLACED_PULSES: i64 = 1;
+const DISPLACED_PULSES: u64 = 1;
 
 /// How far time runs between looks at the requests, at full pace.
 const STRIDE_MAX: Nanos = Nanos::from_millis(100);
@@ -351,7 +351,7 @@ impl MainLoop {
     fn is_displaced(&self, reading: &Reading) -> bool {
         let has_jumped = self.reading.is_some_and(|last| {
             let is_moving = |one: &Reading| one.status.has(AxisStatus::MOVING);
-            let way = (reading.pulses - last.pulses).abs();
+            let way = reading.pulses.abs_diff(last.pulses);
             way > DISPLACED_PULSES && !is_moving(&last) && !is_moving(reading)
         });
         has_jumped || !reading.status.has(AxisStatus::MOTOR_ON)

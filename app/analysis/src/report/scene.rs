@@ -16,11 +16,7 @@ pub fn played_text(played: &SceneRun) -> String {
     };
     let mut lines = vec![format!(
         "scene '{}', {tissue}, path {}: {} ticks, depth up to {:.2} mm, force up to {:.2} N",
-        played.name,
-        played.path,
-        played.ticks,
-        played.depth_max_mm,
-        played.force_max_n
+        played.name, played.path, played.ticks, played.depth_max_mm, played.force_max_n
     )];
     for (why, share) in &played.why {
         lines.push(format!("{:>4.0} %  {why}", 100.0 * share));
