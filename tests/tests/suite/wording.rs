@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 /// Names outside the code that are written like a type's.
-const PROPER_NAMES: [&str; 33] = [
+const PROPER_NAMES: [&str; 35] = [
     // Programs, libraries, repositories and formats.
     "AppImage",
     "CarbonFiberData",
@@ -16,6 +16,7 @@ const PROPER_NAMES: [&str; 33] = [
     "GitHub",
     "JavaScript",
     "LaTeX",
+    "MeshLab",
     "ModemManager",
     "JuliaRheology",
     "MiB",
@@ -30,6 +31,7 @@ const PROPER_NAMES: [&str; 33] = [
     "SarahIaquinta",
     "SplitMix64",
     "StephenQiu628",
+    "WebGPU",
     "WebSocket",
     "WireGuard",
     "WorkflowHub",

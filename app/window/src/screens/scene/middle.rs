@@ -19,7 +19,7 @@ pub(super) enum PictureSource {
 }
 
 /// Share of the height that the picture gets.
-const PICTURE_SHARE: f32 = 0.6;
+const PICTURE_SHARE: f32 = 0.56;
 /// Room for a legend.
 const HEAD: f32 = 32.0;
 
