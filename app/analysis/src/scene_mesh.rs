@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Longest mesh file: glTF with a million triangles and all that a program may add to them.
-const BYTES_MAX: u64 = 1 << 30;
+const BYTES_MAX: u64 = 1_000_000_000;
 
 /// The mesh of a scene that ran.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -146,7 +146,7 @@ fn open(
     }
     let size = std::fs::metadata(&path).map_err(unreadable)?.len();
     if size > BYTES_MAX {
-        return Err(format!("{name} is larger than 1 GiB; decimate the mesh"));
+        return Err(format!("{name} is larger than 1 GB; decimate the mesh"));
     }
     let bytes = std::fs::read(&path).map_err(unreadable)?;
     let hash = sha256(&bytes);

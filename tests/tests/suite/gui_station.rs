@@ -10,7 +10,7 @@ use palpate_window::screens::rig;
 use palpate_window::window::WindowOptions;
 
 const QUEUE: &str = "format = \"palpate-remote-queue 1\"\nname = \"speeds of gel 7\"\nprotocol = \"ramp-hold\"\nruns = 3\n\
-    [choose.speed]\nfrom = \"0.6 mm/s\"\nto = \"7.8 mm/s\"\n";
+    [set]\ndepth = \"6 mm\"\n[choose.speed]\nfrom = \"0.6 mm/s\"\nto = \"7.8 mm/s\"\n";
 
 const ARMED: &str = "Runs may start over the network: queue 'speeds of gel 7'";
 
