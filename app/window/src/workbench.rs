@@ -334,11 +334,11 @@ impl Workbench {
     pub fn operator(&mut self, choice: Operator) {
         let passed = self.runner.send_choice(choice);
         self.keep_refusal(passed);
-        if matches!(choice, Operator::Stop | Operator::Halt | Operator::Abort) {
-            if self.station.disarm_for_stop("a person at the rig stopped it") {
-                let passed = self.runner.send_choice(choice);
-                self.keep_refusal(passed);
-            }
+        if matches!(choice, Operator::Stop | Operator::Halt | Operator::Abort)
+            && self.station.disarm_for_stop("a person at the rig stopped it")
+        {
+            let passed = self.runner.send_choice(choice);
+            self.keep_refusal(passed);
         }
     }
 
