@@ -173,13 +173,6 @@ pub fn viridis(share: f32) -> Color32 {
     Color32::from_rgb(mix(0), mix(1), mix(2))
 }
 
-/// A colour in a share of the light that shows it as it is.
-#[must_use]
-pub fn dimmed(color: Color32, light: f32) -> Color32 {
-    let [r, g, b, _] = Rgba::from(color).to_array();
-    Rgba::from_rgb(r * light, g * light, b * light).into()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

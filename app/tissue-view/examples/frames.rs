@@ -8,8 +8,8 @@ mod dent;
 
 use dent::Dent;
 use palpate_tissue_view::{
-    DetailLevel, EyeLayout, FieldData, LEVELS, LevelChooser, Look, OffScreen, Picture, Screen,
-    SurfaceData,
+    DetailLevel, EyeLayout, FieldData, LEVELS, LevelChooser, OffScreen, Picture, Screen,
+    SurfaceData, SurfaceStyle,
 };
 use std::error::Error;
 use std::sync::Arc;
@@ -56,7 +56,7 @@ fn milliseconds(mut times: Vec<Duration>) -> [f64; 2] {
 fn main() -> Result<(), Box<dyn Error>> {
     let dent = Dent::haptic()?;
     let off_screen = OffScreen::new()?;
-    let mut look = Look::tissue(Look::LIGHT);
+    let mut look = SurfaceStyle::tissue(SurfaceStyle::LIGHT);
     look.thickness_mm = 9.0;
     let picture = Picture {
         surface: Arc::new(SurfaceData::Field(dent.field.clone())),

@@ -7,7 +7,7 @@ mod dent;
 
 use dent::Dent;
 use palpate_tissue_view::{
-    EyeLayout, LEVELS, Look, OffScreen, Picture, ProbeKind, SurfaceColours, SurfaceData,
+    EyeLayout, LEVELS, OffScreen, Picture, ProbeKind, SurfaceColours, SurfaceData, SurfaceStyle,
 };
 use std::error::Error;
 use std::io::BufWriter;
@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let words: Vec<String> = words.collect();
     let has = |word: &str| words.iter().any(|one| one == word);
     let dent = if has("hertz") { Dent::hertz()? } else { Dent::haptic()? };
-    let mut look = Look::tissue(if has("dark") { Look::DARK } else { Look::LIGHT });
+    let mut look =
+        SurfaceStyle::tissue(if has("dark") { SurfaceStyle::DARK } else { SurfaceStyle::LIGHT });
     look.thickness_mm = 9.0;
     if has("depth") {
         look.colours = SurfaceColours::Values { range: [0.0, dent.depth_mm] };

@@ -22,7 +22,7 @@ pub use camera::{Camera, Eye, FIELD_OF_VIEW, ProjectedPoint, Vec3};
 pub use gpu::{AdapterAbilities, RefusedError, TissueRenderer};
 pub use legend::{Legend, LegendTick};
 pub use level::{DetailLevel, LEVELS, LevelChooser, Shading};
-pub use look::{ColourRamp, Look, Rgb, SurfaceColours};
+pub use look::{ColourRamp, Rgb, SurfaceColours, SurfaceStyle};
 pub use off_screen::{Image, OffScreen, OffScreenError, Screen};
 pub use picture::{EyeLayout, Picture};
 pub use probe::{Probe, ProbeError, ProbeKind};

@@ -72,7 +72,7 @@ pub enum SurfaceColours {
 
 /// How a picture looks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Look {
+pub struct SurfaceStyle {
     pub colours: SurfaceColours,
     pub ramp: ColourRamp,
     /// Distance of the lines of equal depth in mm; `None` for no lines.
@@ -85,7 +85,7 @@ pub struct Look {
     pub ink: Rgb,
 }
 
-impl Look {
+impl SurfaceStyle {
     /// Before a light panel.
     pub const LIGHT: Rgb = [244, 244, 242];
     /// Before a dark panel.

@@ -2,7 +2,7 @@
 
 use crate::camera::{Camera, Eye};
 use crate::level::DetailLevel;
-use crate::look::Look;
+use crate::look::SurfaceStyle;
 use crate::probe::Probe;
 use crate::surface::SurfaceData;
 use std::sync::Arc;
@@ -33,6 +33,6 @@ pub struct Picture {
     pub probe: Option<Probe>,
     pub camera: Camera,
     pub eyes: EyeLayout,
-    pub look: Look,
+    pub look: SurfaceStyle,
     pub level: DetailLevel,
 }

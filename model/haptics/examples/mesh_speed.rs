@@ -9,6 +9,8 @@
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
+mod timing;
+
 use palpate_haptics::surface::SurfaceRecovery;
 use palpate_haptics::triangles::shapes::stomach;
 use palpate_haptics::triangles::{
@@ -21,9 +23,7 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// Products one after the other that take some 15 microseconds.
-const ROUNDS: usize = 10_000;
+use timing::{measure_machine, percentiles};
 /// Way of the device in a tick in mm: 100 mm/s.
 const STEP_MM: f64 = 0.1;
 
@@ -84,13 +84,6 @@ fn around(mesh: &TriangleMesh, way: f64, depth: f64) -> [f64; 3] {
     })
 }
 
-/// Percentiles of times in microseconds.
-fn percentiles(times: &mut [f64]) -> [f64; 4] {
-    times.sort_by(f64::total_cmp);
-    let at = |share: f64| times[((share * times.len() as f64) as usize).min(times.len() - 1)];
-    [at(0.5), at(0.99), at(0.999), at(1.0)]
-}
-
 fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
     let recovery = match case {
         Case::Trail => SurfaceRecovery::new(Seconds(1.0), Seconds(1e-3)).expect("a recovery"),
@@ -127,22 +120,6 @@ fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
         "{:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{moved:>10}{contacts:>10}",
         case.name()
     );
-}
-
-/// What the machine alone adds: the same few instructions each time, without memory.
-fn measure_machine(ticks: usize) {
-    let mut times: Vec<f64> = Vec::with_capacity(ticks);
-    for _ in 0..ticks {
-        let start = Instant::now();
-        let mut state = black_box(1u64);
-        for _ in 0..ROUNDS {
-            state = state.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(17);
-        }
-        black_box(state);
-        times.push(start.elapsed().as_secs_f64() * 1e6);
-    }
-    let [p50, p99, p999, max] = percentiles(&mut times);
-    println!("the machine alone, {ROUNDS} products: {p50:.1}, {p99:.1}, {p999:.1}, {max:.1}");
 }
 
 fn main() {

@@ -15,6 +15,8 @@
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
+mod timing;
+
 use palpate_haptics::surface::{
     ContactSide, Cut, Grid, GridNode, HeightField, Surface, SurfaceContact, SurfaceMethod,
     SurfaceRecovery,
@@ -23,6 +25,7 @@ use palpate_model::Seconds;
 use palpate_test_support::naive_surface as naive;
 use std::hint::black_box;
 use std::time::Instant;
+use timing::{measure_machine, percentiles};
 
 /// A tick at 1 kHz.
 const TICK: f64 = 1e-3;
@@ -30,8 +33,6 @@ const TICK: f64 = 1e-3;
 const TAU: f64 = 1.023;
 /// Of neighbours, in mm.
 const SHEAR: f64 = 0.05;
-/// Products one after the other that take some 15 microseconds.
-const ROUNDS: usize = 10_000;
 /// Naive ticks: a hundredth of the others, since each takes up to a second.
 const NAIVE_SHARE: usize = 100;
 
@@ -66,13 +67,6 @@ impl Case {
             }
         }
     }
-}
-
-/// Percentiles of times in microseconds.
-fn percentiles(times: &mut [f64]) -> [f64; 4] {
-    times.sort_by(f64::total_cmp);
-    let at = |share: f64| times[((share * times.len() as f64) as usize).min(times.len() - 1)];
-    [at(0.5), at(0.99), at(0.999), at(1.0)]
 }
 
 fn line(name: &str, times: &mut [f64], nodes_per_tick: f64) -> f64 {
@@ -124,22 +118,6 @@ fn measure_naive(n: usize, case: Case, ticks: usize) -> f64 {
     }
     black_box(&now);
     line("naive", &mut chain, moved as f64 / ticks as f64)
-}
-
-/// What the machine alone adds: the same few instructions each time, without memory.
-fn measure_machine(ticks: usize) {
-    let mut times: Vec<f64> = Vec::with_capacity(ticks);
-    for _ in 0..ticks {
-        let start = Instant::now();
-        let mut state = black_box(1u64);
-        for _ in 0..ROUNDS {
-            state = state.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(17);
-        }
-        black_box(state);
-        times.push(start.elapsed().as_secs_f64() * 1e6);
-    }
-    let [p50, p99, p999, max] = percentiles(&mut times);
-    println!("the machine alone, {ROUNDS} products: {p50:.1}, {p99:.1}, {p999:.1}, {max:.1}");
 }
 
 fn main() {

@@ -2,13 +2,13 @@
 
 use super::off_screen;
 use palpate_tissue_view::{
-    Camera, ColourRamp, EyeLayout, FieldData, LEVELS, Look, Picture, Probe, SurfaceData,
+    Camera, ColourRamp, EyeLayout, FieldData, LEVELS, Picture, Probe, SurfaceData, SurfaceStyle,
 };
 use std::sync::Arc;
 
 const SIZE: [u32; 2] = [160, 100];
 
-fn picture(field: FieldData, look: Look) -> Picture {
+fn picture(field: FieldData, look: SurfaceStyle) -> Picture {
     Picture {
         camera: Camera::of(field.extent()),
         surface: Arc::new(SurfaceData::Field(field)),
@@ -31,7 +31,10 @@ fn a_value_has_the_hue_of_its_legend() {
     for (value, share) in [(2.0, 0.0), (3.0, 0.25), (4.0, 0.5), (6.0, 1.0), (9.0, 1.0)] {
         let field = FieldData::new(5, 10.0, &[0.0; 25]).unwrap();
         let field = field.with_values(vec![value; 25]).unwrap();
-        let look = Look { ramp: ramp.clone(), ..Look::values([2.0, 6.0], Look::LIGHT) };
+        let look = SurfaceStyle {
+            ramp: ramp.clone(),
+            ..SurfaceStyle::values([2.0, 6.0], SurfaceStyle::LIGHT)
+        };
         let image = off_screen.colours(&picture(field, look), SIZE).unwrap();
         let middle = image.pixels[(SIZE[1] / 2 * SIZE[0] + SIZE[0] / 2) as usize];
         let wanted = ramp.at(share);
@@ -51,7 +54,7 @@ fn the_window_shows_the_bytes_that_were_drawn() {
     let Some(mut off_screen) = off_screen() else { return };
     let heights: Vec<f64> = (0..31 * 31).map(|index| f64::from(index % 31 % 7) * 0.1).collect();
     let field = FieldData::new(31, 2.0, &heights).unwrap();
-    let mut picture = picture(field, Look::tissue(Look::LIGHT));
+    let mut picture = picture(field, SurfaceStyle::tissue(SurfaceStyle::LIGHT));
     picture.probe = Some(Probe::new([30.0, 30.0, 5.0], 5.0).unwrap());
     let screen = off_screen.screen(SIZE);
     for level in LEVELS {
@@ -77,9 +80,10 @@ fn the_window_shows_the_bytes_that_were_drawn() {
 #[test]
 fn the_background_is_the_panel() {
     let Some(mut off_screen) = off_screen() else { return };
-    for background in [Look::LIGHT, Look::DARK] {
+    for background in [SurfaceStyle::LIGHT, SurfaceStyle::DARK] {
         let field = FieldData::new(3, 20.0, &[0.0; 9]).unwrap();
-        let image = off_screen.colours(&picture(field, Look::tissue(background)), SIZE).unwrap();
+        let image =
+            off_screen.colours(&picture(field, SurfaceStyle::tissue(background)), SIZE).unwrap();
         let [red, green, blue] = background;
         assert_eq!(image.pixels[0], [red, green, blue, 255]);
     }
@@ -91,7 +95,7 @@ fn lines_of_equal_depth_are_where_the_depth_is() {
     // A plane that goes down along x: 6 mm over 60, with a line every 2 mm.
     let heights: Vec<f64> = (0..61 * 61).map(|index| -0.1 * f64::from(index % 61)).collect();
     let field = FieldData::new(61, 1.0, &heights).unwrap().with_rest(&[0.0; 61 * 61]).unwrap();
-    let mut look = Look::values([0.0, 1.0], Look::LIGHT);
+    let mut look = SurfaceStyle::values([0.0, 1.0], SurfaceStyle::LIGHT);
     look.ink = [0, 0, 0];
     let field = field.with_values(vec![1.0; 61 * 61]).unwrap();
     let mut picture = picture(field, look);

@@ -8,8 +8,8 @@
 use super::off_screen;
 use super::ray_caster::{Hit, HitKind, Reference, angle};
 use palpate_tissue_view::{
-    Camera, DetailLevel, Eye, EyeLayout, FIELD_OF_VIEW, FieldData, Image, LEVELS, Look, MeshData,
-    Picture, Probe, ProbeKind, SurfaceData,
+    Camera, DetailLevel, Eye, EyeLayout, FIELD_OF_VIEW, FieldData, Image, LEVELS, MeshData,
+    Picture, Probe, ProbeKind, SurfaceData, SurfaceStyle,
 };
 use std::sync::Arc;
 
@@ -41,7 +41,7 @@ fn picture(reference: &Reference, eyes: EyeLayout) -> Picture {
             .map(|(centre, radius)| Probe::new(centre, radius).unwrap().of_kind(ProbeKind::Glove)),
         camera,
         eyes,
-        look: Look::tissue(Look::LIGHT),
+        look: SurfaceStyle::tissue(SurfaceStyle::LIGHT),
         level: LEVELS[0],
     }
 }
@@ -209,7 +209,7 @@ fn the_tip_is_as_large_as_its_radius_is_from_there() {
             probe: Some(Probe::new(centre, radius).unwrap()),
             camera,
             eyes: EyeLayout::Single,
-            look: Look::tissue(Look::DARK),
+            look: SurfaceStyle::tissue(SurfaceStyle::DARK),
             level: LEVELS[0],
         };
         let image = off_screen.normals(&picture, size).unwrap();

@@ -7,7 +7,7 @@ use palpate_figures::drawing::round_up;
 use palpate_figures::tokens::viridis;
 use palpate_haptics::surface::Heights;
 use palpate_tissue_view::{
-    ColourRamp, FieldData, Legend, Look, ProbeKind, Rgb, SurfaceColours, SurfaceError,
+    ColourRamp, FieldData, Legend, ProbeKind, Rgb, SurfaceColours, SurfaceError, SurfaceStyle,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -113,9 +113,9 @@ impl SceneLook {
     }
 
     /// The look of a surface of this side that was `deepest` at most, both in mm.
-    pub fn look(&self, side_mm: f64, deepest: f64, tokens: &Tokens) -> Look {
+    pub fn look(&self, side_mm: f64, deepest: f64, tokens: &Tokens) -> SurfaceStyle {
         let range = [0.0, colour_depth(deepest)];
-        let mut look = Look::values(range, rgb(tokens.canvas));
+        let mut look = SurfaceStyle::values(range, rgb(tokens.canvas));
         if self.colours == SceneColours::Tissue {
             look.colours = SurfaceColours::Tissue { has_texture: true };
         }

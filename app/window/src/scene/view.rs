@@ -27,10 +27,8 @@ const ORBIT: [f64; 2] = [0.008, 0.1];
 const ZOOM: [f64; 2] = [0.002, 1.15];
 /// Depth per point of the wheel, in mm.
 const WHEEL_MM: f64 = 0.02;
-/// How much nearer than where all of the surface is seen from the camera begins.
-const NEARER: f64 = 1.08;
-/// How far below the surface it looks, in lengths of the scene.
-const LOWER: f64 = 0.06;
+/// How far below the surface the camera looks at first, in lengths of the scene: all of the block is in the picture.
+const LOWER: f64 = 0.08;
 /// Room for the line below the picture.
 const FOOT: f32 = 20.0;
 
@@ -67,9 +65,7 @@ pub struct SceneView {
 /// Looks at the middle of the block that is drawn, so that its near corner is in the picture.
 fn first_camera([wide, high]: [f64; 2]) -> Camera {
     let below = LOWER * wide.max(high);
-    let mut camera = Camera::of([wide, high]).looking_at([wide / 2.0, high / 2.0, -below]);
-    camera.zoom(NEARER);
-    camera
+    Camera::of([wide, high]).looking_at([wide / 2.0, high / 2.0, -below])
 }
 
 impl SceneView {
