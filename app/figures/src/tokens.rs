@@ -1,6 +1,6 @@
 //! Every colour of the window. Greys by default; a saturated colour means "look here".
 
-use ecolor::{Color32, Rgba};
+use ecolor::Color32;
 
 /// The colours of one theme, by use.
 #[derive(Clone, Debug, PartialEq)]
