@@ -222,11 +222,12 @@ fn a_calibration_is_measured_by_prompts_judged_kept_and_used() {
     // What is in use reads the next session.
     flow.click("Run");
     choose(&mut flow, "Ramp and hold");
-    flow.type_into("hold", "1");
+    // So long that it is stopped before it is over, however busy the computer is.
+    flow.type_into("hold", "600");
     flow.click("Start  F5");
     // The run before stays on the screen until this one has its folder.
     wait_for(&mut flow, "the new run", |run| run.outcome.is_none());
-    flow.wait_for_phase(Phase::Home);
+    flow.wait_for_phase(Phase::Hold);
     flow.click("Stop motion  F12");
     wait_for(&mut flow, "the stop", |run| run.holding.is_some());
     flow.click("Close session");
