@@ -26,6 +26,8 @@ const PROBE_MAX: Nanos = Nanos::from_millis(10);
 const UNSET_BEAT: Nanos = Nanos::from_millis(100);
 /// Time without a good answer after which the port is opened again: the firmware waits a second for the rest of a packet.
 const LOST_MAX: Nanos = Nanos::from_millis(1_500);
+/// No arm turns further.
+const DEGREES_MAX: f64 = 360.0;
 /// Span in which the speed is measured: some counts of a hand, and short beside the 50 ms in which an arm runs away.
 const SPEED_SPAN: Nanos = Nanos::from_millis(4);
 /// Places kept for it, some more than a span has.
@@ -60,7 +62,8 @@ pub enum LineState {
     Quiet { since: Nanos },
     /// The answer to a zero after that is due.
     Probing { since: Nanos },
-    /// The board has lost its set-up, and with it the arm's place: a person must open the device again.
+    /// The board has lost its set-up, and with it the arm's place: a person must open the device again. Zeros are sent all the
+    /// same, the first with a set-up.
     Unset { sent_at: Option<Nanos> },
 }
 
@@ -124,7 +127,10 @@ impl Exchange {
     pub fn begin(&mut self, now: Nanos) {
         self.lose_link();
         self.lost_since = Some(now);
-        if !matches!(self.line, LineState::Unset { .. }) {
+        if matches!(self.line, LineState::Unset { .. }) {
+            self.line = LineState::Unset { sent_at: None };
+            self.gate.set_report(ReportState::NotReady, None);
+        } else {
             self.line = LineState::Quiet { since: now };
         }
     }
@@ -226,8 +232,11 @@ impl Exchange {
 
     /// The place in mm of angles in degrees, if it can be.
     fn believe(&mut self, now: Nanos, degrees: [f64; 2]) -> Result<[f64; 2], HapiFault> {
-        let angles = degrees.map(f64::to_radians);
         self.angles = None;
+        if !degrees.iter().all(|one| one.abs() <= DEGREES_MAX) {
+            return Err(HapiFault::Angles);
+        }
+        let angles = degrees.map(f64::to_radians);
         // Where the linkage is singular no torque makes a force.
         let place = self.linkage.jacobian(angles).and_then(|_| self.linkage.place(angles));
         let place = place.ok_or(HapiFault::Angles)?;
@@ -317,8 +326,13 @@ impl Exchange {
                 write_zero(&mut self.output);
             }
             LineState::Probing { .. } if self.input == [DEVICE] => self.lose_setup(now),
-            LineState::Probing { .. } => self.probe(now),
-            LineState::Unset { .. } => {
+            LineState::Probing { .. } if self.input.is_empty() => self.probe(now),
+            LineState::Probing { .. } => {
+                self.fall_silent(now, HapiFault::Unexpected);
+                write_zero(&mut self.output);
+            }
+            LineState::Unset { sent_at: None } => self.lose_setup(now),
+            LineState::Unset { sent_at: Some(_) } => {
                 self.line = LineState::Unset { sent_at: Some(now) };
                 write_zero(&mut self.output);
             }
