@@ -366,9 +366,9 @@ fn lying(mut bytes: Vec<u8>, lie: HapiLie) -> Vec<u8> {
         HapiLie::Infinite => set(5, f32::INFINITY),
         HapiLie::Huge => set(5, 1e30),
         HapiLie::Jump => {
-            let angle = bytes.get(1..5).map_or(0.0, |four| {
-                f32::from_le_bytes([four[0], four[1], four[2], four[3]])
-            });
+            let angle = bytes
+                .get(1..5)
+                .map_or(0.0, |four| f32::from_le_bytes([four[0], four[1], four[2], four[3]]));
             if let Some(four) = bytes.get_mut(1..5) {
                 four.copy_from_slice(&(angle + 40.0).to_le_bytes());
             }

@@ -22,8 +22,8 @@ pub const BEAT: Nanos = Nanos::from_millis(1);
 const QUIET: Nanos = Nanos::from_millis(10);
 /// Time for the answer after it.
 const PROBE_MAX: Nanos = Nanos::from_millis(10);
-/// From one zero to the next to a board that has lost its set-up.
-const UNSET_BEAT: Nanos = Nanos::from_millis(100);
+/// From one zero to the next to a board that has lost the arm's place.
+const LOST_BEAT: Nanos = Nanos::from_millis(100);
 /// Time without a good answer after which the port is opened again: the firmware waits a second for the rest of a packet.
 const LOST_MAX: Nanos = Nanos::from_millis(1_500);
 /// No arm turns further.
@@ -32,7 +32,8 @@ const DEGREES_MAX: f64 = 360.0;
 const SPEED_SPAN: Nanos = Nanos::from_millis(4);
 /// Places kept for it, some more than a span has.
 const TRACK_MAX: usize = 16;
-/// A place may be this far from the last in addition to four times the largest speed, in mm: some counts of both encoders.
+/// A place may be this far from the last in addition to four times the largest speed, in mm: some counts of both encoders. Encoders
+/// that count steps do not come back from a jump.
 const JUMP_MM: f64 = 2.0;
 
 palpate_model::named! {
@@ -46,10 +47,10 @@ palpate_model::named! {
         OtherDevice = "the answer is of a different device",
         /// No finite angles, or angles that the links do not allow.
         Angles = "the angles are not finite, or the links do not allow them",
-        /// Farther from the last place than any hand moves.
-        Jump = "the position jumps",
-        /// The board knows no motors: it has restarted.
-        Unset = "the board has restarted and lost its home position",
+        /// Farther from the last place than any hand moves: the encoders have lost count.
+        Jump = "the position jumps, and with it the home position is lost",
+        /// The board knows no motors.
+        Restarted = "the board has restarted and lost its home position",
     }
 }
 
@@ -62,9 +63,9 @@ pub enum LineState {
     Quiet { since: Nanos },
     /// The answer to a zero after that is due.
     Probing { since: Nanos },
-    /// The board has lost its set-up, and with it the arm's place: a person must open the device again. Zeros are sent all the
-    /// same, the first with a set-up.
-    Unset { sent_at: Option<Nanos> },
+    /// The board has lost the arm's place: a person must open the device again. Zeros are sent all the same, the first with a
+    /// set-up.
+    Lost { sent_at: Option<Nanos> },
 }
 
 /// One board on one port.
@@ -86,7 +87,7 @@ pub struct Exchange {
     has_news: bool,
     /// The newest believed angles in rad.
     angles: Option<[f64; 2]>,
-    /// Believed places in mm with their times.
+    /// Believed places in mm, and when the packets were sent that they answer.
     track: VecDeque<(Nanos, [f64; 2])>,
     reports: u64,
     fault: Option<HapiFault>,
@@ -127,9 +128,8 @@ impl Exchange {
     pub fn begin(&mut self, now: Nanos) {
         self.lose_link();
         self.lost_since = Some(now);
-        if matches!(self.line, LineState::Unset { .. }) {
-            self.line = LineState::Unset { sent_at: None };
-            self.gate.set_report(ReportState::NotReady, None);
+        if matches!(self.line, LineState::Lost { .. }) {
+            self.lose_home();
         } else {
             self.line = LineState::Quiet { since: now };
         }
@@ -159,7 +159,7 @@ impl Exchange {
     /// Bytes of the board: the pose for the scene if they complete an answer, at no number if it cannot be believed.
     pub fn receive(&mut self, now: Nanos, bytes: &[u8]) -> Option<SensedPose> {
         match self.line {
-            LineState::Unset { .. } => return None,
+            LineState::Lost { .. } => return None,
             LineState::Quiet { .. } => {
                 if !bytes.is_empty() {
                     self.line = LineState::Quiet { since: now };
@@ -175,38 +175,39 @@ impl Exchange {
         sensed
     }
 
-    /// The next answer: its angles in degrees, or what is wrong with it.
-    fn take_answer(&mut self, now: Nanos) -> Option<Result<[f64; 2], HapiFault>> {
+    /// The next answer: when its packet was sent and its angles in degrees, or what is wrong with it.
+    fn take_answer(&mut self, now: Nanos) -> Option<Result<(Nanos, [f64; 2]), HapiFault>> {
         if self.input.is_empty() {
             return None;
         }
-        if self.waiting.is_empty() {
-            return Some(Err(self.fall_silent(now, HapiFault::Unexpected)));
-        }
+        let Some(sent) = self.waiting.front().copied() else {
+            self.fall_silent(now);
+            return Some(Err(HapiFault::Unexpected));
+        };
         let answer = *self.input.first_chunk::<ANSWER>()?;
         let Some(angles) = parse_angles(&answer) else {
-            return Some(Err(self.fall_silent(now, HapiFault::OtherDevice)));
+            self.fall_silent(now);
+            return Some(Err(HapiFault::OtherDevice));
         };
         self.input.drain(..ANSWER);
         self.waiting.pop_front();
         if matches!(self.line, LineState::Probing { .. }) {
             self.line = LineState::Talking;
         }
-        Some(Ok(angles))
+        Some(Ok((sent, angles)))
     }
 
     /// Packets and answers may not belong together any more.
-    fn fall_silent(&mut self, now: Nanos, fault: HapiFault) -> HapiFault {
+    fn fall_silent(&mut self, now: Nanos) {
         self.input.clear();
         self.waiting.clear();
         self.line = LineState::Quiet { since: now };
         self.lost_since.get_or_insert(now);
-        fault
     }
 
-    fn judge(&mut self, now: Nanos, answer: Result<[f64; 2], HapiFault>) -> SensedPose {
+    fn judge(&mut self, now: Nanos, answer: Result<(Nanos, [f64; 2]), HapiFault>) -> SensedPose {
         self.reports += 1;
-        let read = answer.and_then(|degrees| self.believe(now, degrees));
+        let read = answer.and_then(|(sent, degrees)| self.believe((sent, now), degrees));
         let state = match read {
             Ok(_) => {
                 self.lost_since = None;
@@ -214,10 +215,14 @@ impl Exchange {
             }
             Err(fault) => {
                 self.note_fault(fault);
+                self.angles = None;
                 ReportState::Bad
             }
         };
         self.gate.set_report(state, self.waiting.front().copied());
+        if read == Err(HapiFault::Jump) {
+            self.lose_home();
+        }
         let pose = read.map_or(NO_POSE, |[x, y]| Pose {
             at: self.fit.place([1e-3 * x, 1e-3 * y, 0.0], self.middle),
             turn: [0.0; 3],
@@ -225,14 +230,26 @@ impl Exchange {
         SensedPose { number: self.reports, pose }
     }
 
+    /// Where the arm is, no answer says any more.
+    fn lose_home(&mut self) {
+        self.line = LineState::Lost { sent_at: None };
+        self.input.clear();
+        self.waiting.clear();
+        self.angles = None;
+        self.gate.set_report(ReportState::NotReady, None);
+    }
+
     fn note_fault(&mut self, fault: HapiFault) {
         self.fault = Some(fault);
         self.faults += 1;
     }
 
-    /// The place in mm of angles in degrees, if it can be.
-    fn believe(&mut self, now: Nanos, degrees: [f64; 2]) -> Result<[f64; 2], HapiFault> {
-        self.angles = None;
+    /// The place in mm of angles in degrees that were sensed between two times, if it can be.
+    fn believe(
+        &mut self,
+        (sent, now): (Nanos, Nanos),
+        degrees: [f64; 2],
+    ) -> Result<[f64; 2], HapiFault> {
         if !degrees.iter().all(|one| one.abs() <= DEGREES_MAX) {
             return Err(HapiFault::Angles);
         }
@@ -240,17 +257,15 @@ impl Exchange {
         // Where the linkage is singular no torque makes a force.
         let place = self.linkage.jacobian(angles).and_then(|_| self.linkage.place(angles));
         let place = place.ok_or(HapiFault::Angles)?;
-        let last = self.track.back().copied();
-        self.track.push_back((now, place));
-        if let Some((then, before)) = last
-            && distance(before, place) > self.jump_max_mm(now.since(then))
+        if let Some((then, before)) = self.track.back()
+            // The longest that may have passed from one to the other.
+            && distance(*before, place) > self.jump_max_mm(now.since(*then))
         {
-            // One that is elsewhere is believed again where it stays.
-            self.track.drain(..self.track.len() - 1);
             return Err(HapiFault::Jump);
         }
+        self.track.push_back((sent, place));
         while self.track.len() > TRACK_MAX
-            || self.track.get(1).is_some_and(|(at, _)| now.since(*at) >= SPEED_SPAN)
+            || self.track.get(1).is_some_and(|(at, _)| sent.since(*at) >= SPEED_SPAN)
         {
             self.track.pop_front();
         }
@@ -258,10 +273,8 @@ impl Exchange {
         Ok(place)
     }
 
-    /// Answers may come in pairs, a beat of motion apart.
     fn jump_max_mm(&self, elapsed: Nanos) -> f64 {
-        let elapsed_s = Nanos(elapsed.0.max(BEAT.0)).seconds().0;
-        4.0 * self.gate.limits().speed_max_mm_per_s * elapsed_s + JUMP_MM
+        4.0 * self.gate.limits().speed_max_mm_per_s * elapsed.seconds().0 + JUMP_MM
     }
 
     /// Over the span of the track: from one answer to the next a count alone would be fast.
@@ -288,9 +301,7 @@ impl Exchange {
             }
             LineState::Quiet { since } => now.since(since) >= QUIET,
             LineState::Probing { since } => now.since(since) >= PROBE_MAX,
-            LineState::Unset { sent_at } => {
-                sent_at.is_none_or(|sent| now.since(sent) >= UNSET_BEAT)
-            }
+            LineState::Lost { sent_at } => sent_at.is_none_or(|sent| now.since(sent) >= LOST_BEAT),
         }
     }
 
@@ -306,38 +317,39 @@ impl Exchange {
         self.has_news = false;
         self.sent_at = Some(now);
         match self.line {
-            LineState::Talking if self.is_late(now) => {
-                self.fall_silent(now, HapiFault::Unexpected);
-                write_zero(&mut self.output);
-            }
+            LineState::Talking if self.is_late(now) => self.send_zero(now),
             LineState::Talking => {
                 let torques = self.torques(force);
                 write_torques(&mut self.output, torques);
                 self.expect(now);
             }
-            LineState::Quiet { since } if now.since(since) < QUIET => {
-                // The line is silent but for this zero.
-                self.line = LineState::Quiet { since: now };
-                write_zero(&mut self.output);
+            LineState::Quiet { since } if now.since(since) >= QUIET => self.probe(now),
+            // The line is silent but for this zero.
+            LineState::Quiet { .. } => self.send_zero(now),
+            LineState::Probing { since } if now.since(since) < PROBE_MAX => self.send_zero(now),
+            // A board without motors answers with its device's number alone.
+            LineState::Probing { .. } if self.input == [DEVICE] => {
+                self.note_fault(HapiFault::Restarted);
+                self.lose_home();
+                // So that the reason is known.
+                self.gate.force(now);
+                self.end_torque(now);
             }
-            LineState::Quiet { .. } => self.probe(now),
-            LineState::Probing { since } if now.since(since) < PROBE_MAX => {
-                self.fall_silent(now, HapiFault::Unexpected);
-                write_zero(&mut self.output);
-            }
-            LineState::Probing { .. } if self.input == [DEVICE] => self.lose_setup(now),
             LineState::Probing { .. } if self.input.is_empty() => self.probe(now),
-            LineState::Probing { .. } => {
-                self.fall_silent(now, HapiFault::Unexpected);
-                write_zero(&mut self.output);
-            }
-            LineState::Unset { sent_at: None } => self.lose_setup(now),
-            LineState::Unset { sent_at: Some(_) } => {
-                self.line = LineState::Unset { sent_at: Some(now) };
+            LineState::Probing { .. } => self.send_zero(now),
+            LineState::Lost { sent_at: None } => self.end_torque(now),
+            LineState::Lost { sent_at: Some(_) } => {
+                self.line = LineState::Lost { sent_at: Some(now) };
                 write_zero(&mut self.output);
             }
         }
         &self.output
+    }
+
+    /// A zero whose answer is not waited for.
+    fn send_zero(&mut self, now: Nanos) {
+        self.fall_silent(now);
+        write_zero(&mut self.output);
     }
 
     /// A zero whose answer begins the dialogue.
@@ -354,16 +366,9 @@ impl Exchange {
         self.gate.note_sent(now);
     }
 
-    /// A board without motors answers with its device's number alone, and takes no torque. It gets a set-up so that it takes
-    /// zero; where the arm is, it does not know any more.
-    fn lose_setup(&mut self, now: Nanos) {
-        self.note_fault(HapiFault::Unset);
-        self.input.clear();
-        self.waiting.clear();
-        self.angles = None;
-        self.line = LineState::Unset { sent_at: Some(now) };
-        self.gate.set_report(ReportState::NotReady, None);
-        self.gate.force(now);
+    /// Zero for a board that has lost the arm's place. One without motors takes no torque, and so it gets a set-up before.
+    fn end_torque(&mut self, now: Nanos) {
+        self.line = LineState::Lost { sent_at: Some(now) };
         write_first(&mut self.output, &self.setup);
     }
 
@@ -378,8 +383,8 @@ impl Exchange {
     /// Whether good answers have been missing for so long that the port is to be opened again.
     #[must_use]
     pub fn is_hopeless(&self, now: Nanos) -> bool {
-        let is_unset = matches!(self.line, LineState::Unset { .. });
-        !is_unset && self.lost_since.is_some_and(|since| now.since(since) > LOST_MAX)
+        let has_lost_home = matches!(self.line, LineState::Lost { .. });
+        !has_lost_home && self.lost_since.is_some_and(|since| now.since(since) > LOST_MAX)
     }
 
     /// Whether an answer is due.

@@ -45,10 +45,7 @@ impl Pantograph {
         // Over the middle of A and B, at a right angle to their way.
         let height = (self.outer_mm * self.outer_mm - half * half).sqrt();
         let share = height / (2.0 * half);
-        let p = [
-            0.5 * (a[0] + b[0]) - share * way[1],
-            0.5 * (a[1] + b[1]) + share * way[0],
-        ];
+        let p = [0.5 * (a[0] + b[0]) - share * way[1], 0.5 * (a[1] + b[1]) + share * way[0]];
         p.iter().all(|part| part.is_finite()).then_some(Joints { a, b, p })
     }
 
@@ -172,7 +169,11 @@ mod tests {
     fn places_and_torques_are_those_of_haplys_package() {
         // Angles in degrees; place in m and torques in N m of 0.5 N along x and -1.25 N along y, computed by HaplyHAPI 1.0.1.
         let cases = [
-            ([168.0, 12.0], [0.019, 0.03574204647626483], [0.0725601921212649, -0.08812999890794403]),
+            (
+                [168.0, 12.0],
+                [0.019, 0.03574204647626483],
+                [0.0725601921212649, -0.08812999890794403],
+            ),
             (
                 [120.0, 50.0],
                 [0.028016397260131096, 0.12487855748977805],
