@@ -14,12 +14,11 @@ use palpate_analysis::scene::{
     SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
 };
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
-use palpate_analysis::scene_device::{DeviceChoice, open_device};
+use palpate_analysis::scene_device::{DeviceChoice, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_analysis::trade::{TradeExtent, measure_scene};
-use palpate_haptic_devices::InverseDevice;
+use palpate_drivers::wire::DeviceAddress;
 use palpate_haptic_devices::inverse::DeadMan;
-use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -54,10 +53,10 @@ pub struct SceneRunArgs {
     /// Tissue of a specimen of a population, population:NAME#NUMBER, instead of that of the scene file
     #[arg(long, value_name = "SPECIMEN")]
     specimen: Option<String>,
-    /// A haptic device instead of the simulated hand: inverse, or inverse:NAME where several are connected
+    /// A haptic device instead of the simulated hand: inverse, inverse:NAME where several are connected, or hapi:PORT for a 2DIY in its home position
     #[arg(long, value_name = "DEVICE", value_parser = device_name, conflicts_with = "path")]
     device: Option<DeviceName>,
-    /// Where the device's service listens, ADDRESS:PORT
+    /// Where the service of an inverse listens, ADDRESS:PORT
     #[arg(
         long,
         value_name = "ADDRESS:PORT",
@@ -70,15 +69,29 @@ pub struct SceneRunArgs {
     seconds: Option<f64>,
 }
 
-/// A device's name in its service, if there is a choice.
+/// A device as it is named on the command line.
 #[derive(Clone, Debug)]
-struct DeviceName(Option<String>);
+enum DeviceName {
+    /// With its name in the service, if there is a choice.
+    Inverse(Option<String>),
+    /// At a port.
+    Hapi(DeviceAddress),
+}
 
 fn device_name(text: &str) -> Result<DeviceName, String> {
     match text.split_once(':') {
-        None if text == "inverse" => Ok(DeviceName(None)),
-        Some(("inverse", name)) if !name.is_empty() => Ok(DeviceName(Some(name.into()))),
-        _ => Err("give inverse or inverse:NAME".into()),
+        None if text == "inverse" => Ok(DeviceName::Inverse(None)),
+        Some(("inverse", name)) if !name.is_empty() => Ok(DeviceName::Inverse(Some(name.into()))),
+        Some(("hapi", port)) if !port.is_empty() => Ok(DeviceName::Hapi(board_address(port))),
+        _ => Err("give inverse, inverse:NAME or hapi:PORT, such as hapi:/dev/ttyACM0".into()),
+    }
+}
+
+/// A serial port, or an emulated one on a network. The board's USB port has no speed of its own, whatever is set.
+fn board_address(port: &str) -> DeviceAddress {
+    match port.parse::<SocketAddr>() {
+        Ok(_) => DeviceAddress::Tcp(port.into()),
+        Err(_) => DeviceAddress::Serial { port: port.into(), baud: 115_200, has_handshake: false },
     }
 }
 
@@ -192,7 +205,7 @@ fn run_scene(
     }
     let hand = match opened {
         Some(device) => {
-            SceneHand::OnDevice { device: Box::new(device), seconds, is_ending: &is_ending }
+            SceneHand::OnDevice { device, seconds, is_ending: &is_ending }
         }
         None => {
             let laps = seconds.map_or(1, |seconds| (seconds / args.path.seconds()).ceil() as u32);
@@ -253,14 +266,20 @@ fn device(
     name: &DeviceName,
     file: &mut SceneFile,
     output: &Output,
-) -> Result<InverseDevice, Failure> {
-    let choice =
-        DeviceChoice { address: args.service, name: name.0.clone(), dead_man: DeadMan::IfPresent };
+) -> Result<OpenDevice, Failure> {
+    let choice = match name {
+        DeviceName::Inverse(name) => DeviceChoice::Inverse {
+            address: args.service,
+            name: name.clone(),
+            dead_man: DeadMan::IfPresent,
+        },
+        DeviceName::Hapi(address) => DeviceChoice::Hapi(address.clone()),
+    };
     let settings = file.settings(COARSEST).map_err(Failure::usage)?;
-    let (device, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
-    file.device = *device.settings();
+    let (opened, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
+    file.device = *opened.device.settings();
     device_lines(&report).iter().for_each(|line| output.note(line));
-    Ok(device)
+    Ok(opened)
 }
 
 fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {
