@@ -204,9 +204,7 @@ fn run_scene(
         after = Some((curves, plan));
     }
     let hand = match opened {
-        Some(device) => {
-            SceneHand::OnDevice { device, seconds, is_ending: &is_ending }
-        }
+        Some(device) => SceneHand::OnDevice { device, seconds, is_ending: &is_ending },
         None => {
             let laps = seconds.map_or(1, |seconds| (seconds / args.path.seconds()).ceil() as u32);
             SceneHand::Simulated(args.path, laps)

@@ -125,6 +125,11 @@ impl ForceGate {
         self.stop
     }
 
+    /// Another time without an answer, while a delay is measured and there is no force.
+    pub fn set_reply_silence(&mut self, silence: Nanos) {
+        self.limits.reply_silence = silence;
+    }
+
     /// A tick of the scene, with its force in N along the device's axes.
     pub fn set_order(&mut self, now: Nanos, force: [f64; 3]) {
         self.order = Some((now, force));

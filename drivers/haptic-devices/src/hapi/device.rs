@@ -20,8 +20,8 @@ use thiserror::Error;
 
 /// Packets whose round trip is measured at the start: 0.2 s of no force.
 const PINGS: usize = 200;
-/// Longest time for them all, those that are late included.
-const MEASURED_MAX: Nanos = Nanos::from_millis(5_000);
+/// Longest of them, far longer than later: there is no force.
+const PING_MAX: Nanos = Nanos::from_millis(1_000);
 /// Attempts to set the board up, and the time of each: together longer than the second for which it waits for the rest of a packet.
 const ATTEMPTS: u32 = 3;
 const ATTEMPT: Nanos = Nanos::from_millis(700);
@@ -93,9 +93,10 @@ pub enum HapiError {
     #[error("the board at {port} fails while its delay is measured ({fault}); connect it again")]
     Faulty { port: String, fault: HapiFault },
     #[error(
-        "the board at {0} answers too few packets within 2 ms to feel with; connect it without a hub, and close other programs"
+        "the board at {port} takes {:.1} ms to answer, too long to feel with; connect it without a hub, and close other programs",
+        1e3 * .median.seconds().0
     )]
-    Slow(String),
+    Slow { port: String, median: Nanos },
     #[error("the thread of the haptic device cannot be started ({0}); close other programs")]
     Thread(io::Error),
     #[error(transparent)]
@@ -129,7 +130,7 @@ impl HapiDevice {
             Exchange::new(board, fit, options.middle, limits)
         };
         let mut exchange = opened.set_up(&options.setup, fresh)?;
-        let round_trip = opened.measure(&mut exchange)?;
+        let round_trip = opened.measure(&mut exchange, &limits)?;
         let Opened { link, clock, port } = opened;
         let (mut scene, thread) = hand_over(settings, options.period, clock);
         let board = Board { address: options.address.clone(), exchange, scene: thread };
@@ -193,11 +194,6 @@ impl Opened {
         HapiError::Lost { port: self.port.clone(), source }
     }
 
-    /// One look at the port: bytes in, and a packet out if one is due.
-    fn turn(&mut self, exchange: &mut Exchange) -> Result<(), HapiError> {
-        turn(&mut *self.link, &self.clock, exchange).map_err(|err| self.lost(err))
-    }
-
     /// Sends the set-up until the board answers with the angles of the home position.
     fn set_up(
         &mut self,
@@ -212,7 +208,7 @@ impl Opened {
             let begin = (self.clock)();
             exchange.begin(begin);
             while (self.clock)().since(begin) < ATTEMPT {
-                self.turn(&mut exchange)?;
+                turn(&mut *self.link, &self.clock, &mut exchange).map_err(|err| self.lost(err))?;
                 let Some(found) = exchange.degrees() else { continue };
                 let is_home = (0..2).all(|motor| {
                     (found[motor] - setup.home_degrees[motor]).abs() <= HOME_TOLERANCE_DEGREES
@@ -226,33 +222,40 @@ impl Opened {
     }
 
     /// Round trips of packets with zero force, one each millisecond as later.
-    fn measure(&mut self, exchange: &mut Exchange) -> Result<RoundTrip, HapiError> {
-        let mut times = Vec::with_capacity(PINGS);
+    fn measure(
+        &mut self,
+        exchange: &mut Exchange,
+        limits: &ForceLimits,
+    ) -> Result<RoundTrip, HapiError> {
+        let silent = || HapiError::Silent(self.port.clone());
+        let (mut times, mut sent) = (Vec::with_capacity(PINGS), None);
         let (_, faults) = exchange.faults();
-        let start = (self.clock)();
+        exchange.set_reply_silence(PING_MAX);
         while times.len() < PINGS {
-            self.turn(exchange)?;
-            let begin = (self.clock)();
-            let is_sent = exchange.is_waiting() && exchange.line() == LineState::Talking;
-            while is_sent && exchange.is_waiting() {
-                self.turn(exchange)?;
-            }
-            if is_sent && exchange.line() == LineState::Talking {
-                let time = (self.clock)().since(begin);
-                times.push(time);
-                sleep(Duration::from_nanos(BEAT.since(time).0));
+            turn(&mut *self.link, &self.clock, exchange).map_err(|err| self.lost(err))?;
+            let now = (self.clock)();
+            match (sent, exchange.is_waiting()) {
+                (None, true) => sent = Some(now),
+                (Some(begin), false) => {
+                    times.push(now.since(begin));
+                    sent = None;
+                }
+                _ => {}
             }
             match exchange.faults() {
                 (Some(fault), count) if count > faults => {
                     return Err(HapiError::Faulty { port: self.port.clone(), fault });
                 }
-                _ if (self.clock)().since(start) > MEASURED_MAX => {
-                    return Err(HapiError::Slow(self.port.clone()));
-                }
+                _ if exchange.line() != LineState::Talking => return Err(silent()),
                 _ => {}
             }
         }
-        Ok(RoundTrip::of(times))
+        exchange.set_reply_silence(limits.reply_silence);
+        let found = RoundTrip::of(times);
+        if found.median > limits.reply_silence {
+            return Err(HapiError::Slow { port: self.port.clone(), median: found.median });
+        }
+        Ok(found)
     }
 }
 

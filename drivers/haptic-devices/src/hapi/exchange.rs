@@ -145,6 +145,11 @@ impl Exchange {
         self.track.clear();
     }
 
+    /// Another time without an answer, while a delay is measured and there is no force.
+    pub fn set_reply_silence(&mut self, silence: Nanos) {
+        self.gate.set_reply_silence(silence);
+    }
+
     /// A tick of the scene at `at`, with its force in N along its axes.
     pub fn set_order(&mut self, at: Nanos, force: [f64; 3]) {
         self.gate.set_order(at, self.fit.device_force(force));
