@@ -17,6 +17,8 @@ const PATIENCE: Nanos = Nanos::from_millis(1000);
 const EDGES: f64 = 2.0;
 /// What is read where nothing has arrived.
 const NOTHING: u8 = 0xff;
+/// After so many packets the hand takes the arm from its home: not by time, as a busy computer has little of it.
+const PACKETS_AT_HOME: u64 = 100;
 /// Bytes that the USB driver keeps.
 const INPUT_MAX: usize = 256;
 
@@ -303,11 +305,12 @@ impl HapiBoard {
                         port.zero = degrees[motor_of(index)];
                     }
                 }
-                // Now a hand may take the arm from its home.
-                self.arm.lead_from(now + Nanos::from_millis(300));
             }
             Values::Torques { device } => {
                 self.packets += 1;
+                if self.packets == PACKETS_AT_HOME {
+                    self.arm.lead_from(now);
+                }
                 for port in self.ports.iter_mut().filter(|port| port.motor == Some(device)) {
                     port.duty = duty(next(), port.motor_direction);
                 }

@@ -227,26 +227,20 @@ impl Opened {
         exchange: &mut Exchange,
         limits: &ForceLimits,
     ) -> Result<RoundTrip, HapiError> {
-        let silent = || HapiError::Silent(self.port.clone());
-        let (mut times, mut sent) = (Vec::with_capacity(PINGS), None);
+        let mut times = Vec::with_capacity(PINGS);
         let (_, faults) = exchange.faults();
         exchange.set_reply_silence(PING_MAX);
         while times.len() < PINGS {
-            turn(&mut *self.link, &self.clock, exchange).map_err(|err| self.lost(err))?;
-            let now = (self.clock)();
-            match (sent, exchange.is_waiting()) {
-                (None, true) => sent = Some(now),
-                (Some(begin), false) => {
-                    times.push(now.since(begin));
-                    sent = None;
-                }
-                _ => {}
-            }
+            let time =
+                turn(&mut *self.link, &self.clock, exchange).map_err(|err| self.lost(err))?;
+            times.extend(time);
             match exchange.faults() {
                 (Some(fault), count) if count > faults => {
                     return Err(HapiError::Faulty { port: self.port.clone(), fault });
                 }
-                _ if exchange.line() != LineState::Talking => return Err(silent()),
+                _ if exchange.line() != LineState::Talking => {
+                    return Err(HapiError::Silent(self.port.clone()));
+                }
                 _ => {}
             }
         }
@@ -259,16 +253,20 @@ impl Opened {
     }
 }
 
-/// Bytes in, and a packet out if one is due.
-fn turn(link: &mut dyn Link, clock: &HostClock, exchange: &mut Exchange) -> io::Result<()> {
+/// Bytes in, and a packet out if one is due: the round trip that an answer ends.
+fn turn(
+    link: &mut dyn Link,
+    clock: &HostClock,
+    exchange: &mut Exchange,
+) -> io::Result<Option<Nanos>> {
     let mut buffer = [0_u8; 64];
     let count = link.read(&mut buffer, REST)?;
-    exchange.receive(clock(), &buffer[..count]);
-    let now = clock();
+    let (now, since) = (clock(), exchange.waiting_since());
+    let answer = exchange.receive(now, &buffer[..count]);
     if exchange.is_due(now) {
         link.write(exchange.message(now))?;
     }
-    Ok(())
+    Ok(answer.and(since).map(|since| now.since(since)))
 }
 
 /// What the thread has.

@@ -398,6 +398,12 @@ impl Exchange {
         !self.waiting.is_empty()
     }
 
+    /// When the oldest packet was sent whose answer is due.
+    #[must_use]
+    pub fn waiting_since(&self) -> Option<Nanos> {
+        self.waiting.front().copied()
+    }
+
     #[must_use]
     pub fn line(&self) -> LineState {
         self.line
