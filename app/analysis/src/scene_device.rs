@@ -13,6 +13,7 @@ use palpate_rheology::integrators::SeriesBody;
 use palpate_runner::driver_clock;
 use serde::Serialize;
 use std::net::SocketAddr;
+use std::str::FromStr;
 
 /// The stroke that is judged before play: as deep and as fast as a finger presses.
 const STROKE: (Depth, MmPerS) = (Depth(10.0), MmPerS(50.0));
@@ -32,9 +33,54 @@ pub enum DeviceChoice {
     Hapi(DeviceAddress),
 }
 
+/// A device as a person names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceName {
+    /// With its name in the service, if there is a choice.
+    Inverse(Option<String>),
+    /// At a port.
+    Hapi(DeviceAddress),
+}
+
+impl FromStr for DeviceName {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once(':') {
+            None if text == "inverse" => Ok(Self::Inverse(None)),
+            Some(("inverse", name)) if !name.is_empty() => Ok(Self::Inverse(Some(name.into()))),
+            Some(("hapi", port)) if !port.is_empty() => Ok(Self::Hapi(board_address(port))),
+            _ => Err("give inverse, inverse:NAME or hapi:PORT, such as hapi:/dev/ttyACM0"),
+        }
+    }
+}
+
+/// A serial port, or an emulated one on a network. The board's USB port has no speed of its own, whatever is set.
+fn board_address(port: &str) -> DeviceAddress {
+    match port.parse::<SocketAddr>() {
+        Ok(_) => DeviceAddress::Tcp(port.into()),
+        Err(_) => DeviceAddress::Serial { port: port.into(), baud: 115_200, has_handshake: false },
+    }
+}
+
+impl DeviceName {
+    /// The device to open; `service` is where the service of an Inverse listens.
+    #[must_use]
+    pub fn at(self, service: SocketAddr) -> DeviceChoice {
+        match self {
+            Self::Inverse(name) => {
+                DeviceChoice::Inverse { address: service, name, dead_man: DeadMan::IfPresent }
+            }
+            Self::Hapi(address) => DeviceChoice::Hapi(address),
+        }
+    }
+}
+
 /// A device that a scene can use.
 pub struct OpenDevice {
     pub device: Box<dyn HapticDevice>,
+    /// Damping, friction, steps and delay of the loop through it, as the margin needs them.
+    pub looped: LoopDevice,
     /// A look at it while the scene's loop has it.
     pub monitor: DeviceMonitor,
 }
@@ -70,7 +116,8 @@ pub struct DeviceUse {
 }
 
 impl DeviceUse {
-    pub(crate) fn of(report: LinkReport) -> Self {
+    #[must_use]
+    pub fn of(report: LinkReport) -> Self {
         let LinkReport { reports, faults, losses, stop, .. } = report;
         Self { reports, faults, losses, stop: stop.name() }
     }
@@ -112,9 +159,10 @@ fn open_inverse(
     let found = device.found();
     let grip = found.grip.as_ref().map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
     let description = format!("device {}, {grip}, service {}", found.name, found.version);
-    let report = judge(description, &device.round_trip(), device.loop_device(), scene);
+    let looped = device.loop_device();
+    let report = judge(description, &device.round_trip(), looped, scene);
     let monitor = device.monitor();
-    Ok((OpenDevice { device: Box::new(device), monitor }, report))
+    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
 }
 
 fn open_hapi(
@@ -123,10 +171,11 @@ fn open_hapi(
 ) -> Result<(OpenDevice, DeviceReport), String> {
     let device = HapiDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
     let description = format!("2DIY at {}", device.port());
-    let report = judge(description, &device.round_trip(), device.loop_device(), scene);
+    let looped = device.loop_device();
+    let report = judge(description, &device.round_trip(), looped, scene);
     let report = DeviceReport { warnings: HAPI_WARNINGS.to_vec(), ..report };
     let monitor = device.monitor();
-    Ok((OpenDevice { device: Box::new(device), monitor }, report))
+    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
 }
 
 /// The margin of a scene on a device.

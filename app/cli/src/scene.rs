@@ -14,11 +14,9 @@ use palpate_analysis::scene::{
     SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
 };
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
-use palpate_analysis::scene_device::{DeviceChoice, OpenDevice, open_device};
+use palpate_analysis::scene_device::{DeviceName, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_analysis::trade::{TradeExtent, measure_scene};
-use palpate_drivers::wire::DeviceAddress;
-use palpate_haptic_devices::inverse::DeadMan;
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -69,30 +67,8 @@ pub struct SceneRunArgs {
     seconds: Option<f64>,
 }
 
-/// A device as it is named on the command line.
-#[derive(Clone, Debug)]
-enum DeviceName {
-    /// With its name in the service, if there is a choice.
-    Inverse(Option<String>),
-    /// At a port.
-    Hapi(DeviceAddress),
-}
-
 fn device_name(text: &str) -> Result<DeviceName, String> {
-    match text.split_once(':') {
-        None if text == "inverse" => Ok(DeviceName::Inverse(None)),
-        Some(("inverse", name)) if !name.is_empty() => Ok(DeviceName::Inverse(Some(name.into()))),
-        Some(("hapi", port)) if !port.is_empty() => Ok(DeviceName::Hapi(board_address(port))),
-        _ => Err("give inverse, inverse:NAME or hapi:PORT, such as hapi:/dev/ttyACM0".into()),
-    }
-}
-
-/// A serial port, or an emulated one on a network. The board's USB port has no speed of its own, whatever is set.
-fn board_address(port: &str) -> DeviceAddress {
-    match port.parse::<SocketAddr>() {
-        Ok(_) => DeviceAddress::Tcp(port.into()),
-        Err(_) => DeviceAddress::Serial { port: port.into(), baud: 115_200, has_handshake: false },
-    }
+    text.parse().map_err(str::to_owned)
 }
 
 fn path(name: &str) -> Result<ScenePath, String> {
@@ -265,14 +241,7 @@ fn device(
     file: &mut SceneFile,
     output: &Output,
 ) -> Result<OpenDevice, Failure> {
-    let choice = match name {
-        DeviceName::Inverse(name) => DeviceChoice::Inverse {
-            address: args.service,
-            name: name.clone(),
-            dead_man: DeadMan::IfPresent,
-        },
-        DeviceName::Hapi(address) => DeviceChoice::Hapi(address.clone()),
-    };
+    let choice = name.clone().at(args.service);
     let settings = file.settings(COARSEST).map_err(Failure::usage)?;
     let (opened, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
     file.device = *opened.device.settings();
