@@ -1,14 +1,13 @@
 //! A scene in real time, its recording and its replay.
 
 use super::haptics::{LoopMeasurement, fit_haptic_body};
-use super::scene_device::DeviceUse;
+use super::scene_device::{DeviceUse, OpenDevice};
 use super::scene_mesh::{
     MeshReport, mesh_scene_settings, read_mesh_scene, resolve_mesh, source_path,
 };
 use super::tick_replay::{
     FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
 };
-use palpate_haptic_devices::InverseDevice;
 use palpate_haptics::scene::{
     HandLedMeshScene, HandLedScene, HandPose, MeshScene, MeshSceneError, NoForceReason, Pose,
     Scene, ScenePath, SceneTick,
@@ -106,7 +105,7 @@ pub enum SceneHand<'a> {
     /// The simulated hand, along a path so many times.
     Simulated(ScenePath, u32),
     /// A person's hand on a device that was opened for this scene, for so many seconds or until the flag is set.
-    OnDevice { device: Box<InverseDevice>, seconds: Option<f64>, is_ending: &'a AtomicBool },
+    OnDevice { device: OpenDevice, seconds: Option<f64>, is_ending: &'a AtomicBool },
 }
 
 /// What a scene that plays shows of its newest tick.
@@ -173,7 +172,7 @@ fn play<S: Shown>(
             (live, Some(whole), path.name(), None, &no_flag)
         }
         SceneHand::OnDevice { device, seconds, is_ending } => {
-            let monitor = device.monitor();
+            let OpenDevice { device, monitor } = device;
             let live = SceneLoop::start_on_device(device, scene, start(SENSED_COLUMNS)?)?;
             (live, seconds, "device", Some(monitor), is_ending)
         }

@@ -1,35 +1,97 @@
 //! A real haptic device for a scene: opened, judged before play, and how it did.
 
-use palpate_haptic_devices::inverse::{DeadMan, LinkReport};
-use palpate_haptic_devices::{InverseDevice, InverseOptions};
-use palpate_haptics::margin::{MarginReport, MarginSettings};
+use palpate_drivers::wire::DeviceAddress;
+use palpate_haptic_devices::inverse::DeadMan;
+use palpate_haptic_devices::{
+    DeviceMonitor, HapiDevice, HapiOptions, InverseDevice, InverseOptions, LinkReport, RoundTrip,
+};
+use palpate_haptics::HapticDevice;
+use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
 use palpate_haptics::scene::SceneSettings;
 use palpate_model::units::{Depth, MmPerS};
 use palpate_rheology::integrators::SeriesBody;
 use palpate_runner::driver_clock;
 use serde::Serialize;
 use std::net::SocketAddr;
+use std::str::FromStr;
 
 /// The stroke that is judged before play: as deep and as fast as a finger presses.
 const STROKE: (Depth, MmPerS) = (Depth(10.0), MmPerS(50.0));
 
 /// Which device.
 #[derive(Clone, Debug)]
-pub struct DeviceChoice {
-    /// Where its service listens.
-    pub address: SocketAddr,
-    /// Its name in the service; the only one where there is none.
-    pub name: Option<String>,
-    pub dead_man: DeadMan,
+pub enum DeviceChoice {
+    /// An Inverse3 of Haply's Inverse service.
+    Inverse {
+        /// Where its service listens.
+        address: SocketAddr,
+        /// Its name in the service; the only one where there is none.
+        name: Option<String>,
+        dead_man: DeadMan,
+    },
+    /// A 2DIY on a hAPI board.
+    Hapi(DeviceAddress),
+}
+
+/// A device as a person names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceName {
+    /// With its name in the service, if there is a choice.
+    Inverse(Option<String>),
+    /// At a port.
+    Hapi(DeviceAddress),
+}
+
+impl FromStr for DeviceName {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once(':') {
+            None if text == "inverse" => Ok(Self::Inverse(None)),
+            Some(("inverse", name)) if !name.is_empty() => Ok(Self::Inverse(Some(name.into()))),
+            Some(("hapi", port)) if !port.is_empty() => Ok(Self::Hapi(board_address(port))),
+            _ => Err("give inverse, inverse:NAME or hapi:PORT, such as hapi:/dev/ttyACM0"),
+        }
+    }
+}
+
+/// A serial port, or an emulated one on a network. The board's USB port has no speed of its own, whatever is set.
+fn board_address(port: &str) -> DeviceAddress {
+    match port.parse::<SocketAddr>() {
+        Ok(_) => DeviceAddress::Tcp(port.into()),
+        Err(_) => DeviceAddress::Serial { port: port.into(), baud: 115_200, has_handshake: false },
+    }
+}
+
+impl DeviceName {
+    /// The device to open; `service` is where the service of an Inverse listens.
+    #[must_use]
+    pub fn at(self, service: SocketAddr) -> DeviceChoice {
+        match self {
+            Self::Inverse(name) => {
+                DeviceChoice::Inverse { address: service, name, dead_man: DeadMan::IfPresent }
+            }
+            Self::Hapi(address) => DeviceChoice::Hapi(address),
+        }
+    }
+}
+
+/// A device that a scene can use.
+pub struct OpenDevice {
+    pub device: Box<dyn HapticDevice>,
+    /// Damping, friction, steps and delay of the loop through it, as the margin needs them.
+    pub looped: LoopDevice,
+    /// A look at it while the scene's loop has it.
+    pub monitor: DeviceMonitor,
 }
 
 /// A device before play.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceReport {
-    pub name: String,
-    pub grip: Option<String>,
-    /// Version of its service.
-    pub service: String,
+    /// What it is, and with what.
+    pub description: String,
+    /// What a person has to know before the first touch.
+    pub warnings: Vec<&'static str>,
     /// Round trips of messages with zero force.
     pub round_trip_median_ms: f64,
     pub round_trip_p99_ms: f64,
@@ -54,25 +116,75 @@ pub struct DeviceUse {
 }
 
 impl DeviceUse {
-    pub(crate) fn of(report: LinkReport) -> Self {
+    #[must_use]
+    pub fn of(report: LinkReport) -> Self {
         let LinkReport { reports, faults, losses, stop, .. } = report;
         Self { reports, faults, losses, stop: stop.name() }
     }
 }
 
+/// What a 2DIY does not have, and what its board does not do.
+const HAPI_WARNINGS: [&str; 2] = [
+    "the board takes the arm's place for the home position; if the arm was elsewhere, end the scene and start again from home",
+    "the board has no button and keeps its torque if this computer stops; keep the switch of the motors' power supply within reach",
+];
+
 /// Opens a device for a scene; the report is to be read before the first touch.
 pub fn open_device(
     choice: &DeviceChoice,
     scene: &SceneSettings,
-) -> Result<(InverseDevice, DeviceReport), String> {
-    let options = InverseOptions {
-        address: choice.address,
-        device: choice.name.clone(),
-        dead_man: choice.dead_man,
-        ..InverseOptions::new(scene.middle(), scene.period)
-    };
-    let device = InverseDevice::open(&options, driver_clock()).map_err(|err| err.to_string())?;
-    let (found, trip, looped) = (device.found(), device.round_trip(), device.loop_device());
+) -> Result<(OpenDevice, DeviceReport), String> {
+    match choice {
+        DeviceChoice::Inverse { address, name, dead_man } => {
+            let options = InverseOptions {
+                address: *address,
+                device: name.clone(),
+                dead_man: *dead_man,
+                ..InverseOptions::new(scene.middle(), scene.period)
+            };
+            open_inverse(&options, scene)
+        }
+        DeviceChoice::Hapi(address) => {
+            let options = HapiOptions::new(address.clone(), scene.middle(), scene.period);
+            open_hapi(&options, scene)
+        }
+    }
+}
+
+fn open_inverse(
+    options: &InverseOptions,
+    scene: &SceneSettings,
+) -> Result<(OpenDevice, DeviceReport), String> {
+    let device = InverseDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
+    let found = device.found();
+    let grip = found.grip.as_ref().map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
+    let description = format!("device {}, {grip}, service {}", found.name, found.version);
+    let looped = device.loop_device();
+    let report = judge(description, &device.round_trip(), looped, scene);
+    let monitor = device.monitor();
+    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
+}
+
+fn open_hapi(
+    options: &HapiOptions,
+    scene: &SceneSettings,
+) -> Result<(OpenDevice, DeviceReport), String> {
+    let device = HapiDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
+    let description = format!("2DIY at {}", device.port());
+    let looped = device.loop_device();
+    let report = judge(description, &device.round_trip(), looped, scene);
+    let report = DeviceReport { warnings: HAPI_WARNINGS.to_vec(), ..report };
+    let monitor = device.monitor();
+    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
+}
+
+/// The margin of a scene on a device.
+fn judge(
+    description: String,
+    trip: &RoundTrip,
+    looped: LoopDevice,
+    scene: &SceneSettings,
+) -> DeviceReport {
     let margin = MarginSettings {
         body: SeriesBody::from(scene.body).padded(),
         scheme: scene.scheme,
@@ -81,15 +193,13 @@ pub fn open_device(
     };
     let (deepest, speed) = STROKE;
     let margin = margin.assess_stroke(deepest, speed);
-    let report = DeviceReport {
-        name: found.name.clone(),
-        grip: found.grip.clone(),
-        service: found.version.clone(),
+    DeviceReport {
+        description,
+        warnings: Vec::new(),
         round_trip_median_ms: 1e3 * trip.median.seconds().0,
         round_trip_p99_ms: 1e3 * trip.p99.seconds().0,
         delay_ticks: looped.delay_ticks,
         sentences: margin.sentences(),
         margin,
-    };
-    Ok((device, report))
+    }
 }

@@ -12,6 +12,7 @@ use palpate_emulators::bench::EmulatedBench;
 use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilEmulator, GalilModel};
 use palpate_emulators::grbl::{Eeprom, EmulatedGrblSettings, Grbl, HomeWiring};
+use palpate_emulators::hapi::{EmulatedHapi, HapiBoardSettings};
 use palpate_emulators::inverse::{EmulatedInverse, InverseServiceSettings};
 use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{EmulatorAddress, ServeError, ServeEvent, ServeOptions, serve};
@@ -37,6 +38,8 @@ pub enum EmulateCommand {
     Sidecar(SidecarArgs),
     /// Haply's Inverse service with an Inverse3, whose hand pokes; on the network at 127.0.0.1:10001 without --tcp
     Inverse(InverseArgs),
+    /// Haply's 2DIY on a hAPI board, whose hand leaves the home position and pokes
+    Hapi(HapiArgs),
 }
 
 /// The wire to an emulated device.
@@ -154,6 +157,22 @@ pub struct InverseArgs {
     seed: u64,
 }
 
+/// Arguments of `palpate emulate hapi`.
+#[derive(Debug, Args)]
+pub struct HapiArgs {
+    #[command(flatten)]
+    wire: WireArgs,
+    /// From a packet to its answer in ms
+    #[arg(long, value_name = "MS", default_value_t = 0.0, value_parser = reply_ms)]
+    reply_ms: f64,
+    /// The board runs on when its cable is pulled, and keeps its torque
+    #[arg(long)]
+    own_power: bool,
+    /// Seed of everything random
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
 /// Longer than any service takes.
 fn reply_ms(text: &str) -> Result<f64, String> {
     let ms = parse_number(text).ok().filter(|ms| (0.0..=1000.0).contains(ms));
@@ -226,6 +245,7 @@ pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failu
         EmulateCommand::Mark10(args) => mark10(args, output),
         EmulateCommand::Sidecar(args) => sidecar(args, output),
         EmulateCommand::Inverse(args) => inverse(args, output),
+        EmulateCommand::Hapi(args) => hapi(args, output),
     }
 }
 
@@ -327,6 +347,20 @@ fn inverse(args: &InverseArgs, output: &Output) -> Result<(), Failure> {
         fault: args.fault.clone(),
     };
     emulate(&mut device, announcement, &wire, None, args.seed, output)
+}
+
+fn hapi(args: &HapiArgs, output: &Output) -> Result<(), Failure> {
+    let settings = HapiBoardSettings {
+        reply_delay: Nanos((args.reply_ms * 1e6) as u64),
+        has_own_power: args.own_power,
+        ..HapiBoardSettings::default()
+    };
+    let (mut device, _) = EmulatedHapi::new(settings).map_err(Failure::usage)?;
+    let (model, label) = ("2DIY".to_owned(), "hAPI board".to_owned());
+    // A thousand answers a second, as above.
+    let _ = request_real_time();
+    let announcement = Announcement { device: "hapi", model, label, cell: None };
+    emulate(&mut device, announcement, &args.wire, None, args.seed, output)
 }
 
 fn emulate(

@@ -14,12 +14,9 @@ use palpate_analysis::scene::{
     SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
 };
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
-use palpate_analysis::scene_device::{DeviceChoice, open_device};
+use palpate_analysis::scene_device::{DeviceName, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_analysis::trade::{TradeExtent, measure_scene};
-use palpate_haptic_devices::InverseDevice;
-use palpate_haptic_devices::inverse::DeadMan;
-use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -54,10 +51,10 @@ pub struct SceneRunArgs {
     /// Tissue of a specimen of a population, population:NAME#NUMBER, instead of that of the scene file
     #[arg(long, value_name = "SPECIMEN")]
     specimen: Option<String>,
-    /// A haptic device instead of the simulated hand: inverse, or inverse:NAME where several are connected
+    /// A haptic device instead of the simulated hand: inverse, inverse:NAME where several are connected, or hapi:PORT for a 2DIY in its home position
     #[arg(long, value_name = "DEVICE", value_parser = device_name, conflicts_with = "path")]
     device: Option<DeviceName>,
-    /// Where the device's service listens, ADDRESS:PORT
+    /// Where the service of an inverse listens, ADDRESS:PORT
     #[arg(
         long,
         value_name = "ADDRESS:PORT",
@@ -70,16 +67,8 @@ pub struct SceneRunArgs {
     seconds: Option<f64>,
 }
 
-/// A device's name in its service, if there is a choice.
-#[derive(Clone, Debug)]
-struct DeviceName(Option<String>);
-
 fn device_name(text: &str) -> Result<DeviceName, String> {
-    match text.split_once(':') {
-        None if text == "inverse" => Ok(DeviceName(None)),
-        Some(("inverse", name)) if !name.is_empty() => Ok(DeviceName(Some(name.into()))),
-        _ => Err("give inverse or inverse:NAME".into()),
-    }
+    text.parse().map_err(str::to_owned)
 }
 
 fn path(name: &str) -> Result<ScenePath, String> {
@@ -191,9 +180,7 @@ fn run_scene(
         after = Some((curves, plan));
     }
     let hand = match opened {
-        Some(device) => {
-            SceneHand::OnDevice { device: Box::new(device), seconds, is_ending: &is_ending }
-        }
+        Some(device) => SceneHand::OnDevice { device, seconds, is_ending: &is_ending },
         None => {
             let laps = seconds.map_or(1, |seconds| (seconds / args.path.seconds()).ceil() as u32);
             SceneHand::Simulated(args.path, laps)
@@ -253,14 +240,13 @@ fn device(
     name: &DeviceName,
     file: &mut SceneFile,
     output: &Output,
-) -> Result<InverseDevice, Failure> {
-    let choice =
-        DeviceChoice { address: args.service, name: name.0.clone(), dead_man: DeadMan::IfPresent };
+) -> Result<OpenDevice, Failure> {
+    let choice = name.clone().at(args.service);
     let settings = file.settings(COARSEST).map_err(Failure::usage)?;
-    let (device, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
-    file.device = *device.settings();
+    let (opened, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
+    file.device = *opened.device.settings();
     device_lines(&report).iter().for_each(|line| output.note(line));
-    Ok(device)
+    Ok(opened)
 }
 
 fn run_bench(args: &SceneBenchArgs, output: &Output) -> Result<(), Failure> {

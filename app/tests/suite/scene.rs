@@ -167,6 +167,12 @@ fn a_recorded_specimen_is_touched_by_the_simulated_hand_and_through_a_device() {
     assert!(touched["device"]["reports"].as_u64().unwrap() > 0, "{touched}");
     let again = json(&palpate(at.path(), &["scene", "replay", "touched", "--json"]));
     assert_eq!((&again["is_identical"], &again["is_whole"]), (&true.into(), &true.into()));
+    let (_board, ready) = start_device("hapi", &[]);
+    let board = ready["at"].as_str().unwrap();
+    let line = format!("scene run pad.toml --device hapi:{board} --seconds 1 --json");
+    let felt = palpate(at.path(), &split_words(&line));
+    assert!(stderr(&felt).contains("home position"), "{}", stderr(&felt));
+    assert!(json(&felt)["device"]["reports"].as_u64().unwrap() > 0);
     // Another is not there.
     let line = format!("scene run --device inverse:left --service {service}");
     assert_refused(&palpate(at.path(), &split_words(&line)), 1, "left");

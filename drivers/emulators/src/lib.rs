@@ -10,6 +10,7 @@ pub mod cell;
 pub mod faults;
 pub mod galil;
 pub mod grbl;
+pub mod hapi;
 pub mod hx711;
 pub mod inverse;
 pub mod line_cell;
@@ -22,11 +23,13 @@ mod pty;
 #[path = "no_pty.rs"]
 mod pty;
 pub mod serve;
+mod served;
 pub mod sidecar;
 mod wire;
 
 pub use faults::{DeviceFault, FaultError, ScheduledFault};
 pub use plant::EmulatedPlant;
+pub use served::ServedDevice;
 
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;

@@ -8,47 +8,19 @@
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::sim::{Random, RandomStream};
 use palpate_drivers::wire::HostClock;
+use palpate_emulators::ServedDevice;
 use palpate_emulators::inverse::{
     EmulatedInverse, InverseFault, InverseLie, InversePanel, InverseServiceSettings,
 };
-use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
 use palpate_haptic_devices::{ForceLimits, InverseDevice, InverseOptions};
 use palpate_haptics::scene::{Scene, SceneSettings};
 use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
 use std::error::Error;
-use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::sync_channel;
 use std::time::{Duration, Instant};
 
 const ZERO_WITHIN_MS: f64 = 5.0;
-
-fn start_service(stop: &Arc<AtomicBool>) -> Result<(SocketAddr, InversePanel), Box<dyn Error>> {
-    let (mut device, panel) = EmulatedInverse::new(InverseServiceSettings::default())?;
-    let stop = Arc::clone(stop);
-    let (ready, address) = sync_channel(1);
-    let (_orders, received) = sync_channel(1);
-    std::thread::Builder::new().name("inverse".into()).spawn(move || {
-        // Without it the emulator's own lateness is counted, too.
-        let _ = request_real_time();
-        let options = ServeOptions {
-            address: EmulatorAddress::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
-            baud: None,
-            latency: Nanos::ZERO,
-            faults: Vec::new(),
-            seed: 1,
-        };
-        let mut notify = |event| {
-            if let ServeEvent::Ready(address) = event {
-                let _ = ready.send(address);
-            }
-        };
-        let _ = serve(&mut device, &options, &received, &stop, &mut notify);
-    })?;
-    Ok((address.recv()?.parse()?, panel))
-}
 
 /// Sleeps to each tick's time.
 struct Beat {
@@ -197,14 +169,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let mut number = |usual: u64| words.next().and_then(|word| word.parse().ok()).unwrap_or(usual);
     let (seconds, cases) = (number(10), number(1000));
-    let stop = Arc::new(AtomicBool::new(false));
-    let (address, panel) = start_service(&stop)?;
+    let (service, panel) = EmulatedInverse::new(InverseServiceSettings::default())?;
+    let served = ServedDevice::start(service, ServedDevice::free_port())?;
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
     println!("priority of the scene's thread: {}", request_real_time());
     let settings = SceneSettings::default();
     let usual = InverseOptions::new(settings.middle(), Period::MILLISECOND);
-    let options = InverseOptions { address, ..usual };
+    let options = InverseOptions { address: served.address.parse()?, ..usual };
     time_ticks(&options, &clock, seconds)?;
 
     let limits = ForceLimits { ramp: Nanos::from_millis(20), ..options.limits };
@@ -227,7 +199,5 @@ fn main() -> Result<(), Box<dyn Error>> {
         print_percentiles(&format!("{kind}: zero force after"), times);
         println!("{kind}: within {ZERO_WITHIN_MS} ms in {in_time} of {cases}");
     }
-    drop(device);
-    stop.store(true, Ordering::Relaxed);
     Ok(())
 }

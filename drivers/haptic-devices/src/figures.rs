@@ -33,21 +33,22 @@ impl RoundTrip {
 
 /// A device as its owner knows it, in its own millimetres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct InverseFigures {
+#[serde(deny_unknown_fields)]
+pub struct DeviceFigures {
     /// Mechanics, steps and bounds.
     pub device: DeviceSettings,
-    /// Time between sensing and the service's report, and between its order and the force on the hand, in s. Not seen in a
+    /// Time between sensing and the report, and between the order and the force on the hand, in s. Not seen in a
     /// round trip.
     pub hidden_delay_s: f64,
 }
 
-impl Default for InverseFigures {
+impl DeviceFigures {
     /// The Inverse3. Only the reach is Haply's: its tutorial 06 (service 3.5) keeps the stylus within 0.1 m of the middle, and
     /// the cube in that sphere is taken. Haply's public pages give neither mass, friction, step nor largest force. Those are
     /// assumed, on the side that makes the margin smaller: little damping and friction, a coarse step. The largest force is what
     /// palpate asks for, not what the device has.
-    fn default() -> Self {
+    #[must_use]
+    pub fn inverse3() -> Self {
         // The cube in a sphere of 100 mm: 2 * 100 / sqrt(3).
         let side_mm = 115.0;
         Self {
@@ -67,9 +68,34 @@ impl Default for InverseFigures {
             hidden_delay_s: 0.001,
         }
     }
-}
 
-impl InverseFigures {
+    /// Haply's 2DIY of plastic, in the square of 100 mm around the point (19, 90) mm of its plane.
+    ///
+    /// Of public sources: 0.123 N m a motor (`MAX_TORQUE` of Haply's firmware M0 V0.3) over its longest lever in the square, 75.5 mm;
+    /// both encoders one count on, of the 4880 a turn that the set-up names and the firmware M0 halves, are 0.343 mm at most. The
+    /// tests compute both. Assumed: mass, damping, friction, the force for long, the stiffness, and the delay, on the side that
+    /// makes the margin smaller.
+    #[must_use]
+    pub fn two_diy() -> Self {
+        Self {
+            device: DeviceSettings {
+                mass_kg: 0.1,
+                damping_n_s_per_mm: 0.0002,
+                friction_n: 0.1,
+                step_mm: 0.35,
+                turn_step_rad: 0.002,
+                force_max_n: 1.6,
+                force_continuous_n: 0.5,
+                stiffness_max_n_per_mm: 0.5,
+                // Its third direction is none; a device has a reach along each.
+                workspace_mm: [100.0, 100.0, 1.0],
+                ..DeviceSettings::default()
+            },
+            // Half an exchange of a USB device that is served each millisecond, for amplifier and motor.
+            hidden_delay_s: 0.0005,
+        }
+    }
+
     /// What the margin sees of a device with `settings` in the scene. A pose is taken at one tick and used at the next, and
     /// force and pose meet at the service half a round trip away: one tick, the round trip (its 99th percentile) and the
     /// hidden delay.

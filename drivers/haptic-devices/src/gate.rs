@@ -19,11 +19,11 @@ palpate_model::named! {
         /// The device is closed.
         Ended = "the device is closed",
         /// No connection.
-        LinkLost = "the connection to the service is lost",
+        LinkLost = "the connection to the device is lost",
         /// No answer for too long.
-        NoReply = "the service does not answer in time",
+        NoReply = "the device does not answer in time",
         /// A report that cannot be.
-        BadReport = "the service reports values that cannot be",
+        BadReport = "the device reports values that cannot be",
         /// The device is not as it must be.
         NotReady = "the device is not calibrated, not powered or not ready",
         /// The scene's loop is late or gone.
@@ -47,7 +47,7 @@ pub struct ForceLimits {
     pub speed_max_mm_per_s: f64,
     /// Time without a tick of the scene after which the force ends.
     pub scene_silence: Nanos,
-    /// Time without an answer of the service after which the force ends.
+    /// Time without an answer of the device after which the force ends.
     pub reply_silence: Nanos,
     /// Time in which the force comes back, linearly.
     pub ramp: Nanos,
@@ -123,6 +123,11 @@ impl ForceGate {
     /// Why the last force was zero.
     pub fn stop(&self) -> ForceStop {
         self.stop
+    }
+
+    /// Another time without an answer, while a delay is measured and there is no force.
+    pub fn set_reply_silence(&mut self, silence: Nanos) {
+        self.limits.reply_silence = silence;
     }
 
     /// A tick of the scene, with its force in N along the device's axes.

@@ -1,6 +1,6 @@
 //! Haptic devices that can be bought, behind [`HapticDevice`](palpate_haptics::HapticDevice).
 //!
-//! [`inverse`] is Haply's Inverse3 through its Inverse service. [`fit`] brings a device's metres and axes to the scene's
+//! [`inverse`] is Haply's Inverse3 through its Inverse service, [`hapi`] Haply's 2DIY on a board at a serial port. [`fit`] brings a device's metres and axes to the scene's
 //! millimetres, [`gate`] decides in every exchange whether the hand gets a force, and [`figures`] says what the margin
 //! before play needs to know.
 //!
@@ -11,10 +11,14 @@
 pub mod figures;
 pub mod fit;
 pub mod gate;
+mod hand_over;
+pub mod hapi;
 mod http;
 pub mod inverse;
 
-pub use figures::{InverseFigures, RoundTrip};
+pub use figures::{DeviceFigures, RoundTrip};
 pub use fit::{DeviceAxis, FitError, WorkspaceFit};
 pub use gate::{ForceGate, ForceLimits, ForceStop};
+pub use hand_over::{DeviceMonitor, LinkReport, NO_POSE, SensedPose};
+pub use hapi::{HapiDevice, HapiError, HapiOptions};
 pub use inverse::{InverseDevice, InverseError, InverseOptions};

@@ -2,6 +2,8 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
+use palpate_emulators::ServedDevice;
+use palpate_emulators::inverse::{EmulatedInverse, InverseServiceSettings};
 use palpate_haptics::scene::NoForceReason;
 use palpate_runner::TimeScale;
 use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
@@ -119,6 +121,49 @@ fn keys_press_into_the_tissue_and_lift_again() {
     assert!(flow.says(NoForceReason::NoContact.name()));
     flow.click("Stop the scene");
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
+}
+
+#[test]
+fn a_real_device_is_opened_judged_with_its_delay_and_leads_the_stylus() {
+    let (emulated, _panel) = EmulatedInverse::new(InverseServiceSettings::default()).unwrap();
+    let served = ServedDevice::start(emulated, ServedDevice::free_port()).unwrap();
+    let mut flow = open();
+    flow.wait("the path", |window| screen_of::<SceneScreen>(window).computed_path().is_some());
+    flow.type_into("nodes", "51");
+    flow.click("haptic device");
+    flow.window.run_steps(2);
+    flow.window.check_accessibility();
+    for (device, words) in [("omni", "inverse:NAME"), ("inverse:left", "left")] {
+        flow.type_into("device", device);
+        flow.type_into("service", &served.address);
+        if flow.is_enabled("Start the scene") {
+            flow.click("Start the scene");
+        }
+        flow.wait_for_words(words);
+        assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
+    }
+    flow.type_into("device", "inverse");
+    let folder = flow.folder.path().join("touched");
+    flow.type_into("record to", &folder.display().to_string());
+    flow.click("Start the scene");
+    flow.wait("the device", |window| screen_of::<SceneScreen>(window).is_running());
+    flow.wait_for_words("a round trip takes");
+    assert!(flow.says("the device moves the stylus"));
+    flow.window.check_accessibility();
+    // One tick between a position and its force, the round trip, and what the service adds: never none.
+    let looped = screen_of::<SceneScreen>(&flow.window).live_scene().unwrap().loop_device();
+    assert!(looped.delay_ticks >= 1.0, "{looped:?}");
+    flow.wait("reports of the device", |window| {
+        let live = screen_of::<SceneScreen>(window).live_scene().unwrap();
+        live.device().unwrap().used().reports > 10 && live.now() > 0.2
+    });
+    flow.window.key_press(Key::Escape);
+    flow.window.run_steps(2);
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
+    flow.wait_for_words("ticks recorded");
+    flow.click("Replay recording");
+    flow.wait("the replay", |window| replayed(window).is_some());
+    assert_eq!(replayed(&flow.window), Some(Ok(true)));
 }
 
 #[test]

@@ -48,15 +48,14 @@ pub fn played_text(played: &SceneRun) -> String {
 /// What is to be known of a device before the first touch.
 #[must_use]
 pub fn device_lines(report: &DeviceReport) -> Vec<String> {
-    let grip = report.grip.as_ref().map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
     let mut lines = vec![format!(
-        "device {}, {grip}, service {}: a round trip takes {:.2} ms, 99 % at most {:.2} ms; the loop is {:.1} ticks late",
-        report.name,
-        report.service,
+        "{}: a round trip takes {:.2} ms, 99 % at most {:.2} ms; the loop is {:.1} ticks late",
+        report.description,
         report.round_trip_median_ms,
         report.round_trip_p99_ms,
         report.delay_ticks
     )];
+    lines.extend(report.warnings.iter().map(|warning| (*warning).to_owned()));
     lines.extend(report.sentences.iter().cloned());
     lines
 }

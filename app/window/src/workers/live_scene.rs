@@ -1,6 +1,8 @@
 //! The scene of the window: computed along a path, or in a loop of its own, and its past for the plots.
 
 use super::trail::{TIMING_S, forget_old};
+use palpate_analysis::scene_device::{DeviceReport, DeviceUse, OpenDevice};
+use palpate_haptic_devices::DeviceMonitor;
 use palpate_haptics::LawSettings;
 use palpate_haptics::margin::{LoopDevice, Margin, MarginSettings};
 use palpate_haptics::scene::{HandLedScene, HandPose, Scene, ScenePath, SceneSettings, SceneTick};
@@ -73,22 +75,54 @@ impl SceneInstant {
     }
 }
 
-/// The margin of a scene's loop where it is now.
+/// The margin of a scene's loop through `device` where it is now.
 #[must_use]
-pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
-    let device = &settings.device;
+pub fn margin_of(settings: &SceneSettings, device: LoopDevice, tick: &SceneTick) -> Margin {
     let watch = MarginSettings {
         body: LawSettings::of(settings.body, settings.period).body,
         scheme: settings.scheme,
         period: settings.period,
-        device: LoopDevice {
-            damping: device.damping_n_s_per_mm,
-            friction: Newtons(device.friction_n),
-            count_mm: device.step_mm,
-            delay_ticks: 0.0,
-        },
+        device,
     };
     watch.at(Depth(tick.depth), MmPerS(tick.speed))
+}
+
+/// The simulated device of a scene in its loop: nothing delays it.
+#[must_use]
+pub fn simulated_loop(settings: &SceneSettings) -> LoopDevice {
+    let device = &settings.device;
+    LoopDevice {
+        damping: device.damping_n_s_per_mm,
+        friction: Newtons(device.friction_n),
+        count_mm: device.step_mm,
+        delay_ticks: 0.0,
+    }
+}
+
+/// What moves the stylus of a scene.
+pub enum SceneLead {
+    /// The simulated hand, along a path and then where it is pointed.
+    Path(ScenePath),
+    /// The simulated hand, where it is pointed.
+    Pointer,
+    /// A person's hand on a device that was opened for the scene.
+    Device(OpenDevice, DeviceReport),
+}
+
+/// The device of a scene that runs or ran.
+#[derive(Debug)]
+pub struct PlayedDevice {
+    /// What was known before the first touch.
+    pub report: DeviceReport,
+    looped: LoopDevice,
+    monitor: DeviceMonitor,
+}
+
+impl PlayedDevice {
+    /// How the connection is.
+    pub fn used(&self) -> DeviceUse {
+        DeviceUse::of(self.monitor.report())
+    }
 }
 
 /// A scene computed along a path, not in real time.
@@ -141,26 +175,36 @@ pub struct LiveScene {
     timing_read_at: f64,
     is_led: bool,
     priority: String,
+    device: Option<PlayedDevice>,
 }
 
 impl LiveScene {
-    /// Starts the loop; the hand goes along `path` and then where it is pointed.
+    /// Starts the loop; `settings` are those of the device that leads it.
     pub fn start(
         settings: SceneSettings,
-        path: Option<ScenePath>,
+        lead: SceneLead,
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
         let scene = Scene::new(settings).map_err(|err| err.to_string())?;
         let moment = SceneInstant::of(&scene);
-        let live = SceneLoop::start(scene, path, recorder)?;
+        let is_led = matches!(lead, SceneLead::Path(_));
+        let (live, device) = match lead {
+            SceneLead::Path(path) => (SceneLoop::start(scene, Some(path), recorder)?, None),
+            SceneLead::Pointer => (SceneLoop::start(scene, None, recorder)?, None),
+            SceneLead::Device(OpenDevice { device, looped, monitor }, report) => {
+                let live = SceneLoop::start_on_device(device, scene, recorder)?;
+                (live, Some(PlayedDevice { report, looped, monitor }))
+            }
+        };
         Ok(Self {
             settings,
             moment,
             trail: VecDeque::new(),
             timing: live.timing(),
             timing_read_at: 0.0,
-            is_led: path.is_some(),
+            is_led,
             priority: live.granted_priority().to_string(),
+            device,
             live: Some(live),
         })
     }
@@ -217,6 +261,16 @@ impl LiveScene {
 
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
+    }
+
+    /// The real device, if one leads it.
+    pub fn device(&self) -> Option<&PlayedDevice> {
+        self.device.as_ref()
+    }
+
+    /// What its loop goes through.
+    pub fn loop_device(&self) -> LoopDevice {
+        self.device.as_ref().map_or_else(|| simulated_loop(&self.settings), |device| device.looped)
     }
 
     pub fn moment(&self) -> &SceneInstant {

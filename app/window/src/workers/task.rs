@@ -99,6 +99,11 @@ impl<T: Send + 'static> BackgroundTask<T> {
         self.answer.as_ref()
     }
 
+    /// The answer, for which there is one owner.
+    pub fn take_answer(&mut self) -> Option<Result<T, String>> {
+        self.answer.take()
+    }
+
     /// None while no work is in progress.
     pub fn state(&self) -> Option<TaskState> {
         let seconds = self.since.as_ref()?.seconds();

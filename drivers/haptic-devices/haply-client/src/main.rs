@@ -5,43 +5,17 @@ use haply::HaplyDevice;
 use haply::device_model::{
     Config, Force, ForceInput, Inverse3Configure, PresetConfig, ProfileConfig, SessionConfigure,
 };
+use palpate_emulators::ServedDevice;
 use palpate_emulators::inverse::{
     EmulatedInverse, InverseFault, InverseLie, InversePanel, InverseServiceSettings,
 };
-use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
-use palpate_model::Nanos;
 use std::error::Error;
-use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::atomic::AtomicBool;
-use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 
 type Outcome = Result<(), Box<dyn Error + Send + Sync>>;
 
 /// Longest wait for something that must come.
 const WAITS: u32 = 2000;
-
-fn start() -> Result<(SocketAddr, InversePanel), Box<dyn Error + Send + Sync>> {
-    let (mut device, panel) = EmulatedInverse::new(InverseServiceSettings::default())?;
-    let (ready, address) = sync_channel(1);
-    let (_orders, received) = sync_channel(1);
-    std::thread::Builder::new().name("inverse".into()).spawn(move || {
-        let options = ServeOptions {
-            address: EmulatorAddress::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
-            baud: None,
-            latency: Nanos::ZERO,
-            faults: Vec::new(),
-            seed: 1,
-        };
-        let mut notify = |event| {
-            if let ServeEvent::Ready(address) = event {
-                let _ = ready.send(address);
-            }
-        };
-        let _ = serve(&mut device, &options, &received, &AtomicBool::new(false), &mut notify);
-    })?;
-    Ok((address.recv()?.parse()?, panel))
-}
 
 fn check(what: &str, is_so: bool) -> Outcome {
     println!("{what}: {}", if is_so { "as expected" } else { "DIFFERENT" });
@@ -63,7 +37,9 @@ async fn push(device: &mut HaplyDevice, panel: &InversePanel, z: f32) -> Outcome
 }
 
 async fn drive() -> Outcome {
-    let (address, panel) = start()?;
+    let (service, panel) = EmulatedInverse::new(InverseServiceSettings::default())?;
+    let served = ServedDevice::start(service, ServedDevice::free_port())?;
+    let address = &served.address;
     let mut device =
         HaplyDevice::new(&format!("http://{address}"), &format!("ws://{address}/")).await?;
     let version = device.get_service_version().await?;

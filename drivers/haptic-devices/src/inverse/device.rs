@@ -1,25 +1,21 @@
 //! The device: a thread with the connection, and the ends of it in the scene's loop.
 
 use super::discover::{DeadMan, FoundDevice, InverseError, find};
-use super::exchange::{BEAT, Exchange, NO_POSE, SensedPose};
+use super::exchange::{BEAT, Exchange};
 use super::link::Link;
-use super::message::ReportFault;
-use crate::figures::{InverseFigures, RoundTrip};
+use crate::figures::{DeviceFigures, RoundTrip};
 use crate::fit::WorkspaceFit;
-use crate::gate::{ForceLimits, ForceStop};
+use crate::gate::ForceLimits;
+use crate::hand_over::{DeviceMonitor, SceneEnd, ThreadEnd, hand_over};
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::wire::HostClock;
 use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::scene::{DeviceSettings, Pose};
 use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
-use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{JoinHandle, park_timeout, sleep};
+use std::thread::{park_timeout, sleep};
 use std::time::Duration;
-use triple_buffer::{Input, Output, triple_buffer};
 
 /// Messages whose round trip is measured at the start: 0.2 s of no force.
 const PINGS: usize = 200;
@@ -34,8 +30,6 @@ const RECEIVED_MAX: usize = 16;
 const GOODBYE_TURNS: u32 = 50;
 /// From one attempt to connect again to the next.
 const RETRY: Duration = Duration::from_millis(200);
-/// Time in which a pose must be new: a thread that does not run reports no fault of its own.
-const POSE_AGE_MAX_S: f64 = 0.005;
 
 /// Which device, and how it lies in the scene.
 #[derive(Clone, Debug)]
@@ -47,7 +41,7 @@ pub struct InverseOptions {
     pub dead_man: DeadMan,
     pub fit: WorkspaceFit,
     pub limits: ForceLimits,
-    pub figures: InverseFigures,
+    pub figures: DeviceFigures,
     /// Middle of the tissue's surface in the scene, in mm.
     pub middle: [f64; 3],
     /// From tick to tick of the scene.
@@ -64,66 +58,20 @@ impl InverseOptions {
             dead_man: DeadMan::IfPresent,
             fit: WorkspaceFit::default(),
             limits: ForceLimits::default(),
-            figures: InverseFigures::default(),
+            figures: DeviceFigures::inverse3(),
             middle,
             period,
         }
     }
 }
 
-/// How the connection is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkReport {
-    pub is_connected: bool,
-    /// Why there is no force.
-    pub stop: ForceStop,
-    /// The newest report that could not be, and how many there were.
-    pub fault: Option<ReportFault>,
-    pub faults: u64,
-    /// Reports received.
-    pub reports: u64,
-    /// Times that the connection was lost.
-    pub losses: u64,
-}
-
-/// A look at a device while the scene's loop has it.
-#[derive(Clone, Debug)]
-pub struct InverseMonitor(Arc<Mutex<LinkReport>>);
-
-impl InverseMonitor {
-    /// How the connection is.
-    #[must_use]
-    pub fn report(&self) -> LinkReport {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// A tick of the scene.
-#[derive(Clone, Copy, Debug, Default)]
-struct Order {
-    number: u64,
-    /// When the scene gave it: a thread that runs late must not take it for new.
-    at: Nanos,
-    force: [f64; 3],
-}
-
 /// An Inverse3 in use. Dropping it sends zero force and ends the session.
+#[derive(Debug)]
 pub struct InverseDevice {
-    settings: DeviceSettings,
+    scene: SceneEnd,
     found: FoundDevice,
     round_trip: RoundTrip,
     loop_device: LoopDevice,
-    sensed: Output<SensedPose>,
-    orders: Input<Order>,
-    clock: HostClock,
-    number: u64,
-    /// The newest report seen, and ticks since.
-    seen: u64,
-    ticks_without: u64,
-    ticks_without_max: u64,
-    monitor: InverseMonitor,
-    is_ending: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
 }
 
 impl InverseDevice {
@@ -139,41 +87,14 @@ impl InverseDevice {
         let mut exchange = Exchange::new(names, fit, options.middle, limits);
         let mut link = connect(options.address, &mut exchange)?;
         let round_trip = measure(&mut link, &mut exchange, &clock)?;
-        let (pose_input, sensed) = triple_buffer(&SensedPose { number: 0, pose: NO_POSE });
-        let (orders, order_output) = triple_buffer(&Order::default());
-        let monitor = InverseMonitor(Arc::new(Mutex::new(LinkReport::default())));
-        let is_ending = Arc::new(AtomicBool::new(false));
-        let service = Service {
-            address: options.address,
-            exchange,
-            clock: Arc::clone(&clock),
-            poses: pose_input,
-            orders: order_output,
-            last_order: 0,
-            monitor: monitor.clone(),
-            losses: 0,
-            is_ending: Arc::clone(&is_ending),
-        };
-        let thread = std::thread::Builder::new()
-            .name("haptic-device".into())
-            .spawn(move || service.run(link))
-            .map_err(InverseError::Thread)?;
-        let period_s = options.period.seconds().0;
+        let (mut scene, thread) = hand_over(settings, options.period, clock);
+        let service = Service { address: options.address, exchange, scene: thread };
+        scene.start(move || service.run(link)).map_err(InverseError::Thread)?;
         Ok(Self {
             loop_device: options.figures.loop_device(&settings, &round_trip, options.period),
-            settings,
+            scene,
             found,
             round_trip,
-            sensed,
-            orders,
-            clock,
-            number: 0,
-            seen: 0,
-            ticks_without: 0,
-            ticks_without_max: (POSE_AGE_MAX_S / period_s).ceil().max(1.0) as u64,
-            monitor,
-            is_ending,
-            thread: Some(thread),
         })
     }
 
@@ -197,50 +118,22 @@ impl InverseDevice {
 
     /// A look at it for another thread.
     #[must_use]
-    pub fn monitor(&self) -> InverseMonitor {
-        self.monitor.clone()
-    }
-}
-
-impl fmt::Debug for InverseDevice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("InverseDevice").field("found", &self.found).finish_non_exhaustive()
+    pub fn monitor(&self) -> DeviceMonitor {
+        self.scene.monitor.clone()
     }
 }
 
 impl HapticDevice for InverseDevice {
     fn settings(&self) -> &DeviceSettings {
-        &self.settings
+        &self.scene.settings
     }
 
     fn sense(&mut self, elapsed: u64) -> Pose {
-        let sensed = *self.sensed.read();
-        if sensed.number == self.seen {
-            self.ticks_without = self.ticks_without.saturating_add(elapsed);
-        } else {
-            self.seen = sensed.number;
-            self.ticks_without = 0;
-        }
-        if self.ticks_without > self.ticks_without_max { NO_POSE } else { sensed.pose }
+        self.scene.sense(elapsed)
     }
 
     fn give(&mut self, force: [f64; 3]) {
-        self.number += 1;
-        self.orders.write(Order { number: self.number, at: (self.clock)(), force });
-        if let Some(thread) = &self.thread {
-            thread.thread().unpark();
-        }
-    }
-}
-
-impl Drop for InverseDevice {
-    fn drop(&mut self) {
-        self.is_ending.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.thread().unpark();
-            // A thread that failed has let the connection go, and the service ends its force.
-            let _ = thread.join();
-        }
+        self.scene.give(force);
     }
 }
 
@@ -293,26 +186,16 @@ fn measure(
 struct Service {
     address: SocketAddr,
     exchange: Exchange,
-    clock: HostClock,
-    poses: Input<SensedPose>,
-    orders: Output<Order>,
-    last_order: u64,
-    monitor: InverseMonitor,
-    losses: u64,
-    is_ending: Arc<AtomicBool>,
+    scene: ThreadEnd,
 }
 
 impl Service {
-    fn is_ending(&self) -> bool {
-        self.is_ending.load(Ordering::Relaxed)
-    }
-
     /// Runs until the device is dropped; a lost connection is opened again.
     fn run(mut self, first: Link) {
         // Without real-time priority it runs as an ordinary thread; the watchdog counts time, not turns.
         let _ = request_real_time();
         let mut link = Some(first);
-        while !self.is_ending() {
+        while !self.scene.is_ending() {
             match link.take() {
                 Some(open) => {
                     if let Some(open) = self.talk(open) {
@@ -328,17 +211,18 @@ impl Service {
 
     /// Exchanges messages until the device is dropped, with the connection, or until that is lost.
     fn talk(&mut self, mut link: Link) -> Option<Link> {
-        while !self.is_ending() {
-            self.take_order();
+        while !self.scene.is_ending() {
+            if let Some((at, force)) = self.scene.take_order() {
+                self.exchange.set_order(at, force);
+            }
             for _ in 0..RECEIVED_MAX {
                 let Some(text) = link.receive().ok()? else {
                     break;
                 };
-                let now = (self.clock)();
-                let sensed = self.exchange.receive(now, &text);
-                self.poses.write(sensed);
+                let now = self.scene.now();
+                self.scene.show_pose(self.exchange.receive(now, &text));
             }
-            let now = (self.clock)();
+            let now = self.scene.now();
             if self.exchange.is_due(now) {
                 link.send(self.exchange.message(now)).ok()?;
                 self.publish(true);
@@ -352,34 +236,15 @@ impl Service {
         Some(link)
     }
 
-    fn take_order(&mut self) {
-        if self.orders.update() {
-            let order = *self.orders.output_buffer();
-            if order.number != self.last_order {
-                self.last_order = order.number;
-                self.exchange.set_order(order.at, order.force);
-            }
-        }
-    }
-
-    /// Shows how the connection is, and to the scene that there is no pose.
     fn publish(&mut self, is_connected: bool) {
-        let stop = self.exchange.stop();
-        if !is_connected || stop == ForceStop::NoReply {
-            let number = self.exchange.reports();
-            self.poses.write(SensedPose { number, pose: NO_POSE });
-        }
-        let (fault, faults) = self.exchange.faults();
-        let reports = self.exchange.reports();
-        let report = LinkReport { is_connected, stop, fault, faults, reports, losses: self.losses };
-        *self.monitor.0.lock().unwrap_or_else(PoisonError::into_inner) = report;
+        self.scene.publish(self.exchange.link_report(is_connected));
     }
 
     fn lose_link(&mut self) {
-        self.losses += 1;
+        self.scene.count_loss();
         self.exchange.lose_link();
         // Its force is zero now, and its reason is that the connection is lost.
-        self.exchange.note_lost((self.clock)());
+        self.exchange.note_lost(self.scene.now());
         self.publish(false);
     }
 
@@ -394,13 +259,13 @@ impl Service {
     /// Zero force, then the end of the session.
     fn say_goodbye(&mut self, mut link: Link) {
         self.exchange.end();
-        let now = (self.clock)();
+        let now = self.scene.now();
         let _ = link.send(self.exchange.message(now));
         self.publish(true);
         // Closing with reports unread sends a reset, which may overtake the zero; so its answer is waited for a little.
         for _ in 0..GOODBYE_TURNS {
             while let Ok(Some(text)) = link.receive() {
-                self.exchange.receive((self.clock)(), &text);
+                self.exchange.receive(self.scene.now(), &text);
             }
             if !self.exchange.is_waiting() {
                 break;

@@ -3,7 +3,7 @@
 use super::message::{ArmReport, ReportFault, ServiceReport, write_force};
 use crate::fit::WorkspaceFit;
 use crate::gate::{ForceGate, ForceLimits, ForceStop, ReportState};
-use palpate_haptics::scene::Pose;
+use crate::hand_over::{LinkReport, NO_POSE, SensedPose};
 use palpate_model::Nanos;
 use std::collections::VecDeque;
 
@@ -18,18 +18,6 @@ const WAITING_MAX: usize = 1000;
 const SETTLING: u64 = 10;
 /// A place may be this far from the last in addition to four times the largest speed, in mm: some steps of the sensors.
 const JUMP_MM: f64 = 2.0;
-
-/// A pose for the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SensedPose {
-    /// Rises with every report.
-    pub number: u64,
-    /// In the scene's millimetres; at no number while there is none.
-    pub pose: Pose,
-}
-
-/// The pose of a device that is gone.
-pub const NO_POSE: Pose = Pose { at: [f64::NAN; 3], turn: [0.0; 3] };
 
 /// One device in one session of the service.
 #[derive(Debug)]
@@ -207,16 +195,23 @@ impl Exchange {
         self.gate.force(now);
     }
 
+    /// How the dialogue is.
+    #[must_use]
+    pub fn link_report(&self, is_connected: bool) -> LinkReport {
+        LinkReport {
+            is_connected,
+            stop: self.stop(),
+            fault: self.fault.map(ReportFault::name),
+            faults: self.faults,
+            reports: self.reports,
+            losses: 0,
+        }
+    }
+
     /// The newest fault of a report, and how many there were.
     #[must_use]
     pub fn faults(&self) -> (Option<ReportFault>, u64) {
         (self.fault, self.faults)
-    }
-
-    /// Reports received.
-    #[must_use]
-    pub fn reports(&self) -> u64 {
-        self.reports
     }
 }
 

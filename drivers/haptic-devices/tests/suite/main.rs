@@ -1,6 +1,8 @@
-//! The Inverse3 through the crate's public door, on an emulated service.
+//! Haptic devices through the crate's public door, on emulated ones.
 #![cfg(test)]
 
+mod hapi_simulated;
+mod hapi_wires;
 mod margin;
 mod reports;
 mod served;

@@ -1,6 +1,6 @@
 //! The margin before play with the device's own delay and steps.
 
-use palpate_haptic_devices::{InverseFigures, RoundTrip, WorkspaceFit};
+use palpate_haptic_devices::{DeviceFigures, RoundTrip, WorkspaceFit};
 use palpate_haptics::Period;
 use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
 use palpate_haptics::scene::{DeviceSettings, SceneSettings};
@@ -20,8 +20,8 @@ fn assess(device: LoopDevice) -> MarginReport {
 }
 
 fn loop_device(step_mm: f64, millis: f64, scale: f64) -> LoopDevice {
-    let usual = InverseFigures::default();
-    let figures = InverseFigures { device: DeviceSettings { step_mm, ..usual.device }, ..usual };
+    let usual = DeviceFigures::inverse3();
+    let figures = DeviceFigures { device: DeviceSettings { step_mm, ..usual.device }, ..usual };
     let round_trip = RoundTrip::of(vec![Nanos((millis * 1e6) as u64); 100]);
     let fit = WorkspaceFit { scale, ..WorkspaceFit::default() };
     let settings = fit.scene_settings(&figures.device);

@@ -1,64 +1,65 @@
-//! An emulated service on a TCP port of this computer, in a thread of its own.
+//! Emulated devices on ports of this computer, each in a thread of its own.
 #![expect(clippy::disallowed_methods, reason = "the clock of a test stands for the runner's")]
 
-use palpate_drivers::wire::HostClock;
+use palpate_drivers::wire::{DeviceAddress, HostClock};
+use palpate_emulators::ServedDevice;
+use palpate_emulators::hapi::{EmulatedHapi, HapiBoardSettings, HapiPanel};
 use palpate_emulators::inverse::{EmulatedInverse, InversePanel, InverseServiceSettings};
-use palpate_emulators::serve::{EmulatorAddress, ServeEvent, ServeOptions, serve};
-use palpate_haptic_devices::InverseOptions;
+use palpate_haptic_devices::{HapiOptions, InverseOptions};
 use palpate_haptics::Period;
 use palpate_model::Nanos;
-use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::sync_channel;
-use std::thread::JoinHandle;
 use std::time::Instant;
 
-/// A service in use; dropping it ends it.
+/// The middle of the tissue in the scenes here.
+pub const MIDDLE: [f64; 3] = [30.0, 30.0, 0.0];
+
+/// An Inverse service in use; dropping it ends it.
 pub struct ServedInverse {
-    pub address: SocketAddr,
     pub panel: InversePanel,
-    stop: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    served: ServedDevice,
 }
 
 impl ServedInverse {
     pub fn start(settings: InverseServiceSettings) -> Self {
-        let (mut device, panel) = EmulatedInverse::new(settings).unwrap();
-        let stop = Arc::new(AtomicBool::new(false));
-        let is_over = Arc::clone(&stop);
-        let (ready, address) = sync_channel(1);
-        let (_orders, received) = sync_channel(1);
-        let work = move || {
-            let options = ServeOptions {
-                address: EmulatorAddress::Tcp(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
-                baud: None,
-                latency: Nanos::ZERO,
-                faults: Vec::new(),
-                seed: 1,
-            };
-            let mut notify = |event| {
-                if let ServeEvent::Ready(address) = event {
-                    ready.send(address).unwrap();
-                }
-            };
-            serve(&mut device, &options, &received, &is_over, &mut notify).unwrap();
-        };
-        let thread = std::thread::Builder::new().name("inverse".into()).spawn(work).unwrap();
-        let address = address.recv().unwrap().parse().unwrap();
-        Self { address, panel, stop, thread: Some(thread) }
+        let (device, panel) = EmulatedInverse::new(settings).unwrap();
+        let served = ServedDevice::start(device, ServedDevice::free_port()).unwrap();
+        Self { panel, served }
     }
 
     pub fn options(&self) -> InverseOptions {
-        let options = InverseOptions::new([30.0, 30.0, 0.0], Period::MILLISECOND);
-        InverseOptions { address: self.address, ..options }
+        let address = self.served.address.parse().unwrap();
+        InverseOptions { address, ..InverseOptions::new(MIDDLE, Period::MILLISECOND) }
     }
 }
 
-impl Drop for ServedInverse {
-    fn drop(&mut self) {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.take().unwrap().join().unwrap();
+/// A hAPI board in use; dropping it ends it.
+pub struct ServedHapi {
+    pub panel: HapiPanel,
+    served: ServedDevice,
+}
+
+impl ServedHapi {
+    /// On a pseudo-terminal, or on a TCP port where a system has none.
+    pub fn start(settings: HapiBoardSettings) -> Self {
+        let (device, panel) = EmulatedHapi::new(settings).unwrap();
+        let place = match cfg!(unix) {
+            true => palpate_emulators::serve::EmulatorAddress::Pty(None),
+            false => ServedDevice::free_port(),
+        };
+        Self { panel, served: ServedDevice::start(device, place).unwrap() }
+    }
+
+    pub fn address(&self) -> DeviceAddress {
+        let place = self.served.address.clone();
+        match cfg!(unix) {
+            true => DeviceAddress::Serial { port: place, baud: 115_200, has_handshake: false },
+            false => DeviceAddress::Tcp(place),
+        }
+    }
+
+    pub fn options(&self) -> HapiOptions {
+        HapiOptions::new(self.address(), MIDDLE, Period::MILLISECOND)
     }
 }
 

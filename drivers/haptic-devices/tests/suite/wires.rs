@@ -2,8 +2,10 @@
 
 use super::served::{ServedInverse, clock};
 use palpate_emulators::inverse::{InverseFault, InverseLie, InverseServiceSettings};
-use palpate_haptic_devices::inverse::{DeadMan, InverseMonitor, LinkReport};
-use palpate_haptic_devices::{ForceLimits, ForceStop, InverseDevice, InverseError, InverseOptions};
+use palpate_haptic_devices::inverse::DeadMan;
+use palpate_haptic_devices::{
+    DeviceMonitor, ForceLimits, ForceStop, InverseDevice, InverseError, InverseOptions, LinkReport,
+};
 use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::Pose;
 use palpate_model::Nanos;
@@ -27,7 +29,7 @@ fn open(options: &InverseOptions) -> Result<InverseDevice, InverseError> {
 /// Ticks until the connection is as wanted.
 fn tick_until(
     device: &mut InverseDevice,
-    monitor: &InverseMonitor,
+    monitor: &DeviceMonitor,
     is_so: impl Fn(&LinkReport) -> bool,
 ) -> LinkReport {
     let mut tick = || {

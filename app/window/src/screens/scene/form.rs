@@ -5,6 +5,7 @@ use crate::widgets::{
     tick_box,
 };
 use eframe::egui::Ui;
+use palpate_analysis::scene_device::{DeviceChoice, DeviceName};
 use palpate_haptics::scene::{ScenePath, SceneSettings};
 use palpate_haptics::surface::INERT;
 use palpate_runner::haptics::scene_file::SceneFile;
@@ -22,7 +23,15 @@ pub(super) enum FileAction {
     Read,
 }
 
-/// A scene file's numbers and the path of the hand.
+/// What moves the stylus, as chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HandChoice {
+    Path(ScenePath),
+    Pointer,
+    Device,
+}
+
+/// A scene file's numbers and what moves the stylus.
 pub(super) struct SceneForm {
     /// Path of the file; none for the scene built in.
     pub file: String,
@@ -35,8 +44,10 @@ pub(super) struct SceneForm {
     friction: QuantityField,
     rate: QuantityField,
     is_guarded: bool,
-    /// What leads the hand at first; the pointer and the keys without one.
-    pub path: Option<ScenePath>,
+    pub hand: HandChoice,
+    /// A real device, and where the service of an Inverse listens.
+    device: String,
+    service: String,
 }
 
 impl Default for SceneForm {
@@ -57,7 +68,9 @@ impl SceneForm {
             friction: QuantityField::new(read.friction),
             rate: QuantityField::new(read.rate_hz),
             is_guarded: read.is_guarded,
-            path: Some(FIRST_PATH),
+            hand: HandChoice::Path(FIRST_PATH),
+            device: "inverse".into(),
+            service: "127.0.0.1:10001".into(),
             read,
         }
     }
@@ -75,7 +88,9 @@ impl SceneForm {
     pub fn take(&mut self, file: SceneFile) {
         *self = Self {
             file: std::mem::take(&mut self.file),
-            path: self.path,
+            hand: self.hand,
+            device: std::mem::take(&mut self.device),
+            service: std::mem::take(&mut self.service),
             notes: std::mem::take(&mut self.notes),
             ..Self::of(file)
         };
@@ -93,6 +108,22 @@ impl SceneForm {
         self.slope.check(|slope| within(slope, [0.0, 1000.0]));
         self.friction.check(|friction| within(friction, [0.0, 10.0]));
         self.rate.check(check_rate);
+    }
+
+    /// The path that is chosen, or the one to begin with.
+    pub fn path(&self) -> ScenePath {
+        match self.hand {
+            HandChoice::Path(path) => path,
+            HandChoice::Pointer | HandChoice::Device => FIRST_PATH,
+        }
+    }
+
+    /// The device to open.
+    pub fn device(&self) -> Result<DeviceChoice, String> {
+        let name: DeviceName =
+            self.device.trim().parse().map_err(|words| format!("device: {words}"))?;
+        let service = self.service.trim().parse();
+        Ok(name.at(service.map_err(|_| "service: give ADDRESS:PORT, such as 127.0.0.1:10001")?))
     }
 
     /// What the scene is made of, or the first thing that is wrong.
@@ -141,10 +172,19 @@ impl SceneForm {
         section_ui(ui, "Hand");
         ui.horizontal_wrapped(|ui| {
             for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name()).named(path.name());
+                let choice = HandChoice::Path(path);
+                ui.radio_value(&mut self.hand, choice, path.name()).named(path.name());
             }
-            ui.radio_value(&mut self.path, None, "pointer and keys").named("pointer and keys");
+            for (choice, name) in
+                [(HandChoice::Pointer, "pointer and keys"), (HandChoice::Device, "haptic device")]
+            {
+                ui.radio_value(&mut self.hand, choice, name).named(name);
+            }
         });
+        if self.hand == HandChoice::Device {
+            text_row(ui, "device", "inverse, inverse:NAME or hapi:PORT", &mut self.device);
+            text_row(ui, "service", "ADDRESS:PORT of an Inverse's service", &mut self.service);
+        }
         action
     }
 

@@ -40,10 +40,11 @@ fn shown_scene<'a>(
     match (side, live, computed) {
         (PictureSource::Live, Some(live), _) => {
             let end = live.now().max(PAST_S);
-            let title = match (live.is_running(), live.is_led()) {
-                (false, _) => "stopped; the last picture",
-                (true, true) => "the path moves the hand",
-                (true, false) => "the pointer and the keys move the hand",
+            let title = match (live.is_running(), live.is_led(), live.device()) {
+                (false, ..) => "stopped; the last picture",
+                (true, _, Some(_)) => "the device moves the stylus",
+                (true, true, None) => "the path moves the hand",
+                (true, false, None) => "the pointer and the keys move the hand",
             };
             Ok(ShownScene {
                 instant: live.moment(),

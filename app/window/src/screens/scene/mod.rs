@@ -11,16 +11,20 @@ use super::tape::{TapePanel, loop_button_ui};
 use crate::scene::look::SceneLook;
 use crate::scene::view::SceneView;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
-use crate::workers::live_scene::{ComputedPath, LiveScene, SceneInstant, compute_path};
+use crate::workers::live_scene::{
+    ComputedPath, LiveScene, SceneInstant, SceneLead, compute_path, simulated_loop,
+};
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
-use form::SceneForm;
+use form::{HandChoice, SceneForm};
 use middle::PictureSource;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::scene::{finish_scene_recording, read_scene, replay};
+use palpate_analysis::scene_device::{DeviceReport, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
+use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::scene::{HandPose, SceneSettings};
-use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
+use palpate_runner::haptics::scene::{COLUMNS, SENSED_COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
 use plan::PlannedScene;
 use serde_json::Value;
@@ -28,6 +32,9 @@ use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
 const TURN: [f64; 3] = [0.0, -0.5, 0.0];
+
+/// Why nothing else is started meanwhile.
+const OPENING: &str = "the device of the scene is being opened";
 
 pub const SCREEN: ScreenEntry = ScreenEntry {
     name: "Scene",
@@ -42,6 +49,8 @@ pub struct SceneScreen {
     form: SceneForm,
     reading: BackgroundTask<(SceneFile, Vec<String>)>,
     computed: BackgroundTask<ComputedPath>,
+    /// A device that is being opened for the scene of the form.
+    opening: BackgroundTask<(OpenDevice, DeviceReport)>,
     is_shown: bool,
     live: Option<LiveScene>,
     /// What it is made of.
@@ -55,6 +64,13 @@ pub struct SceneScreen {
     viewed_mm: f64,
 }
 
+/// What the numbers on the right are of.
+struct SeenScene<'a> {
+    settings: &'a SceneSettings,
+    instant: &'a SceneInstant,
+    device: LoopDevice,
+}
+
 impl Default for SceneScreen {
     fn default() -> Self {
         let form = SceneForm::default();
@@ -63,6 +79,7 @@ impl Default for SceneScreen {
             form,
             reading: BackgroundTask::default(),
             computed: BackgroundTask::default(),
+            opening: BackgroundTask::default(),
             is_shown: false,
             live: None,
             live_file: SceneFile::default(),
@@ -94,11 +111,16 @@ impl SceneScreen {
     /// Whether the scene of the form can start, or why not.
     fn verdict(&self, workbench: &Workbench) -> Result<(), String> {
         workbench.loop_verdict(SCREEN.name)?;
-        self.compute_verdict()
+        self.compute_verdict()?;
+        match self.form.hand {
+            HandChoice::Device => self.form.device().map(|_| ()),
+            HandChoice::Path(_) | HandChoice::Pointer => Ok(()),
+        }
     }
 
     fn compute_verdict(&self) -> Result<(), String> {
         require(!self.is_running(), "the scene runs")?;
+        require(!self.opening.is_busy(), OPENING)?;
         self.form.settings().map(|_| ())
     }
 
@@ -120,7 +142,7 @@ impl SceneScreen {
     /// Computes the scene of the form along its path.
     fn compute(&mut self, ctx: &Context) {
         let Ok(settings) = self.form.settings() else { return };
-        let path = self.form.path.unwrap_or(form::FIRST_PATH);
+        let path = self.form.path();
         self.side = PictureSource::Computed;
         self.look_at(&settings);
         self.computed.start("scene-path", ctx, move |progress| {
@@ -128,18 +150,39 @@ impl SceneScreen {
         });
     }
 
-    /// Starts the scene, unless it runs, and records it if a folder is named.
+    /// Starts the scene, unless it runs, and records it if a folder is named. A device is opened first.
     fn start(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
-        let started = self.form.scene_file().and_then(|file| {
-            let settings = self.form.settings()?;
+        match self.form.hand {
+            HandChoice::Path(path) => self.begin(ctx, SceneLead::Path(path)),
+            HandChoice::Pointer => self.begin(ctx, SceneLead::Pointer),
+            HandChoice::Device => {
+                let wanted = (self.form.device(), self.form.settings());
+                let (Ok(choice), Ok(settings)) = wanted else { return };
+                self.refusal = None;
+                self.opening.start("scene-device", ctx, move |_| open_device(&choice, &settings));
+            }
+        }
+    }
+
+    /// Starts the scene with what leads it.
+    fn begin(&mut self, ctx: &Context, lead: SceneLead) {
+        let started = self.form.scene_file().and_then(|mut file| {
+            let columns = match &lead {
+                SceneLead::Path(_) | SceneLead::Pointer => COLUMNS,
+                SceneLead::Device(open, _) => {
+                    file.device = *open.device.settings();
+                    SENSED_COLUMNS
+                }
+            };
+            let settings = file.settings(file.nodes.unwrap_or_default())?;
             self.look_at(&settings);
             let text = file.text();
-            let begin = |folder: &Path| SceneRecorder::start(folder, &text, COLUMNS);
+            let begin = |folder: &Path| SceneRecorder::start(folder, &text, columns);
             let recorder = self.tape.begin(ctx, begin)?;
-            let live = LiveScene::start(settings, self.form.path, recorder)?;
+            let live = LiveScene::start(settings, lead, recorder)?;
             Ok((live, file))
         });
         match started {
@@ -165,12 +208,18 @@ impl SceneScreen {
     }
 
     /// What is on the screen: the scene that runs or ran, or the computed path.
-    fn seen(&self) -> Option<(&SceneSettings, &SceneInstant)> {
+    fn seen(&self) -> Option<SeenScene<'_>> {
         match (self.side, &self.live, self.computed.answer()) {
-            (PictureSource::Live, Some(live), _) => Some((live.settings(), live.moment())),
-            (PictureSource::Computed, _, Some(Ok(computed))) => {
-                Some((&computed.settings, &computed.deepest))
-            }
+            (PictureSource::Live, Some(live), _) => Some(SeenScene {
+                settings: live.settings(),
+                instant: live.moment(),
+                device: live.loop_device(),
+            }),
+            (PictureSource::Computed, _, Some(Ok(computed))) => Some(SeenScene {
+                settings: &computed.settings,
+                instant: &computed.deepest,
+                device: simulated_loop(&computed.settings),
+            }),
             _ => None,
         }
     }
@@ -178,8 +227,8 @@ impl SceneScreen {
 
 impl Screen for SceneScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
-        // A running scene keeps its settings.
-        let is_running = self.is_running();
+        // A running scene keeps its settings, and one whose device is being opened.
+        let is_running = self.is_running() || self.opening.is_busy();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
             Some(form::FileAction::Dialog) => commands.push(UiCommand::Choose(PathPurpose::Scene)),
             Some(form::FileAction::Read) => commands.push(UiCommand::OpenScene),
@@ -194,9 +243,18 @@ impl Screen for SceneScreen {
         section_ui(ui, "Touch");
         let both = [UiCommand::SceneStart, UiCommand::SceneStop];
         loop_button_ui(ui, "scene", is_running, &self.verdict(workbench), both, commands);
-        let words = match self.live.as_ref().is_some_and(LiveScene::is_led) {
-            true => "The path moves the hand; at its end the pointer and the keys take over.",
-            false => {
+        let live = self.live.as_ref().filter(|live| live.is_running());
+        let words = match (live.map(LiveScene::is_led), live.and_then(LiveScene::device)) {
+            _ if self.opening.is_busy() => {
+                "The device is being opened; its delay is measured with zero force."
+            }
+            (_, Some(_)) => {
+                "The device moves the stylus. Read what stands on the right, then press the button of the grip."
+            }
+            (Some(true), None) => {
+                "The path moves the hand; at its end the pointer and the keys take over."
+            }
+            (Some(false) | None, None) => {
                 "In the picture: hold the left button to press, and turn the wheel to press deeper; drag with the right \
                  button to rotate, turn the wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift \
                  with arrows rotates, + and - zoom, Home resets the camera."
@@ -219,7 +277,7 @@ impl Screen for SceneScreen {
         self.draw_right(ui);
     }
 
-    fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+    fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
         self.form.check();
         self.tape.poll();
         self.computed.poll();
@@ -230,6 +288,13 @@ impl Screen for SceneScreen {
                     self.form.fill(file.clone(), notes.clone());
                 }
                 Some(Err(reason)) => self.refusal = Some(reason.clone()),
+                None => {}
+            }
+        }
+        if self.opening.poll() {
+            match self.opening.take_answer() {
+                Some(Ok((device, report))) => self.begin(ctx, SceneLead::Device(device, report)),
+                Some(Err(reason)) => self.refusal = Some(reason),
                 None => {}
             }
         }
@@ -279,14 +344,22 @@ impl Screen for SceneScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.computed.is_busy() || self.tape.is_busy() || self.is_running()
+        self.computed.is_busy()
+            || self.opening.is_busy()
+            || self.tape.is_busy()
+            || self.is_running()
     }
 
     fn running(&self) -> Option<&'static str> {
-        self.is_running().then_some("the scene runs")
+        match self.opening.is_busy() {
+            true => Some(OPENING),
+            false => self.is_running().then_some("the scene runs"),
+        }
     }
 
     fn stop(&mut self) {
+        // A device that is still being opened is closed as soon as it is open.
+        self.opening = BackgroundTask::default();
         if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
             self.tape.end(move || live.stop().and_then(finish_scene_recording));
         }
@@ -306,7 +379,8 @@ impl Screen for SceneScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let can_stop = require(self.is_running(), "the scene is not running");
+        let is_running = self.is_running() || self.opening.is_busy();
+        let can_stop = require(is_running, "the scene is not running");
         let can_start = self.verdict(workbench);
         vec![
             PaletteAction::new("Start the scene", "", UiCommand::SceneStart).if_ok(can_start),

@@ -1,22 +1,26 @@
 //! Force on the hand, its limits, and timing of the loop.
 
-use super::SceneScreen;
 use super::middle::PictureSource;
+use super::{SceneScreen, SeenScene};
 use crate::widgets::{fact_ui, loop_times_ui, placeholder_ui, section_ui, small_ui, tokens_of};
-use crate::workers::live_scene::{LiveScene, force_of, margin_of};
+use crate::workers::live_scene::{LiveScene, PlayedDevice, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::margin_text;
-use palpate_haptics::scene::{SceneSettings, SceneTick};
+use palpate_analysis::report::scene::device_lines;
+use palpate_haptics::scene::SceneTick;
 
 impl SceneScreen {
     pub fn draw_right(&self, ui: &mut Ui) {
-        let Some((settings, instant)) = self.seen() else {
+        let Some(seen) = self.seen() else {
             return placeholder_ui(ui, "no scene yet");
         };
-        force_ui(ui, &instant.tick);
-        guard_ui(ui, settings, &instant.tick);
+        force_ui(ui, &seen.instant.tick);
+        guard_ui(ui, &seen);
         let live = self.live.as_ref().filter(|_| self.side == PictureSource::Live);
         if let Some(live) = live {
+            if let Some(device) = live.device() {
+                device_ui(ui, device);
+            }
             loop_ui(ui, live);
         }
     }
@@ -34,11 +38,12 @@ fn force_ui(ui: &mut Ui, tick: &SceneTick) {
     ui.add(Label::new(tick.no_force_reason.name()).wrap());
 }
 
-fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
+fn guard_ui(ui: &mut Ui, seen: &SeenScene<'_>) {
+    let (settings, tick) = (seen.settings, &seen.instant.tick);
     let tokens = tokens_of(ui);
     section_ui(ui, "Margin and guard");
     if tick.is_contact() {
-        let margin = margin_text(&margin_of(settings, tick));
+        let margin = margin_text(&margin_of(settings, seen.device, tick));
         ui.add(Label::new(margin).wrap());
     } else {
         ui.label("no margin without contact");
@@ -55,6 +60,19 @@ fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
     if tick.is_buzzing {
         let words = RichText::new("limit cycle: the loop vibrates by itself");
         ui.label(words.strong().color(tokens.alarm_text));
+    }
+}
+
+/// A real device: how the connection is, and what was known before the first touch.
+fn device_ui(ui: &mut Ui, device: &PlayedDevice) {
+    section_ui(ui, "Device");
+    let used = device.used();
+    fact_ui(ui, "now", used.stop);
+    let counts =
+        format!("{} reports, {} impossible, {} losses", used.reports, used.faults, used.losses);
+    fact_ui(ui, "connection", counts);
+    for line in device_lines(&device.report) {
+        small_ui(ui, line);
     }
 }
 
