@@ -1,7 +1,7 @@
 //! The device: a thread with the port, and the end of it in the scene's loop.
 
 use super::exchange::{BEAT, Exchange, HapiFault, LineState};
-use super::message::{BoardSetup, write_first};
+use super::message::{BoardSetup, write_first, write_zero};
 use crate::figures::{DeviceFigures, RoundTrip};
 use crate::fit::{DeviceAxis, FitError, WorkspaceFit};
 use crate::gate::ForceLimits;
@@ -124,7 +124,7 @@ impl HapiDevice {
         let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
         let limits = ForceLimits { force_max_n, ..options.limits };
         let port = options.address.to_string();
-        let mut opened = Opened { link: options.address.open()?, clock, port };
+        let mut opened = Opened { link: Port(options.address.open()?), clock, port };
         let fresh = || {
             let board = (options.linkage, options.setup);
             Exchange::new(board, fit, options.middle, limits)
@@ -182,9 +182,20 @@ impl HapticDevice for HapiDevice {
     }
 }
 
+/// An open port. Whatever ends its use, a panic included, the last packet is a zero.
+struct Port(Box<dyn Link>);
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        let mut packet = Vec::new();
+        write_zero(&mut packet);
+        let _ = self.0.write(&packet);
+    }
+}
+
 /// A port before play.
 struct Opened {
-    link: Box<dyn Link>,
+    link: Port,
     clock: HostClock,
     port: String,
 }
@@ -203,12 +214,13 @@ impl Opened {
         for _ in 0..ATTEMPTS {
             let mut packet = Vec::new();
             write_first(&mut packet, setup);
-            self.link.write(&packet).map_err(|err| self.lost(err))?;
+            self.link.0.write(&packet).map_err(|err| self.lost(err))?;
             let mut exchange = fresh();
             let begin = (self.clock)();
             exchange.begin(begin);
             while (self.clock)().since(begin) < ATTEMPT {
-                turn(&mut *self.link, &self.clock, &mut exchange).map_err(|err| self.lost(err))?;
+                turn(&mut *self.link.0, &self.clock, &mut exchange)
+                    .map_err(|err| self.lost(err))?;
                 let Some(found) = exchange.degrees() else { continue };
                 let is_home = (0..2).all(|motor| {
                     (found[motor] - setup.home_degrees[motor]).abs() <= HOME_TOLERANCE_DEGREES
@@ -232,7 +244,7 @@ impl Opened {
         exchange.set_reply_silence(PING_MAX);
         while times.len() < PINGS {
             let time =
-                turn(&mut *self.link, &self.clock, exchange).map_err(|err| self.lost(err))?;
+                turn(&mut *self.link.0, &self.clock, exchange).map_err(|err| self.lost(err))?;
             times.extend(time);
             match exchange.faults() {
                 (Some(fault), count) if count > faults => {
@@ -278,13 +290,13 @@ struct Board {
 
 impl Board {
     /// Runs until the device is dropped; a lost port is opened again.
-    fn run(mut self, first: Box<dyn Link>) {
+    fn run(mut self, first: Port) {
         // Without real-time priority it runs as an ordinary thread; the watchdog counts time, not turns.
         let _ = request_real_time();
         let mut link = Some(first);
         while !self.scene.is_ending() {
             match link.take() {
-                Some(mut open) => match self.talk(&mut *open) {
+                Some(mut open) => match self.talk(&mut *open.0) {
                     Ok(()) => link = Some(open),
                     Err(_) => self.lose_link(),
                 },
@@ -333,18 +345,19 @@ impl Board {
         self.publish(false);
     }
 
-    fn reconnect(&mut self) -> Option<Box<dyn Link>> {
+    fn reconnect(&mut self) -> Option<Port> {
         let Ok(link) = self.address.open() else {
             // Not parked: each tick of the scene would wake it.
             sleep(RETRY);
             return None;
         };
         self.exchange.begin(self.scene.now());
-        Some(link)
+        Some(Port(link))
     }
 
     /// Zero torque until its answer is there.
-    fn say_goodbye(&mut self, mut link: Box<dyn Link>) {
+    fn say_goodbye(&mut self, mut port: Port) {
+        let link = &mut port.0;
         self.exchange.end();
         let mut is_sent = false;
         let mut buffer = [0_u8; 64];
