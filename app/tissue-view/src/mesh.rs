@@ -42,7 +42,8 @@ pub struct MovedNode {
 fn bounds_of(places: &[Vec3]) -> [Vec3; 2] {
     let first = places.first().copied().unwrap_or_default();
     places.iter().fold([first; 2], |[low, high], place| {
-        let pick = |from: Vec3, of: fn(f64, f64) -> f64| [0, 1, 2].map(|axis| of(from[axis], place[axis]));
+        let pick =
+            |from: Vec3, of: fn(f64, f64) -> f64| [0, 1, 2].map(|axis| of(from[axis], place[axis]));
         [pick(low, f64::min), pick(high, f64::max)]
     })
 }
@@ -55,11 +56,7 @@ fn node(place: Vec3, normal: Vec3, depth_mm: f64) -> [f32; 8] {
 
 impl MeshData {
     /// Of places in mm, unit normals and the three nodes of each triangle.
-    pub fn new(
-        places: &[Vec3],
-        normals: &[Vec3],
-        indices: Vec<u32>,
-    ) -> Result<Self, SurfaceError> {
+    pub fn new(places: &[Vec3], normals: &[Vec3], indices: Vec<u32>) -> Result<Self, SurfaceError> {
         check_count("normals", normals.len(), places.len())?;
         if !indices.len().is_multiple_of(3) {
             return Err(SurfaceError::Triangles(indices.len()));
@@ -74,7 +71,11 @@ impl MeshData {
         let [low, high] = bounds_of(places);
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         Ok(Self {
-            nodes: places.iter().zip(normals).map(|(place, normal)| node(*place, *normal, 0.0)).collect(),
+            nodes: places
+                .iter()
+                .zip(normals)
+                .map(|(place, normal)| node(*place, *normal, 0.0))
+                .collect(),
             indices: indices.into(),
             // No division by the size of a point.
             size_mm: sides.into_iter().fold(1e-3, f64::max),
@@ -240,7 +241,16 @@ mod tests {
             place[node / 2] = if node.is_multiple_of(2) { radius } else { -radius };
             place
         });
-        let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let faces = [
+            [0, 2, 4],
+            [2, 1, 4],
+            [1, 3, 4],
+            [3, 0, 4],
+            [2, 0, 5],
+            [1, 2, 5],
+            [3, 1, 5],
+            [0, 3, 5],
+        ];
         MeshShape::new(&places.collect::<Vec<_>>(), &faces).unwrap()
     }
 
@@ -251,7 +261,10 @@ mod tests {
         assert_eq!(rest.size_mm, 4.0);
         for node in &rest.nodes {
             // Single precision.
-            assert!((0..3).all(|axis| (node[axis] / 2.0 - node[axis + 3]).abs() < 1e-6), "{node:?}");
+            assert!(
+                (0..3).all(|axis| (node[axis] / 2.0 - node[axis + 3]).abs() < 1e-6),
+                "{node:?}"
+            );
         }
     }
 
@@ -262,7 +275,8 @@ mod tests {
         let data = shape.displaced([moved]).unwrap();
         let mut places = shape.places.clone();
         places[4] = moved.place;
-        let faces: Vec<[u32; 3]> = shape.rest.indices.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect();
+        let faces: Vec<[u32; 3]> =
+            shape.rest.indices.chunks_exact(3).map(|face| [face[0], face[1], face[2]]).collect();
         let wanted = MeshShape::new(&places, &faces).unwrap().at_rest();
         for (data, wanted) in data.nodes.iter().zip(&wanted.nodes) {
             assert_eq!(data[..6], wanted[..6]);

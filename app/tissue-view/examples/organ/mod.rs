@@ -7,9 +7,7 @@ use palpate_haptics::triangles::shapes::{NODULE_MM, phantom, stomach};
 use palpate_haptics::triangles::{
     Dent, DentSettings, MaterialMap, SurfacePoint, TriangleMesh, TriangleSoup,
 };
-use palpate_tissue_view::{
-    Camera, ElasticModel, MeshShape, MovedNode, PictureShape, Probe, Vec3,
-};
+use palpate_tissue_view::{Camera, ElasticModel, MeshShape, MovedNode, PictureShape, Probe, Vec3};
 use std::error::Error;
 
 const RADIUS_MM: f64 = 6.0;

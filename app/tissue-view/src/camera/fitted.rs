@@ -52,7 +52,8 @@ impl Camera {
         let axes = self.axes();
         let [right, up, away] = axes;
         let tangent = (FIELD_OF_VIEW / 2.0).tan() * (1.0 - ROOM);
-        let middle_ahead = dot([0, 1, 2].map(|axis| (bounds[0][axis] + bounds[1][axis]) / 2.0), away);
+        let middle_ahead =
+            dot([0, 1, 2].map(|axis| (bounds[0][axis] + bounds[1][axis]) / 2.0), away);
         let corners = (0..8).map(|corner: usize| {
             let place = [0, 1, 2].map(|axis| bounds[corner >> axis & 1][axis]);
             axes.map(|axis| dot(place, axis))
@@ -71,9 +72,8 @@ impl Camera {
         };
         let [ahead_x, to_right] = reach(0, tangent * shape.aspect_of_eye(), shape.eyes.eyes());
         let [ahead_y, to_top] = reach(1, tangent, &[Eye::Single]);
-        let target = [0, 1, 2].map(|axis| {
-            to_right * right[axis] + to_top * up[axis] + middle_ahead * away[axis]
-        });
+        let target = [0, 1, 2]
+            .map(|axis| to_right * right[axis] + to_top * up[axis] + middle_ahead * away[axis]);
         let distance = (middle_ahead - ahead_x.min(ahead_y)) / self.size;
         if !(distance.is_finite() && distance > 0.0 && target.iter().all(|part| part.is_finite())) {
             return self;
@@ -139,12 +139,16 @@ mod tests {
 
     #[test]
     fn another_shape_keeps_what_was_zoomed_and_comes_back() {
-        let [wide, narrow] = [1.6, 0.4].map(|aspect| PictureShape { aspect, eyes: EyeLayout::Single });
+        let [wide, narrow] =
+            [1.6, 0.4].map(|aspect| PictureShape { aspect, eyes: EyeLayout::Single });
         let fitted = Camera::around(BLOCK).fitted(BLOCK, wide);
         let mut zoomed = fitted;
         zoomed.zoom(2.0);
         let there = zoomed.reshaped(BLOCK, [wide, narrow]);
-        assert!((2.0 * there.distance_mm() / fitted.fitted(BLOCK, narrow).distance_mm() - 1.0).abs() < 1e-9);
+        assert!(
+            (2.0 * there.distance_mm() / fitted.fitted(BLOCK, narrow).distance_mm() - 1.0).abs()
+                < 1e-9
+        );
         let back = there.reshaped(BLOCK, [narrow, wide]);
         assert!((back.distance_mm() / zoomed.distance_mm() - 1.0).abs() < 1e-9);
     }

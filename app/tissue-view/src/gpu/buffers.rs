@@ -201,7 +201,8 @@ impl SceneBuffers {
     ) -> bool {
         self.lines = None;
         let before = before.filter(|one| Arc::ptr_eq(&one.indices, &now.indices));
-        if let (Some(before), Some(Triangles { nodes: Some(nodes), .. })) = (before, &self.surface) {
+        if let (Some(before), Some(Triangles { nodes: Some(nodes), .. })) = (before, &self.surface)
+        {
             let changed = changed_rows(&before.nodes, &now.nodes, 1);
             if let Some([first, end]) = changed {
                 let bytes = bytemuck::cast_slice(now.nodes[first..end].as_flattened());
@@ -372,7 +373,10 @@ fn triangles<const N: usize>(
     };
     let nodes = nodes.as_flattened();
     Some(Triangles {
-        nodes: Some(buffer(bytemuck::cast_slice(nodes), wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST)),
+        nodes: Some(buffer(
+            bytemuck::cast_slice(nodes),
+            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        )),
         indices: buffer(bytemuck::cast_slice(indices), wgpu::BufferUsages::INDEX),
         count: indices.len() as u32,
     })

@@ -146,9 +146,8 @@ fn first_hit(
         if first.is_some_and(|hit| hit.distance <= distance) {
             continue;
         }
-        let mixed = [0, 1, 2].map(|axis| {
-            (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>()
-        });
+        let mixed = [0, 1, 2]
+            .map(|axis| (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>());
         first = Some(Hit { kind: HitKind::Tissue, normal: unit(mixed), distance });
     }
     first
