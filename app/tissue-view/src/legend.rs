@@ -15,6 +15,39 @@ pub struct Legend {
     pub ticks: Vec<LegendTick>,
 }
 
+/// The range of a legend: it grows with what is shown and never shrinks, so that colours do not change their meaning while
+/// one looks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GrowingRange {
+    least: f64,
+    greatest: f64,
+}
+
+impl GrowingRange {
+    /// From zero to at least `greatest`.
+    #[must_use]
+    pub fn to(greatest: f64) -> Self {
+        Self { least: 0.0, greatest }
+    }
+
+    /// Takes the least and the greatest value of a picture; what is not finite counts for nothing.
+    pub fn take(&mut self, [least, greatest]: [f64; 2]) {
+        if least.is_finite() {
+            self.least = self.least.min(least);
+        }
+        if greatest.is_finite() {
+            self.greatest = self.greatest.max(greatest);
+        }
+    }
+
+    /// Zero and all that was taken are in it; its ends are zero or 1, 2 or 5 times a power of ten.
+    #[must_use]
+    pub fn range(self) -> [f64; 2] {
+        let round = |length: f64| if length > 0.0 { round_step(length) } else { 0.0 };
+        [-round(-self.least), round(self.greatest)]
+    }
+}
+
 /// The most numbers beside a bar.
 const TICKS: f64 = 6.0;
 
@@ -64,6 +97,18 @@ mod tests {
         let legend = Legend::new("depth (mm)", [1.0, 5.0]);
         assert_eq!(legend.ticks[1].text, "2");
         assert!((legend.ticks[1].share - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_range_grows_by_round_steps_and_never_shrinks() {
+        let mut range = GrowingRange::to(1.0);
+        assert_eq!(range.range(), [0.0, 1.0]);
+        range.take([0.2, 3.1]);
+        range.take([f64::NAN, f64::INFINITY]);
+        range.take([0.0, 0.5]);
+        assert_eq!(range.range(), [0.0, 5.0]);
+        range.take([-0.0035, 0.0]);
+        assert_eq!(range.range(), [-0.005, 5.0]);
     }
 
     #[test]

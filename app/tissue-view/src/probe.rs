@@ -33,6 +33,8 @@ pub enum ProbeError {
     Place,
     #[error("the direction of the shaft has no length")]
     Axis,
+    #[error("the normal of the tissue below the probe has no length")]
+    Ground,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +43,8 @@ pub struct Probe {
     pub(crate) radius: f64,
     pub(crate) axis: Vec3,
     pub(crate) kind: ProbeKind,
+    /// A point of the tissue near the tip and the unit normal there; `None` where the picture knows it by itself or there is none.
+    pub(crate) ground: Option<(Vec3, Vec3)>,
 }
 
 impl Probe {
@@ -53,7 +57,7 @@ impl Probe {
             return Err(ProbeError::Place);
         }
         let axis = [0.0, 0.0, 1.0];
-        Ok(Self { centre, radius: radius_mm, axis, kind: ProbeKind::Steel })
+        Ok(Self { centre, radius: radius_mm, axis, kind: ProbeKind::Steel, ground: None })
     }
 
     /// The same whose lowest point along the axis is at `tip`, in mm.
@@ -72,6 +76,20 @@ impl Probe {
             return Err(ProbeError::Axis);
         }
         self.axis = axis.map(|part| part / length);
+        Ok(self)
+    }
+
+    /// The same above a mesh that is at `point`, in mm, with a normal of any length: what a polished tip mirrors.
+    /// Over a field of heights it changes nothing.
+    pub fn above(mut self, point: Vec3, normal: Vec3) -> Result<Self, ProbeError> {
+        let length = dot(normal, normal).sqrt();
+        if !(length.is_finite() && length > 0.0) {
+            return Err(ProbeError::Ground);
+        }
+        if point.iter().any(|part| !part.is_finite()) {
+            return Err(ProbeError::Place);
+        }
+        self.ground = Some((point, normal.map(|part| part / length)));
         Ok(self)
     }
 
@@ -187,6 +205,8 @@ mod tests {
         assert_eq!(Probe::new([f64::NAN; 3], 1.0), Err(ProbeError::Place));
         let probe = Probe::new([0.0; 3], 1.0).unwrap();
         assert_eq!(probe.with_axis([0.0; 3]), Err(ProbeError::Axis));
+        assert_eq!(probe.above([0.0; 3], [0.0; 3]), Err(ProbeError::Ground));
+        assert_eq!(probe.above([f64::NAN; 3], [0.0, 0.0, 1.0]), Err(ProbeError::Place));
         assert_eq!(probe.with_tip_at([f64::INFINITY; 3]), Err(ProbeError::Place));
     }
 }

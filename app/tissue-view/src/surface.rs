@@ -1,5 +1,9 @@
 //! What is drawn: heights over a grid, or a mesh of triangles.
 
+use crate::camera::Vec3;
+use crate::level::DetailLevel;
+use crate::mesh::MeshData;
+use crate::quantity::{ElasticModel, ModelQuantity};
 use thiserror::Error;
 
 /// A surface that cannot be drawn.
@@ -18,6 +22,8 @@ pub enum SurfaceError {
     Spacing(f64),
     #[error("triangle {triangle} names node {node}, and there are {nodes}")]
     Index { triangle: usize, node: u32, nodes: usize },
+    #[error("node {node} is said to have moved, and there are {nodes}")]
+    MovedNode { node: u32, nodes: usize },
     #[error("{0} indices are no triangles: three make one")]
     Triangles(usize),
 }
@@ -37,8 +43,14 @@ pub struct FieldData {
     pub(crate) values: Vec<f32>,
 }
 
+/// The least and the greatest; infinite and crossed where there are none.
+fn ends(numbers: impl Iterator<Item = f32>) -> [f32; 2] {
+    let start = [f32::INFINITY, f32::NEG_INFINITY];
+    numbers.fold(start, |[low, high], number| [low.min(number), high.max(number)])
+}
+
 /// Whether all numbers are finite; the first that is not otherwise.
-fn check_finite(
+pub(crate) fn check_finite(
     what: &'static str,
     numbers: impl Iterator<Item = f64> + Clone,
 ) -> Result<(), SurfaceError> {
@@ -51,7 +63,11 @@ fn check_finite(
     Err(SurfaceError::NotFinite { what, node })
 }
 
-fn check_count(what: &'static str, given: usize, wanted: usize) -> Result<(), SurfaceError> {
+pub(crate) fn check_count(
+    what: &'static str,
+    given: usize,
+    wanted: usize,
+) -> Result<(), SurfaceError> {
     if given == wanted { Ok(()) } else { Err(SurfaceError::Count { what, given, wanted }) }
 }
 
@@ -102,71 +118,26 @@ impl FieldData {
         self
     }
 
+    /// With what the fitted model says at the depths of the nodes as what colours stand for. All nodes are of one model.
+    #[must_use]
+    pub fn with_model_as_values(mut self, quantity: ModelQuantity, model: &ElasticModel) -> Self {
+        let at = |both: &[f32; 2]| model.at(quantity, f64::from(both[1])) as f32;
+        self.values = self.heights.iter().map(at).collect();
+        self
+    }
+
+    /// Lowest and highest corner of the box around it, in mm.
+    #[must_use]
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let [wide, high] = self.extent();
+        let [low, top] = ends(self.heights.iter().map(|both| both[0]));
+        [[0.0, 0.0, f64::from(low)], [wide, high, f64::from(top)]]
+    }
+
     /// Lengths along x and y in mm.
     #[must_use]
     pub fn extent(&self) -> [f64; 2] {
         [self.columns, self.rows].map(|side| f64::from(side - 1) * self.spacing_mm)
-    }
-}
-
-/// Triangles with normals, made ready for the graphics processor.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeshData {
-    /// Place in mm, unit normal, value of the colours, depth below rest in mm.
-    pub(crate) nodes: Vec<[f32; 8]>,
-    pub(crate) indices: Vec<u32>,
-    pub(crate) size_mm: f64,
-}
-
-impl MeshData {
-    /// Of places in mm, unit normals and the three nodes of each triangle.
-    pub fn new(
-        places: &[[f64; 3]],
-        normals: &[[f64; 3]],
-        indices: Vec<u32>,
-    ) -> Result<Self, SurfaceError> {
-        check_count("normals", normals.len(), places.len())?;
-        if !indices.len().is_multiple_of(3) {
-            return Err(SurfaceError::Triangles(indices.len()));
-        }
-        if let Some(at) = indices.iter().position(|&node| node as usize >= places.len()) {
-            let (triangle, node) = (at / 3, indices[at]);
-            return Err(SurfaceError::Index { triangle, node, nodes: places.len() });
-        }
-        // A sum is finite only if its parts are.
-        check_finite("place", places.iter().map(|place| place.iter().sum()))?;
-        check_finite("normal", normals.iter().map(|normal| normal.iter().sum()))?;
-        let length = |axis: usize| {
-            let ends = places.iter().map(|place| place[axis]);
-            let [low, high] = ends.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], end| {
-                [low.min(end), high.max(end)]
-            });
-            high - low
-        };
-        let nodes = places.iter().zip(normals).map(|([x, y, z], [u, v, w])| {
-            [*x, *y, *z, *u, *v, *w, 0.0, 0.0].map(|number| number as f32)
-        });
-        Ok(Self { nodes: nodes.collect(), indices, size_mm: length(0).max(length(1)).max(1e-3) })
-    }
-
-    /// With a number for each node that colours stand for.
-    pub fn with_values(mut self, values: &[f32]) -> Result<Self, SurfaceError> {
-        check_count("values", values.len(), self.nodes.len())?;
-        check_finite("value", values.iter().map(|&value| f64::from(value)))?;
-        for (node, &value) in self.nodes.iter_mut().zip(values) {
-            node[6] = value;
-        }
-        Ok(self)
-    }
-
-    /// With depths below rest in mm, for lines of equal depth.
-    pub fn with_depths(mut self, depths: &[f32]) -> Result<Self, SurfaceError> {
-        check_count("depths", depths.len(), self.nodes.len())?;
-        check_finite("depth", depths.iter().map(|&depth| f64::from(depth)))?;
-        for (node, &depth) in self.nodes.iter_mut().zip(depths) {
-            node[7] = depth;
-        }
-        Ok(self)
     }
 }
 
@@ -178,6 +149,34 @@ pub enum SurfaceData {
 }
 
 impl SurfaceData {
+    /// Lowest and highest corner of the box around it, in mm.
+    #[must_use]
+    pub fn bounds(&self) -> [Vec3; 2] {
+        match self {
+            Self::Field(field) => field.bounds(),
+            Self::Mesh(mesh) => mesh.bounds,
+        }
+    }
+
+    /// The least and the greatest of what colours stand for; `None` without.
+    #[must_use]
+    pub fn value_range(&self) -> Option<[f64; 2]> {
+        let [least, greatest] = match self {
+            Self::Field(field) => ends(field.values.iter().copied()),
+            Self::Mesh(mesh) => ends(mesh.nodes.iter().map(|node| node[6])),
+        };
+        (least <= greatest).then(|| [least, greatest].map(f64::from))
+    }
+
+    /// A level as it is for this surface: of a mesh all triangles are drawn at every level.
+    #[must_use]
+    pub fn level(&self, level: DetailLevel) -> DetailLevel {
+        match self {
+            Self::Field(_) => level,
+            Self::Mesh(_) => DetailLevel { every: 1, ..level },
+        }
+    }
+
     /// A length of the surface in mm.
     #[must_use]
     pub fn size_mm(&self) -> f64 {
@@ -213,15 +212,5 @@ mod tests {
         let field = FieldData::new(2, 1.0, &flat).unwrap();
         assert!(field.clone().with_rest(&bad).is_err());
         assert!(field.with_values(vec![0.0; 3]).is_err());
-    }
-
-    #[test]
-    fn a_triangle_without_its_node_is_refused() {
-        let (places, normals) = ([[0.0; 3]; 3], [[0.0, 0.0, 1.0]; 3]);
-        let refused = MeshData::new(&places, &normals, vec![0, 1, 3]).unwrap_err();
-        assert_eq!(refused, SurfaceError::Index { triangle: 0, node: 3, nodes: 3 });
-        let refused = MeshData::new(&places, &normals, vec![0, 1]).unwrap_err();
-        assert_eq!(refused, SurfaceError::Triangles(2));
-        assert!(MeshData::new(&places, &normals[..2], vec![0, 1, 2]).is_err());
     }
 }

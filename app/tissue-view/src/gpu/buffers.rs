@@ -3,6 +3,7 @@
 use super::pipelines::{OPENNESS, Pipelines};
 use super::uniforms;
 use crate::look::{ColourRamp, RAMP};
+use crate::mesh::MeshData;
 use crate::picture::Picture;
 use crate::probe::{Probe, ProbeKind};
 use crate::surface::{FieldData, SurfaceData};
@@ -180,13 +181,37 @@ impl SceneBuffers {
                 UploadedChanges { heights: field.heights, any: changes.any | field.any }
             }
             SurfaceData::Mesh(mesh) => {
-                if !is_same {
-                    self.lines = None;
-                    self.surface = triangles(device, &mesh.nodes, &mesh.indices);
-                }
-                UploadedChanges { heights: false, any: changes.any | !is_same }
+                let before = before.as_deref().and_then(|one| match one {
+                    SurfaceData::Mesh(mesh) => Some(mesh),
+                    SurfaceData::Field(_) => None,
+                });
+                changes.any |= !is_same && self.update_mesh(device, queue, before, mesh);
+                changes
             }
         }
+    }
+
+    /// Uploads the nodes from the first that differs to the last, or all of another mesh.
+    fn update_mesh(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        before: Option<&MeshData>,
+        now: &MeshData,
+    ) -> bool {
+        self.lines = None;
+        let before = before.filter(|one| Arc::ptr_eq(&one.indices, &now.indices));
+        if let (Some(before), Some(Triangles { nodes: Some(nodes), .. })) = (before, &self.surface)
+        {
+            let changed = changed_rows(&before.nodes, &now.nodes, 1);
+            if let Some([first, end]) = changed {
+                let bytes = bytemuck::cast_slice(now.nodes[first..end].as_flattened());
+                queue.write_buffer(nodes, (first * size_of::<[f32; 8]>()) as u64, bytes);
+            }
+            return changed.is_some();
+        }
+        self.surface = triangles(device, &now.nodes, &now.indices);
+        true
     }
 
     fn update_field(
@@ -348,7 +373,10 @@ fn triangles<const N: usize>(
     };
     let nodes = nodes.as_flattened();
     Some(Triangles {
-        nodes: Some(buffer(bytemuck::cast_slice(nodes), wgpu::BufferUsages::VERTEX)),
+        nodes: Some(buffer(
+            bytemuck::cast_slice(nodes),
+            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        )),
         indices: buffer(bytemuck::cast_slice(indices), wgpu::BufferUsages::INDEX),
         count: indices.len() as u32,
     })

@@ -124,7 +124,7 @@ impl TissueRenderer {
         let mut renderer = Self::new(device, window, abilities);
         let DetailLevel { samples, shading, .. } =
             abilities.possible(LEVELS[abilities.first_level.min(LEVELS.len() - 1)]);
-        for part in [Part::Probe, Part::Field, Part::Sides] {
+        for part in [Part::Probe, Part::Field, Part::Sides, Part::Mesh] {
             let key = PipelineKey { part, samples, shading, output: Output::Colours };
             renderer.pipelines.make(device, key);
         }

@@ -53,6 +53,9 @@ pub(super) fn of(picture: &Picture, eye: Eye, [wide, high]: [u32; 2]) -> [[f32; 
         rows[8] = row(probe.axis, probe.length_mm(size));
         let is_glove = f64::from(u8::from(probe.kind == ProbeKind::Glove));
         rows[9] = row([probe.shaft_mm(), 1.0, is_glove], 0.0);
+        if let (Some((point, normal)), false) = (probe.ground, is_field) {
+            rows[6] = row(normal, dot(normal, point));
+        }
     } else {
         rows[8] = [0.0, 0.0, 1.0, 1.0];
     }

@@ -6,7 +6,8 @@ struct Scene {
     eye: vec4f,
     // Unit vector to the lamp.
     light: vec4f,
-    // Columns, rows, spacing, thickness drawn at the sides.
+    // Columns, rows, spacing, thickness drawn at the sides. Of a mesh: unit normal of the tissue below the probe and how far
+    // along it the tissue is, or zero.
     grid: vec4f,
     // Centre of the tip's sphere, its radius.
     probe: vec4f,

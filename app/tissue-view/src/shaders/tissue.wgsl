@@ -64,6 +64,42 @@ fn wet_texture(place: vec2f, pixel: f32) -> Texture {
     return found;
 }
 
+struct Skin {
+    // To be taken from the normal.
+    tilt: vec3f,
+    colour: vec3f,
+}
+
+// The texture along z, on a mesh along the axis that the surface faces, mixed where it faces two.
+fn wet_skin(place: vec3f, normal: vec3f, pixel: f32) -> Skin {
+    var skin: Skin;
+    if (scene.switches.w > 0.5) {
+        let found = wet_texture(place.xy, pixel);
+        skin.tilt = vec3f(found.slope, 0.0);
+        skin.colour = found.colour;
+        return skin;
+    }
+    var shares = normal * normal * normal * normal;
+    shares = max(shares / (shares.x + shares.y + shares.z) - 0.08, vec3f(0.0));
+    shares /= shares.x + shares.y + shares.z;
+    if (shares.x > 0.0) {
+        let found = wet_texture(place.yz + 57.0, pixel);
+        skin.tilt += shares.x * vec3f(0.0, found.slope);
+        skin.colour += shares.x * found.colour;
+    }
+    if (shares.y > 0.0) {
+        let found = wet_texture(place.zx + 131.0, pixel);
+        skin.tilt += shares.y * vec3f(found.slope.y, 0.0, found.slope.x);
+        skin.colour += shares.y * found.colour;
+    }
+    if (shares.z > 0.0) {
+        let found = wet_texture(place.xy, pixel);
+        skin.tilt += shares.z * vec3f(found.slope, 0.0);
+        skin.colour += shares.z * found.colour;
+    }
+    return skin;
+}
+
 fn ramp_at(value: f32) -> vec3f {
     let share = clamp((value - scene.colour.x) / (scene.colour.y - scene.colour.x), 0.0, 1.0) * 255.0;
     let low = i32(floor(share));
@@ -90,9 +126,12 @@ fn contour(depth: f32) -> f32 {
     return select(0.0, (1.0 - smoothstep(0.5, 1.5, off)) * scene.ink.a, is_line);
 }
 
-fn open_at(place: vec3f) -> f32 {
+// Share of the sky that is seen. On a mesh it is a guess from the depth: the walls of a dent of 45 degrees hide 0.29 of it on
+// the average (1 - sin 45 degrees), more further down.
+fn open_at(place: vec3f, depth: f32) -> f32 {
     if (scene.switches.w < 0.5) {
-        return 1.0;
+        let down = max(depth, 0.0);
+        return 1.0 - 0.58 * down / (down + 0.02 * scene.switches.z);
     }
     let size = vec2f(textureDimensions(openness));
     let at = (place.xy / scene.grid.z / 2.0 + 0.5) / size;
@@ -109,8 +148,9 @@ fn soft_light(normal: vec3f, lamp: f32, open: f32, colour: vec3f) -> vec3f {
 }
 
 @fragment
-fn tissue_colour(point: SurfacePoint) -> @location(0) vec4f {
-    let smooth_normal = normalize(point.normal);
+fn tissue_colour(point: SurfacePoint, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
+    // An open mesh has an inner side.
+    let smooth_normal = normalize(point.normal) * select(-1.0, 1.0, is_front);
     let from_eye = point.place - scene.eye.xyz;
     let distance = length(from_eye);
     let to_eye = -from_eye / distance;
@@ -121,7 +161,7 @@ fn tissue_colour(point: SurfacePoint) -> @location(0) vec4f {
         near_share = 1.0 - (1.0 - near_share) * (1.0 - shaft_share(point.place, smooth_normal));
         lamp = lamp_share(point.place);
     }
-    let fold = open_at(point.place);
+    let fold = open_at(point.place, point.values.y);
     let open = fold * (1.0 - near_share);
     let line = contour(point.values.y);
     if (scene.colour.z > 0.5) {
@@ -133,9 +173,9 @@ fn tissue_colour(point: SurfacePoint) -> @location(0) vec4f {
     var normal = smooth_normal;
     var colour = TISSUE;
     if (IS_FULL && scene.switches.y > 0.5) {
-        let found = wet_texture(point.place.xy, distance / scene.eye.w);
-        normal = normalize(smooth_normal - vec3f(found.slope, 0.0));
-        colour *= found.colour;
+        let skin = wet_skin(point.place, smooth_normal, distance / scene.eye.w);
+        normal = normalize(smooth_normal - skin.tilt);
+        colour *= skin.colour;
     }
     var light = soft_light(normal, lamp, open, colour);
     light += wet_light(point.place, normal, to_eye, lamp, fold, near_share);
@@ -155,7 +195,9 @@ fn wet_light(place: vec3f, normal: vec3f, to_eye: vec3f, lamp: f32, fold: f32, n
     let shine = highlight(scene.light.xyz, normal, to_eye, 0.40, WATER);
     var light = LAMP * lamp * (shine + highlight(scene.light.xyz, normal, to_eye, 0.2, WATER) * 1.5);
     var way = reflect(-to_eye, normal);
-    way = normalize(vec3f(way.xy, max(way.z, 0.02)));
+    if (scene.switches.w > 0.5) {
+        way = normalize(vec3f(way.xy, max(way.z, 0.02)));
+    }
     var seen = room(way, 0.05) + vec3f(0.9, 0.95, 1.0) * 9.0 * window_share(way, 0.04);
     if (scene.shaft.y > 0.5) {
         let met = meet_probe(place + normal * 0.01, way);
@@ -182,10 +224,26 @@ fn side_colour(point: SurfacePoint) -> @location(0) vec4f {
     return vec4f(tone(light), 1.0);
 }
 
-// The tissue as the probe's surface mirrors it, or the room.
+// The tissue as the probe's surface mirrors it: in the contact's own shade it is dark and red.
+fn ground_light(lit: f32, value: f32) -> vec3f {
+    if (scene.colour.z > 0.5) {
+        return ramp_at(value) * (0.15 + 0.6 * lit);
+    }
+    return TISSUE * mix(vec3f(0.16, 0.07, 0.06), vec3f(1.15, 1.3, 1.3), lit);
+}
+
+// What the probe's surface mirrors: the tissue below it, or the room.
 fn around_probe(place: vec3f, way: vec3f, roughness: f32) -> vec3f {
     let high = studio(way, roughness);
-    if (way.z > 0.0 || scene.switches.w < 0.5) {
+    if (scene.switches.w < 0.5) {
+        // The tissue below is a plane.
+        let sink = -dot(way, scene.grid.xyz);
+        let fall = max(dot(place, scene.grid.xyz) - scene.grid.w, 0.0) / max(sink, 0.02);
+        let lit = smoothstep(0.0, 1.8 * scene.probe.w, fall);
+        let seen = smoothstep(8.0, 2.0, fall / scene.probe.w) * smoothstep(0.0, 0.12, sink);
+        return mix(high, ground_light(lit, scene.colour.x), seen);
+    }
+    if (way.z > 0.0) {
         return high;
     }
     let down = max(-way.z, 0.02);
@@ -196,13 +254,9 @@ fn around_probe(place: vec3f, way: vec3f, roughness: f32) -> vec3f {
     hit = place.xy + way.xy * fall;
     let edge = 0.03 * scene.switches.z + 0.25 * fall;
     let inside = smoothstep(vec2f(-edge), vec2f(edge), min(hit, last - hit));
-    // In the contact's own shade the tissue is dark and red.
     let lit = smoothstep(0.0, 1.8 * scene.probe.w, fall);
-    var tissue = TISSUE * mix(vec3f(0.16, 0.07, 0.06), vec3f(1.15, 1.3, 1.3), lit);
-    if (scene.colour.z > 0.5) {
-        let seen = vec2i(clamp(hit / scene.grid.z + 0.5, vec2f(0.0), scene.grid.xy - 1.0));
-        tissue = ramp_at(textureLoad(scalars, seen, 0).x) * (0.15 + 0.6 * lit);
-    }
+    let seen = vec2i(clamp(hit / scene.grid.z + 0.5, vec2f(0.0), scene.grid.xy - 1.0));
+    let tissue = ground_light(lit, textureLoad(scalars, seen, 0).x);
     return mix(high, tissue, inside.x * inside.y * smoothstep(0.0, 0.12, -way.z));
 }
 
@@ -211,13 +265,19 @@ fn probe_colour(point: ProbePoint) -> @location(0) vec4f {
     let normal = normalize(point.normal);
     let to_eye = normalize(scene.eye.xyz - point.place);
     let cosine = max(dot(normal, to_eye), 0.0);
-    var open = 1.0;
+    // Low on the tip the tissue is near and hides the room.
+    var gap = 1e6;
+    var up = 1.0;
     if (scene.switches.w > 0.5) {
-        // Low on the tip the tissue is near and hides the room.
         let node = vec2i(clamp(point.place.xy / scene.grid.z + 0.5, vec2f(0.0), scene.grid.xy - 1.0));
-        let gap = max(point.place.z - height_at(node), 0.0) / max(scene.probe.w, 1e-3);
-        open = mix(0.3, 1.0, clamp(gap * 1.3 + 0.25 * max(normal.z, 0.0), 0.0, 1.0));
+        gap = point.place.z - height_at(node);
+        up = normal.z;
+    } else if (dot(scene.grid.xyz, scene.grid.xyz) > 0.5) {
+        gap = dot(point.place, scene.grid.xyz) - scene.grid.w;
+        up = dot(normal, scene.grid.xyz);
     }
+    let near = max(gap, 0.0) / max(scene.probe.w, 1e-3);
+    let open = mix(0.3, 1.0, clamp(near * 1.3 + 0.25 * max(up, 0.0), 0.0, 1.0));
     let way = reflect(-to_eye, normal);
     if (scene.shaft.z > 0.5) {
         let facing = dot(normal, scene.light.xyz);

@@ -19,7 +19,7 @@ fn picture(field: FieldData, look: SurfaceStyle) -> Picture {
     }
 }
 
-fn linear(value: u8) -> f64 {
+pub fn linear(value: u8) -> f64 {
     let share = f64::from(value) / 255.0;
     if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
 }

@@ -1,6 +1,7 @@
 //! Pictures off the screen against a reference of their own. Without a graphics adapter they are skipped.
 
 mod colours;
+mod meshes;
 mod ray_caster;
 mod shapes;
 

@@ -84,38 +84,73 @@ impl Reference {
             .collect()
     }
 
-    /// What a ray meets first.
-    fn first_hit(&self, triangles: &[[[Vec3; 3]; 2]], from: Vec3, way: Vec3) -> Option<Hit> {
-        let mut first = self.finger.and_then(|finger| finger_hit(finger, from, way));
-        for [places, normals] in triangles {
-            let Some((distance, shares)) = triangle_hit(*places, from, way) else { continue };
-            if first.is_some_and(|hit| hit.distance <= distance) {
-                continue;
-            }
-            let mixed = [0, 1, 2].map(|axis| {
-                (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>()
-            });
-            first = Some(Hit { kind: HitKind::Tissue, normal: unit(mixed), distance });
-        }
-        first
-    }
-
     /// What the pixels of a picture see, row by row from the top.
-    pub fn picture(&self, camera: &Camera, eye: Eye, [wide, high]: [u32; 2]) -> Vec<Option<Hit>> {
-        let from = camera.eye(eye);
-        let half = [wide, high].map(|side| f64::from(side) / 2.0);
-        let triangles = self.triangles();
-        let pixels = (0..high).flat_map(|row| (0..wide).map(move |column| (column, row)));
-        pixels
-            .map(|(column, row)| {
-                let at = [
-                    (f64::from(column) + 0.5 - half[0]) / half[1],
-                    (half[1] - f64::from(row) - 0.5) / half[1],
-                ];
-                self.first_hit(&triangles, from, camera.ray(at, eye))
-            })
-            .collect()
+    pub fn picture(&self, camera: &Camera, eye: Eye, size: [u32; 2]) -> Vec<Option<Hit>> {
+        picture_of(&self.triangles(), self.finger, camera, (eye, size))
     }
+}
+
+/// Places and normals of the corners of triangles. The normals are summed triangle by triangle with the weights of Max
+/// ("Weights for computing vertex normals from facet normals", 1999).
+pub fn corners_of(places: &[Vec3], faces: &[[u32; 3]]) -> Vec<[[Vec3; 3]; 2]> {
+    let mut normals = vec![[0.0; 3]; places.len()];
+    for face in faces {
+        let [a, b, c] = face.map(|node| places[node as usize]);
+        let sides = [minus(b, a), minus(c, b), minus(a, c)];
+        let squares = sides.map(|side| dot(side, side));
+        let across = cross(sides[0], minus(c, a));
+        for (corner, node) in face.iter().enumerate() {
+            let weight = squares[corner] * squares[(corner + 2) % 3];
+            let sum = &mut normals[*node as usize];
+            *sum = [0, 1, 2].map(|axis| sum[axis] + across[axis] / weight);
+        }
+    }
+    let corner = |node: &u32| (places[*node as usize], unit(normals[*node as usize]));
+    faces
+        .iter()
+        .map(|face| [face.map(|node| corner(&node).0), face.map(|node| corner(&node).1)])
+        .collect()
+}
+
+/// What the pixels of a picture of triangles and a finger see, row by row from the top.
+pub fn picture_of(
+    triangles: &[[[Vec3; 3]; 2]],
+    finger: Option<(Vec3, f64)>,
+    camera: &Camera,
+    (eye, [wide, high]): (Eye, [u32; 2]),
+) -> Vec<Option<Hit>> {
+    let from = camera.eye(eye);
+    let half = [wide, high].map(|side| f64::from(side) / 2.0);
+    let pixels = (0..high).flat_map(|row| (0..wide).map(move |column| (column, row)));
+    pixels
+        .map(|(column, row)| {
+            let at = [
+                (f64::from(column) + 0.5 - half[0]) / half[1],
+                (half[1] - f64::from(row) - 0.5) / half[1],
+            ];
+            first_hit(triangles, finger, from, camera.ray(at, eye))
+        })
+        .collect()
+}
+
+/// What a ray meets first.
+fn first_hit(
+    triangles: &[[[Vec3; 3]; 2]],
+    finger: Option<(Vec3, f64)>,
+    from: Vec3,
+    way: Vec3,
+) -> Option<Hit> {
+    let mut first = finger.and_then(|finger| finger_hit(finger, from, way));
+    for [places, normals] in triangles {
+        let Some((distance, shares)) = triangle_hit(*places, from, way) else { continue };
+        if first.is_some_and(|hit| hit.distance <= distance) {
+            continue;
+        }
+        let mixed = [0, 1, 2]
+            .map(|axis| (0..3).map(|corner| shares[corner] * normals[corner][axis]).sum::<f64>());
+        first = Some(Hit { kind: HitKind::Tissue, normal: unit(mixed), distance });
+    }
+    first
 }
 
 /// Distance and shares of the corners (Moeller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997).

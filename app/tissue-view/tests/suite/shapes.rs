@@ -88,7 +88,7 @@ fn change(wanted: &[Option<Hit>], index: usize, size: [u32; 2]) -> Option<[f64; 
 /// A vertex is placed to a sixteenth of a pixel at worst (Vulkan, subPixelPrecisionBits: at least 4), so what a pixel shows may be what the
 /// reference sees a sixteenth of a pixel beside: the tolerance is a sixteenth of the change to the next pixel. To that
 /// come roundings of single precision: 0.001 degrees are 150 of them for a normal; 1e-5 of a distance are 80.
-fn compare(wanted: &[Option<Hit>], image: &Image<[f32; 4]>, name: &str) {
+pub fn compare(wanted: &[Option<Hit>], image: &Image<[f32; 4]>, name: &str) {
     assert_eq!(wanted.len(), image.pixels.len());
     let (mut errors, mut above, mut kinds) = (Vec::new(), 0, 0);
     for (index, pixel) in image.pixels.iter().enumerate() {

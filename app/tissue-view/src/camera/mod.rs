@@ -3,6 +3,10 @@
 //! Scene: x along columns, y along rows, z up, in mm. Clip space: x right, y up, depth 0 at the near plane and 1 at the
 //! far plane, as WebGPU has it (W3C, "WebGPU", section "Coordinate Systems").
 
+mod fitted;
+
+pub use fitted::PictureShape;
+
 /// A position or a direction in the scene, in mm.
 pub type Vec3 = [f64; 3];
 
@@ -14,8 +18,8 @@ const NEAR: f64 = 0.02;
 const FAR: f64 = 20.0;
 /// The eye stays above the surface, and off the pole, where left and right would have no meaning. In rad.
 const ELEVATION: [f64; 2] = [0.08, 1.54];
-/// Distance from the target, in lengths of the scene.
-const DISTANCE: [f64; 2] = [0.15, 6.0];
+/// Distance from the target, in lengths of the scene: from the furthest all of a block fits one eye of a narrow pair.
+const DISTANCE: [f64; 2] = [0.15, 20.0];
 /// Distance between the two eyes, in distances of the target: a thirtieth is the usual rule of stereo photography.
 const EYES_APART: f64 = 1.0 / 30.0;
 
@@ -49,6 +53,8 @@ pub struct Camera {
     azimuth: f64,
     /// Angle above the surface in rad.
     elevation: f64,
+    /// The least angle above the surface in rad.
+    lowest: f64,
     /// In lengths of the scene.
     distance: f64,
 }
@@ -66,6 +72,16 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[must_use]
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[must_use]
+pub(crate) fn minus(a: Vec3, b: Vec3) -> Vec3 {
+    [0, 1, 2].map(|axis| a[axis] - b[axis])
+}
+
 /// From `from`, `length` in a direction.
 #[must_use]
 pub(crate) fn along(from: Vec3, direction: Vec3, length: f64) -> Vec3 {
@@ -81,6 +97,7 @@ impl Camera {
             size: wide.max(high),
             azimuth: 0.5,
             elevation: 0.6,
+            lowest: ELEVATION[0],
             distance: 1.9,
         }
     }
@@ -95,7 +112,7 @@ impl Camera {
     /// Turns about the target by angles in rad.
     pub fn orbit(&mut self, about: f64, up: f64) {
         self.azimuth = (self.azimuth + about).rem_euclid(std::f64::consts::TAU);
-        self.elevation = (self.elevation + up).clamp(ELEVATION[0], ELEVATION[1]);
+        self.elevation = (self.elevation + up).clamp(self.lowest, ELEVATION[1]);
     }
 
     /// Comes nearer by a factor above 1, goes away by one below.
