@@ -2,9 +2,10 @@
 
 use palpate_haptic_devices::inverse::{DeadMan, LinkReport};
 use palpate_haptic_devices::{InverseDevice, InverseOptions};
-use palpate_haptics::margin::{MarginReport, MarginSettings};
-use palpate_haptics::scene::SceneSettings;
+use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
+use palpate_haptics::scene::{SceneSettings, SceneStart};
 use palpate_model::units::{Depth, MmPerS};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::SeriesBody;
 use palpate_runner::driver_clock;
 use serde::Serialize;
@@ -60,27 +61,30 @@ impl DeviceUse {
     }
 }
 
+/// A scene that can be, as a device needs to know it.
+#[derive(Clone, Debug)]
+pub struct SceneToTouch {
+    pub settings: SceneSettings,
+    /// Force models of all its materials.
+    pub bodies: Vec<ModifiedKelvin>,
+    pub start: SceneStart,
+}
+
 /// Opens a device for a scene; the report is to be read before the first touch.
 pub fn open_device(
     choice: &DeviceChoice,
-    scene: &SceneSettings,
+    scene: &SceneToTouch,
 ) -> Result<(InverseDevice, DeviceReport), String> {
+    let SceneToTouch { settings, bodies, start } = scene;
     let options = InverseOptions {
         address: choice.address,
         device: choice.name.clone(),
         dead_man: choice.dead_man,
-        ..InverseOptions::new(scene.middle(), scene.period)
+        ..InverseOptions::new(start.place, settings.period)
     };
     let device = InverseDevice::open(&options, driver_clock()).map_err(|err| err.to_string())?;
     let (found, trip, looped) = (device.found(), device.round_trip(), device.loop_device());
-    let margin = MarginSettings {
-        body: SeriesBody::from(scene.body).padded(),
-        scheme: scene.scheme,
-        period: scene.period,
-        device: looped,
-    };
-    let (deepest, speed) = STROKE;
-    let margin = margin.assess_stroke(deepest, speed);
+    let margin = worst_margin(settings, bodies, looped);
     let report = DeviceReport {
         name: found.name.clone(),
         grip: found.grip.clone(),
@@ -92,4 +96,22 @@ pub fn open_device(
         margin,
     };
     Ok((device, report))
+}
+
+/// The margin of the material that needs the most damping of the device.
+fn worst_margin(
+    scene: &SceneSettings,
+    bodies: &[ModifiedKelvin],
+    device: LoopDevice,
+) -> MarginReport {
+    let (deepest, speed) = STROKE;
+    let of = |body: ModifiedKelvin| {
+        let body = SeriesBody::from(body).padded();
+        MarginSettings { body, scheme: scene.scheme, period: scene.period, device }
+            .assess_stroke(deepest, speed)
+    };
+    let ratio = |margin: &MarginReport| margin.ratio().unwrap_or(f64::INFINITY);
+    bodies.iter().map(|body| of(*body)).fold(of(scene.body), |worst, one| {
+        if ratio(&one) < ratio(&worst) { one } else { worst }
+    })
 }

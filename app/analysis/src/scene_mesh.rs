@@ -101,6 +101,7 @@ pub(super) fn mesh_scene_settings(
         bodies,
         shading: mesh.shading,
         dent: DentSettings { slope: file.slope, reach_mm: mesh.reach_mm, recovery },
+        start: mesh.start,
         scene,
     })
 }
