@@ -300,8 +300,9 @@ fn value_of(value: &DeValue<'_>) -> Value {
                 _ => None,
             };
             let texts = items.iter().map(text).collect::<Option<_>>().map(Value::Texts);
-            let numbers = || items.iter().map(|item| number_of(item.get_ref())).collect();
-            texts.or_else(|| numbers().map(Value::Numbers)).unwrap_or(Value::Other)
+            let number = |item: &Spanned<DeValue<'_>>| number_of(item.get_ref());
+            let numbers = || items.iter().map(number).collect::<Option<_>>().map(Value::Numbers);
+            texts.or_else(numbers).unwrap_or(Value::Other)
         }
         _ => Value::Other,
     }

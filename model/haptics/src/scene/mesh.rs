@@ -1,10 +1,10 @@
 //! A scene whose tissue is a mesh of triangles instead of a square of heights.
 
 use super::device::length;
-use super::settings::START_HEIGHT_MM;
 use super::rendering::ForceRendering;
 use super::{
-    HandPose, Pose, SceneError, SceneSettings, SceneStart, SceneTick, SimulatedDevice, StartPlace, hash,
+    HandPose, Pose, START_HEIGHT_MM, SceneError, SceneSettings, SceneStart, SceneTick,
+    SimulatedDevice, StartPlace, hash,
 };
 use crate::SettingError;
 use crate::triangles::{
@@ -48,11 +48,13 @@ pub enum MeshSceneError {
     )]
     StartVertex { vertex: usize, vertices: usize },
     #[error(
-        "the place where the scene begins is more than {FAR_MM} mm from the surface; give one that is nearer, or correct the unit of the mesh"
+        "the place where the scene begins is more than {} mm from the surface; give one that is nearer, or correct the unit of the mesh",
+        FAR_MM
     )]
     StartFar,
     #[error(
-        "other tissue is less than {START_HEIGHT_MM} mm before the place where the scene begins; choose a place with more room"
+        "other tissue is less than {} mm before the place where the scene begins; choose a place with more room",
+        START_HEIGHT_MM
     )]
     StartBuried,
 }

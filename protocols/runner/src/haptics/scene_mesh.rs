@@ -117,7 +117,7 @@ fn read_hash(fields: &mut Fields, key: &str) -> Option<String> {
 }
 
 fn read_start(fields: &mut Fields) -> StartPlace {
-    // A mesh may be anywhere in its file's frame, but no further from the origin than a scanner's room is large.
+    // The frame of a file may have its origin far from the mesh.
     let near = fields.numbers("mesh.start_mm", -1e6, 1e6).map(StartPlace::Near);
     // Three vertices of each triangle at most.
     let most = 3 * MOST_FACES as u64 - 1;
