@@ -1,22 +1,18 @@
 //! A scene in real time, its recording and its replay.
 
 use super::haptics::{LoopMeasurement, fit_haptic_body};
-use super::scene_device::{DeviceUse, OpenDevice};
-use super::scene_mesh::{
-    MeshReport, mesh_scene_settings, read_mesh_scene, resolve_mesh, source_path,
-};
+use super::scene_device::{DeviceUse, OpenDevice, SceneToTouch};
+use super::scene_mesh::{MeshReport, read_mesh_scene, resolve_mesh, source_path};
 use super::tick_replay::{
     FinishedRecording, RecordedTicks, ReplayResult, Replayable, replay_ticks,
 };
 use palpate_haptics::scene::{
-    HandLedMeshScene, HandLedScene, HandPose, MeshScene, MeshSceneError, NoForceReason, Pose,
-    Scene, ScenePath, SceneTick,
+    MeshScene, NoForceReason, Pose, Scene, ScenePath, SceneStart, SceneTick, SimulatedDevice,
 };
 use palpate_runner::haptics::scene::{
     COLUMNS, Columns, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
 use palpate_runner::haptics::scene_file::SceneFile;
-use palpate_runner::haptics::scene_mesh::SceneMesh;
 use palpate_runner::haptics::{LoopScene, SceneEnd, SceneFrame, SceneLoop};
 use palpate_sessions::ticks::{SETTINGS_FILE, TickRecording, has_columns};
 use serde::Serialize;
@@ -62,12 +58,19 @@ pub fn read_any_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), S
 }
 
 /// Refuses a scene that cannot be, before anything is measured or written. The check of a square is the same on any number of nodes.
-pub fn check_scene(file: &SceneFile) -> Result<(), String> {
+pub fn check_scene(file: &SceneFile) -> Result<SceneToTouch, String> {
     const COARSEST: usize = 3;
-    match &file.mesh {
-        Some(mesh) => read_mesh_scene(file, mesh, None).map(|_| ()),
-        None => file.scene(COARSEST).map(|_| ()),
-    }
+    let Some(mesh) = &file.mesh else {
+        let settings = *file.scene(COARSEST)?.settings();
+        let start = SceneStart::of_square(&settings);
+        return Ok(SceneToTouch { settings, bodies: Vec::new(), start });
+    };
+    let (scene, _) = read_mesh_scene(file, mesh, None)?;
+    Ok(SceneToTouch {
+        settings: *scene.settings(),
+        bodies: mesh.bodies.iter().filter_map(|one| one.body).collect(),
+        start: scene.start(),
+    })
 }
 
 /// Result of a scene that ran in real time.
@@ -172,7 +175,7 @@ fn play<S: Shown>(
             (live, Some(whole), path.name(), None, &no_flag)
         }
         SceneHand::OnDevice { device, seconds, is_ending } => {
-            let OpenDevice { device, monitor } = device;
+            let OpenDevice { device, monitor, .. } = device;
             let live = SceneLoop::start_on_device(device, scene, start(SENSED_COLUMNS)?)?;
             (live, seconds, "device", Some(monitor), is_ending)
         }
@@ -245,30 +248,6 @@ impl SeenTicks {
     }
 }
 
-impl Replayable<3, 10> for HandLedScene {
-    fn tick(&mut self, row: &SceneRow) -> SceneRow {
-        let (hand, elapsed) = scene_input(row);
-        let tick = self.tick_after(hand, elapsed);
-        scene_row(hand, elapsed, &tick)
-    }
-
-    fn state_hash(&self) -> u64 {
-        self.scene.hash()
-    }
-}
-
-impl Replayable<3, 10> for HandLedMeshScene {
-    fn tick(&mut self, row: &SceneRow) -> SceneRow {
-        let (hand, elapsed) = scene_input(row);
-        let tick = self.tick_after(hand, elapsed);
-        scene_row(hand, elapsed, &tick)
-    }
-
-    fn state_hash(&self) -> u64 {
-        self.scene.hash()
-    }
-}
-
 /// The finished recording of a scene, if it has one.
 #[must_use]
 pub fn finish_scene_recording(end: SceneEnd) -> FinishedRecording {
@@ -276,30 +255,32 @@ pub fn finish_scene_recording(end: SceneEnd) -> FinishedRecording {
     Some(end.recorded?.map(|counts| (counts, hash)))
 }
 
-/// On a device that was sensed.
-impl Replayable<3, 10> for Scene {
-    fn tick(&mut self, row: &SceneRow) -> SceneRow {
-        let (sensed, elapsed) = scene_input(row);
-        let HandPose { at, turn } = sensed;
-        let tick = self.render(Pose { at, turn }, elapsed);
-        scene_row(sensed, elapsed, &tick)
-    }
-
-    fn state_hash(&self) -> u64 {
-        self.hash()
-    }
+/// A scene whose ticks are computed again.
+struct ReplayedScene<S> {
+    scene: S,
+    /// The simulated device that the recorded hand leads; `None` where the recording has the sensed places of another device.
+    device: Option<SimulatedDevice>,
+    /// The force that the device was given last.
+    force: [f64; 3],
 }
 
-/// On a device that was sensed.
-impl Replayable<3, 10> for MeshScene {
+impl<S: LoopScene> Replayable<3, 10> for ReplayedScene<S> {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
-        let (sensed, elapsed) = scene_input(row);
-        let tick = self.render(Pose { at: sensed.at, turn: sensed.turn }, elapsed);
-        scene_row(sensed, elapsed, &tick)
+        let (input, elapsed) = scene_input(row);
+        let pose = match &mut self.device {
+            Some(device) => {
+                device.follow(input, self.force, elapsed.max(1));
+                device.pose()
+            }
+            None => Pose { at: input.at, turn: input.turn },
+        };
+        let tick = self.scene.render(pose, elapsed);
+        self.force = tick.force;
+        scene_row(input, elapsed, &tick)
     }
 
     fn state_hash(&self) -> u64 {
-        self.hash()
+        self.scene.hash()
     }
 }
 
@@ -320,35 +301,29 @@ pub fn replay(
     let found = TickRecording::read(folder, columns)?;
     let called = folder.join(SETTINGS_FILE).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;
+    let ticks = (&found, columns);
     if let Some(mesh) = &file.mesh {
-        return replay_mesh(folder, (&file, mesh), (&found, columns), is_going);
+        // Its files are where they were, or in the folder of the recording, and have the bytes that they had.
+        let (scene, _) = read_mesh_scene(&file, mesh, Some(folder))?;
+        let name = format!("scene '{}' on {}", file.name, mesh.file);
+        return replay_scene(&name, scene, ticks, is_going);
     }
     let nodes = file.nodes.ok_or_else(|| {
         format!("{called} does not state the number of nodes; use a complete recording")
     })?;
-    let mut scene = file.scene(nodes)?;
-    let name = format!("scene '{}'", file.name);
-    if is_sensed {
-        return replay_ticks(&name, &found, columns, &mut scene, is_going);
-    }
-    let mut led = HandLedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
-    replay_ticks(&name, &found, columns, &mut led, is_going)
+    replay_scene(&format!("scene '{}'", file.name), file.scene(nodes)?, ticks, is_going)
 }
 
-/// The files of the mesh are where they were, or in the folder of the recording, and have the bytes that they had.
-fn replay_mesh(
-    folder: &Path,
-    (file, mesh): (&SceneFile, &SceneMesh),
+fn replay_scene<S: LoopScene>(
+    name: &str,
+    scene: S,
     (found, columns): (&TickRecording<3, 10>, Columns),
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<ReplayResult, String> {
-    let settings = mesh_scene_settings(file, mesh, Some(folder))?;
-    let refused = |err: MeshSceneError| format!("the scene '{}': {err}", file.name);
-    let name = format!("scene '{}' on {}", file.name, mesh.file);
-    if columns == SENSED_COLUMNS {
-        let mut scene = MeshScene::new(&settings).map_err(refused)?;
-        return replay_ticks(&name, found, columns, &mut scene, is_going);
-    }
-    let mut led = HandLedMeshScene::new(&settings).map_err(refused)?;
-    replay_ticks(&name, found, columns, &mut led, is_going)
+    let device = match columns == SENSED_COLUMNS {
+        true => None,
+        false => Some(scene.simulated_device().map_err(|err| format!("{name}: {err}"))?),
+    };
+    let mut replayed = ReplayedScene { scene, device, force: [0.0; 3] };
+    replay_ticks(name, found, columns, &mut replayed, is_going)
 }

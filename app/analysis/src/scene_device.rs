@@ -7,8 +7,9 @@ use palpate_haptic_devices::{
 };
 use palpate_haptics::HapticDevice;
 use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
-use palpate_haptics::scene::SceneSettings;
+use palpate_haptics::scene::{SceneSettings, SceneStart};
 use palpate_model::units::{Depth, MmPerS};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::SeriesBody;
 use palpate_runner::driver_clock;
 use serde::Serialize;
@@ -129,10 +130,19 @@ const HAPI_WARNINGS: [&str; 2] = [
     "the board has no button and keeps its torque if this computer stops; keep the switch of the motors' power supply within reach",
 ];
 
+/// A scene that can be, as a device needs to know it.
+#[derive(Clone, Debug)]
+pub struct SceneToTouch {
+    pub settings: SceneSettings,
+    /// Force models of all its materials.
+    pub bodies: Vec<ModifiedKelvin>,
+    pub start: SceneStart,
+}
+
 /// Opens a device for a scene; the report is to be read before the first touch.
 pub fn open_device(
     choice: &DeviceChoice,
-    scene: &SceneSettings,
+    scene: &SceneToTouch,
 ) -> Result<(OpenDevice, DeviceReport), String> {
     match choice {
         DeviceChoice::Inverse { address, name, dead_man } => {
@@ -140,12 +150,13 @@ pub fn open_device(
                 address: *address,
                 device: name.clone(),
                 dead_man: *dead_man,
-                ..InverseOptions::new(scene.middle(), scene.period)
+                ..InverseOptions::new(scene.start.place, scene.settings.period)
             };
             open_inverse(&options, scene)
         }
         DeviceChoice::Hapi(address) => {
-            let options = HapiOptions::new(address.clone(), scene.middle(), scene.period);
+            let options =
+                HapiOptions::new(address.clone(), scene.start.place, scene.settings.period);
             open_hapi(&options, scene)
         }
     }
@@ -153,7 +164,7 @@ pub fn open_device(
 
 fn open_inverse(
     options: &InverseOptions,
-    scene: &SceneSettings,
+    scene: &SceneToTouch,
 ) -> Result<(OpenDevice, DeviceReport), String> {
     let device = InverseDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
     let found = device.found();
@@ -167,7 +178,7 @@ fn open_inverse(
 
 fn open_hapi(
     options: &HapiOptions,
-    scene: &SceneSettings,
+    scene: &SceneToTouch,
 ) -> Result<(OpenDevice, DeviceReport), String> {
     let device = HapiDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
     let description = format!("2DIY at {}", device.port());
@@ -183,16 +194,9 @@ fn judge(
     description: String,
     trip: &RoundTrip,
     looped: LoopDevice,
-    scene: &SceneSettings,
+    scene: &SceneToTouch,
 ) -> DeviceReport {
-    let margin = MarginSettings {
-        body: SeriesBody::from(scene.body).padded(),
-        scheme: scene.scheme,
-        period: scene.period,
-        device: looped,
-    };
-    let (deepest, speed) = STROKE;
-    let margin = margin.assess_stroke(deepest, speed);
+    let margin = worst_margin(&scene.settings, &scene.bodies, looped);
     DeviceReport {
         description,
         warnings: Vec::new(),
@@ -202,4 +206,23 @@ fn judge(
         sentences: margin.sentences(),
         margin,
     }
+}
+
+/// The margin of the material that needs the most damping of the device.
+fn worst_margin(
+    scene: &SceneSettings,
+    bodies: &[ModifiedKelvin],
+    device: LoopDevice,
+) -> MarginReport {
+    let (deepest, speed) = STROKE;
+    let of = |body: ModifiedKelvin| {
+        let body = SeriesBody::from(body).padded();
+        MarginSettings { body, scheme: scene.scheme, period: scene.period, device }
+            .assess_stroke(deepest, speed)
+    };
+    let ratio = |margin: &MarginReport| margin.ratio().unwrap_or(f64::INFINITY);
+    bodies
+        .iter()
+        .map(|body| of(*body))
+        .fold(of(scene.body), |worst, one| if ratio(&one) < ratio(&worst) { one } else { worst })
 }

@@ -72,7 +72,7 @@ pub(super) fn read_mesh_scene(
 }
 
 /// What a scene on a mesh is made of.
-pub(super) fn mesh_scene_settings(
+fn mesh_scene_settings(
     file: &SceneFile,
     mesh: &SceneMesh,
     beside: Option<&Path>,
@@ -101,6 +101,7 @@ pub(super) fn mesh_scene_settings(
         bodies,
         shading: mesh.shading,
         dent: DentSettings { slope: file.slope, reach_mm: mesh.reach_mm, recovery },
+        start: mesh.start,
         scene,
     })
 }

@@ -14,7 +14,7 @@ use palpate_analysis::scene::{
     SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
 };
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
-use palpate_analysis::scene_device::{DeviceName, OpenDevice, open_device};
+use palpate_analysis::scene_device::{DeviceName, OpenDevice, SceneToTouch, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_analysis::trade::{TradeExtent, measure_scene};
 use palpate_haptics::scene::ScenePath;
@@ -123,9 +123,6 @@ struct PlayedOutput<'a> {
     planned_again: Option<&'a ScenePlan>,
 }
 
-/// Nodes along a side of a scene whose mesh is still to be planned; the device is the same on any mesh.
-const COARSEST: usize = 3;
-
 /// A day, in s.
 const SECONDS_MAX: f64 = 86_400.0;
 
@@ -168,9 +165,12 @@ fn run_scene(
         file.name.clone_from(specimen);
     }
     // An impossible scene is refused before anything is measured or written.
-    check_scene(&file).map_err(Failure::usage)?;
-    let opened = args.device.as_ref().map(|name| device(args, name, &mut file, output));
+    let scene = check_scene(&file).map_err(Failure::usage)?;
+    let opened = args.device.as_ref().map(|name| device(args, name, &scene, output));
     let opened = opened.transpose()?;
+    if let Some(device) = &opened {
+        file.device = *device.device.settings();
+    }
     let is_ending = ctrl_c_flag()?;
     let mut after = None;
     if file.nodes.is_none() {
@@ -221,11 +221,6 @@ fn run_scene(
 /// What a scene on a mesh has no part of.
 fn refuse_on_mesh(args: &SceneRunArgs, file: &SceneFile) -> Result<(), Failure> {
     let Some(mesh) = &file.mesh else { return Ok(()) };
-    if args.device.is_some() {
-        return Err(Failure::usage(
-            "a scene on a mesh is led by the simulated hand so far; leave out --device",
-        ));
-    }
     if args.specimen.is_some() && !mesh.bodies.is_empty() {
         return Err(Failure::usage(
             "the mesh of the scene has its own force models; leave out --specimen, or name the specimen in mesh.bodies",
@@ -234,17 +229,15 @@ fn refuse_on_mesh(args: &SceneRunArgs, file: &SceneFile) -> Result<(), Failure> 
     Ok(())
 }
 
-/// Opens the device, says what is to be known before the first touch, and gives its numbers to the scene.
+/// Opens the device, and says what is to be known before the first touch.
 fn device(
     args: &SceneRunArgs,
     name: &DeviceName,
-    file: &mut SceneFile,
+    scene: &SceneToTouch,
     output: &Output,
 ) -> Result<OpenDevice, Failure> {
     let choice = name.clone().at(args.service);
-    let settings = file.settings(COARSEST).map_err(Failure::usage)?;
-    let (opened, report) = open_device(&choice, &settings).map_err(Failure::failed)?;
-    file.device = *opened.device.settings();
+    let (opened, report) = open_device(&choice, scene).map_err(Failure::failed)?;
     device_lines(&report).iter().for_each(|line| output.note(line));
     Ok(opened)
 }

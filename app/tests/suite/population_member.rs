@@ -1,6 +1,7 @@
 //! Specimens of a saved population on the simulated rig, in scenes and in the haptic loop.
 
 use crate::population::record_study;
+use crate::scene::BOX;
 use crate::support::{answer, assert_refused, palpate, short_run, stdout, succeeded, typed};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -82,6 +83,44 @@ fn a_fit_of_a_simulated_specimen_finds_the_parameters_that_were_drawn() {
         };
         assert_eq!(own, value);
     }
+}
+
+#[test]
+fn materials_of_a_mesh_are_specimens_of_a_population() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    write_populations(at);
+    let show = |name: &str, text: &str| {
+        std::fs::write(at.join(name), text).unwrap();
+        answer(&palpate(at, &["scene", "show", name, "--json"]))["file"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    std::fs::write(at.join("box.obj"), BOX).unwrap();
+    std::fs::write(at.join("map.csv"), "vertex,material\n4,1\n5,1\n").unwrap();
+    let bodies = ["population:pad#1", "population:pad#2"];
+    let mesh =
+        format!("[mesh]\nfile = \"box.obj\"\nmaterials = \"map.csv\"\nbodies = {bodies:?}\n");
+    let shown = show("box.toml", &mesh);
+    for name in bodies {
+        // The same specimen as the tissue of a square.
+        let square = show("square.toml", &format!("[tissue]\nsource = \"{name}\"\n"));
+        let numbers = square.split("[tissue]\n").nth(1).unwrap().split("side_mm").next().unwrap();
+        assert!(numbers.contains("mu1 = "), "{square}");
+        assert!(shown.contains(&format!("[bodies.\"{name}\"]\n{numbers}")), "{shown}");
+    }
+    // The corners 4 and 5 are an edge of the upper side: between them the second specimen answers alone.
+    let middle = ("start_mm = [20, 20, 40]", "start_mm = [20, 0.5, 40]");
+    let force = |start: &str| {
+        std::fs::write(at.join("box.toml"), format!("{mesh}{start}\n")).unwrap();
+        let run = answer(&typed(at, "scene run box.toml --json"));
+        assert_eq!(run["mesh"]["materials"], 2);
+        run["force_max_n"].as_f64().unwrap()
+    };
+    assert!((force(middle.0) - force(middle.1)).abs() > 1e-3);
+    std::fs::write(at.join("box.toml"), mesh.replace("pad#2", "pad")).unwrap();
+    assert_refused(&palpate(at, &["scene", "run", "box.toml"]), 2, "population:NAME#NUMBER");
 }
 
 #[test]

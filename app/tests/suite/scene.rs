@@ -66,7 +66,7 @@ fn a_scene_file_is_shown_whole_and_run() {
 }
 
 /// A box of 40 mm as a file that a person can read.
-const BOX: &str = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 40 40 0\nv 0 0 40\nv 40 0 40\nv 0 40 40\nv 40 40 40\n\
+pub(crate) const BOX: &str = "v 0 0 0\nv 40 0 0\nv 0 40 0\nv 40 40 0\nv 0 0 40\nv 40 0 40\nv 0 40 40\nv 40 40 40\n\
     f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
 #[test]
@@ -86,6 +86,75 @@ fn a_mesh_is_touched_recorded_and_computed_again() {
     assert_refused(&palpate(at.path(), &["scene", "replay", "poke"]), 2, "another file");
     let bench = palpate(at.path(), &["scene", "bench", "box.toml"]);
     assert_refused(&bench, 2, "mesh.file");
+}
+
+#[test]
+fn a_mesh_is_touched_through_a_device_and_computed_again() {
+    let at = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(at.path().join(name), text).unwrap();
+    put("box.obj", BOX);
+    put("box.toml", "[mesh]\nfile = \"box.obj\"\nstart_mm = [12, 30, 41]\n");
+    let (_service, ready) = start_device("inverse", &[]);
+    let service = ready["at"].as_str().unwrap();
+    let line = format!(
+        "scene record box.toml --device inverse --service {service} --seconds 2 --to touched --json"
+    );
+    let touched = json(&palpate(at.path(), &split_words(&line)));
+    assert_eq!((&touched["path"], &touched["mesh"]["triangles"]), (&"device".into(), &12.into()));
+    assert!(touched["device"]["reports"].as_u64().unwrap() > 0, "{touched}");
+    let again = json(&palpate(at.path(), &["scene", "replay", "touched", "--json"]));
+    assert_eq!((&again["is_identical"], &again["is_whole"]), (&true.into(), &true.into()));
+    // The middle of its reach is at the place of the surface: the hand swings by 3 and 8 mm, along x and z, and a force moves it on.
+    let ticks = std::fs::read_to_string(at.path().join("touched/ticks.csv")).unwrap();
+    let sensed = ticks.lines().filter_map(|line| {
+        let places = line.split(',').skip(3).take(3).map(|one| one.parse().ok());
+        places.collect::<Option<Vec<f64>>>().filter(|one| one.len() == 3 && one[0].is_finite())
+    });
+    let mut count = 0;
+    for place in sensed {
+        let apart =
+            [12.0, 30.0, 40.0].iter().zip(&place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        assert!(apart.sqrt() < 25.0, "{place:?}");
+        count += 1;
+    }
+    assert!(count > 0, "{ticks}");
+}
+
+#[test]
+fn a_scene_on_a_mesh_begins_where_its_file_says() {
+    let at = tempfile::tempdir().unwrap();
+    std::fs::write(at.path().join("box.obj"), BOX).unwrap();
+    let put = |start: &str| {
+        let text = format!("[mesh]\nfile = \"box.obj\"\n{start}\n");
+        std::fs::write(at.path().join("box.toml"), text).unwrap();
+    };
+    // On the lower side: the path comes from below and goes up.
+    put("start_mm = [10.0, 15.0, -4.0]");
+    let shown = stdout(&palpate(at.path(), &["scene", "show", "box.toml"]));
+    assert!(shown.contains("start_mm = [10.0, 15.0, -4.0]"), "{shown}");
+    let line = split_words("scene record box.toml --to poke --json");
+    let run = json(&palpate(at.path(), &line));
+    assert!(run["depth_max_mm"].as_f64().unwrap() > 5.0, "{run}");
+    let ticks = std::fs::read_to_string(at.path().join("poke/ticks.csv")).unwrap();
+    let first: Vec<f64> =
+        ticks.lines().nth(1).unwrap().split(',').filter_map(|one| one.parse().ok()).collect();
+    let hand = &first[first.len() - 10..][..3];
+    // The hand has moved for a tick at most by 0.1 mm.
+    for (part, expected) in hand.iter().zip([10.0, 15.0, -10.0]) {
+        assert!((part - expected).abs() < 0.1, "{first:?}");
+    }
+    let again = json(&palpate(at.path(), &["scene", "replay", "poke", "--json"]));
+    assert_eq!(again["is_identical"], true, "{again}");
+    put("start_vertex = 7");
+    succeeded(&palpate(at.path(), &["scene", "run", "box.toml"]));
+    for (start, reason) in [
+        ("start_vertex = 8", "begins at vertex 8, but the file of the mesh has 8"),
+        ("start_mm = [0, 0, 99]", "more than 30 mm from the surface"),
+        ("start_mm = 7", "box.toml, line 3: mesh.start_mm: give 3 numbers"),
+    ] {
+        put(start);
+        assert_refused(&palpate(at.path(), &["scene", "run", "box.toml"]), 2, reason);
+    }
 }
 
 #[test]

@@ -35,6 +35,7 @@ enum Value {
     Number(f64),
     Flag(bool),
     Texts(Vec<String>),
+    Numbers(Vec<f64>),
     Other,
 }
 
@@ -192,6 +193,23 @@ impl Fields {
         })
     }
 
+    /// As many numbers within bounds, if they are there.
+    pub fn numbers<const N: usize>(
+        &mut self,
+        key: &str,
+        least: f64,
+        most: f64,
+    ) -> Option<[f64; N]> {
+        let hint = format!("give {N} numbers from {least} to {most}, between [ and ]");
+        self.read_value(key, &hint, |value| match value {
+            Value::Numbers(numbers) => {
+                let all: [f64; N] = numbers.try_into().ok()?;
+                Some(all).filter(|all| all.iter().all(|one| (least..=most).contains(one)))
+            }
+            _ => None,
+        })
+    }
+
     /// A whole number within bounds, if it is there.
     pub fn whole_number(&mut self, key: &str, least: u64, most: u64) -> Option<u64> {
         let (least, most) = (least as f64, most as f64);
@@ -272,24 +290,30 @@ impl Fields {
 fn value_of(value: &DeValue<'_>) -> Value {
     match value {
         DeValue::String(text) => Value::Text(text.to_string()),
-        DeValue::Integer(number) => as_number(&number.to_string()),
-        DeValue::Float(number) => as_number(&number.to_string()),
+        DeValue::Integer(_) | DeValue::Float(_) => {
+            number_of(value).map_or(Value::Other, Value::Number)
+        }
         DeValue::Boolean(flag) => Value::Flag(*flag),
         DeValue::Array(items) => {
             let text = |item: &Spanned<DeValue<'_>>| match item.get_ref() {
                 DeValue::String(text) => Some(text.to_string()),
                 _ => None,
             };
-            items.iter().map(text).collect::<Option<_>>().map_or(Value::Other, Value::Texts)
+            let texts = items.iter().map(text).collect::<Option<_>>().map(Value::Texts);
+            let number = |item: &Spanned<DeValue<'_>>| number_of(item.get_ref());
+            let numbers = || items.iter().map(number).collect::<Option<_>>().map(Value::Numbers);
+            texts.or_else(numbers).unwrap_or(Value::Other)
         }
         _ => Value::Other,
     }
 }
 
-fn as_number(text: &str) -> Value {
+fn number_of(value: &DeValue<'_>) -> Option<f64> {
+    let text = match value {
+        DeValue::Integer(number) => number.to_string(),
+        DeValue::Float(number) => number.to_string(),
+        _ => return None,
+    };
     // "inf" and "nan" are TOML, but nothing that a rig has.
-    match text.parse::<f64>() {
-        Ok(number) if number.is_finite() => Value::Number(number),
-        _ => Value::Other,
-    }
+    text.parse().ok().filter(|number: &f64| number.is_finite())
 }

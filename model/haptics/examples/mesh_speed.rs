@@ -4,7 +4,8 @@
 //!
 //! `slide`: the device circles the body of the stomach at 3 mm of depth and 100 mm/s. `deep`: the same at 10 mm. `wide`: it stays at
 //! 30 mm, and the dent is as wide as it may be. `air`: it moves up to 20 mm above the surface. `fast`: each tick it is somewhere else, inside or outside.
-//! The longest ticks are mostly the machine's: the first line says what it does to work that is always the same.
+//! The longest ticks are mostly the machine's: the first line says what it does to work that is always the same. The hash is of the forces
+//! of all ticks and the dent of every hundredth: it is the same where no number has changed.
 
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
@@ -26,6 +27,15 @@ use std::time::Instant;
 use timing::{measure_machine, percentiles};
 /// Way of the device in a tick in mm: 100 mm/s.
 const STEP_MM: f64 = 0.1;
+/// From one look at the whole dent to the next, in ticks.
+const HASHED: usize = 100;
+/// Where the hash FNV-1a begins, 64 bit.
+const FNV: u64 = 0xcbf2_9ce4_8422_2325;
+
+fn add(hash: u64, numbers: impl IntoIterator<Item = f64>) -> u64 {
+    let bytes = numbers.into_iter().flat_map(|number| number.to_bits().to_le_bytes());
+    bytes.fold(hash, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
 
 #[derive(Clone, Copy)]
 enum Case {
@@ -100,7 +110,7 @@ fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
         MeshTouchLoop::new(mesh.clone(), MaterialMap::one(mesh), &settings).expect("a touch");
     let mut random = SplitMix::seeded(1);
     let mut times = Vec::with_capacity(ticks);
-    let (mut moved, mut contacts) = (0, 0);
+    let (mut moved, mut contacts, mut hash) = (0, 0, FNV);
     touched.tick(around(mesh, 0.0, -5.0));
     // The first tenth is not counted: memory comes to the cache.
     for tick in 0..ticks + ticks / 10 {
@@ -112,12 +122,16 @@ fn measure(mesh: &Arc<TriangleMesh>, case: Case, ticks: usize) {
             times.push(taken * 1e6);
             moved += report.dent.moved;
             contacts += usize::from(report.contact.touch.is_contact());
+            hash = add(hash, report.force);
+            if tick % HASHED == 0 {
+                hash = add(hash, touched.touched().dent().sunk().iter().copied());
+            }
         }
     }
     let [p50, p99, p999, max] = percentiles(&mut times);
     let (moved, contacts) = (moved / ticks, 100 * contacts / ticks);
     println!(
-        "{:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{moved:>10}{contacts:>10}",
+        "{:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{moved:>10}{contacts:>10}  {hash:016x}",
         case.name()
     );
 }
@@ -130,7 +144,7 @@ fn main() {
     println!("{} triangles, made in {made:.0} ms; us per tick, {ticks} ticks", mesh.faces().len());
     measure_machine(ticks);
     println!(
-        "{:<24}{:>10}{:>10}{:>10}{:>11}{:>10}{:>10}",
+        "{:<24}{:>10}{:>10}{:>10}{:>11}{:>10}{:>10}  hash",
         "", "p50", "p99", "p99.9", "max", "moved", "contact %"
     );
     Case::ALL.into_iter().for_each(|case| measure(&mesh, case, ticks));

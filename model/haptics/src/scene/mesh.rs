@@ -3,7 +3,8 @@
 use super::device::length;
 use super::rendering::ForceRendering;
 use super::{
-    HandPose, Pose, START_HEIGHT_MM, SceneError, SceneSettings, SceneTick, SimulatedDevice, hash,
+    HandPose, Pose, START_HEIGHT_MM, SceneError, SceneSettings, SceneStart, SceneTick,
+    SimulatedDevice, StartPlace, hash,
 };
 use crate::SettingError;
 use crate::triangles::{
@@ -26,6 +27,7 @@ pub struct MeshSceneSettings {
     pub bodies: Vec<ModifiedKelvin>,
     pub shading: Shading,
     pub dent: DentSettings,
+    pub start: StartPlace,
     /// Friction, device, period, scheme, guard and controller of the scene; what it has of a square of tissue has no effect.
     pub scene: SceneSettings,
 }
@@ -41,6 +43,20 @@ pub enum MeshSceneError {
         "the map has {materials} materials, but there are {bodies} force models; give one for each material"
     )]
     Bodies { materials: usize, bodies: usize },
+    #[error(
+        "the scene begins at vertex {vertex}, but the file of the mesh has {vertices}, counted from 0; choose one of them"
+    )]
+    StartVertex { vertex: usize, vertices: usize },
+    #[error(
+        "the place where the scene begins is more than {} mm from the surface; give one that is nearer, or correct the unit of the mesh",
+        FAR_MM
+    )]
+    StartFar,
+    #[error(
+        "other tissue is less than {} mm before the place where the scene begins; choose a place with more room",
+        START_HEIGHT_MM
+    )]
+    StartBuried,
 }
 
 /// A scene on a mesh with its state. A tick is that of [`Scene`](super::Scene), with the same numbers.
@@ -52,27 +68,13 @@ pub struct MeshScene {
     last: SceneTick,
     contact: Option<MeshTouch>,
     settings: SceneSettings,
-    middle: [f64; 3],
-    start: [f64; 3],
+    start: SceneStart,
 }
 
 impl MeshSceneSettings {
-    /// The middle of the mesh's box in mm.
-    pub fn middle(&self) -> [f64; 3] {
-        let [low, high] = self.mesh.bounds();
-        [0, 1, 2].map(|axis| 0.5 * (low[axis] + high[axis]))
-    }
-
-    /// Position of the stylus at the start, in mm: above the surface in the middle, or where there is none, as beside a bend, above the
-    /// highest vertex.
-    pub fn start(&self) -> [f64; 3] {
-        let [x, y, _] = self.middle();
-        let [low, high] = self.mesh.bounds();
-        let above = self.mesh.first_hit([x, y, high[2] + 1.0], [x, y, low[2] - 1.0]);
-        let higher = |one: [f64; 3], other: &[f64; 3]| if other[2] > one[2] { *other } else { one };
-        let highest = || self.mesh.points().iter().fold(low, higher);
-        let [x, y, z] = above.map_or_else(highest, |hit| hit.point);
-        [x, y, z + START_HEIGHT_MM]
+    /// Where the scene begins.
+    pub fn start(&self) -> Result<SceneStart, MeshSceneError> {
+        SceneStart::on_mesh(&self.mesh, self.start)
     }
 }
 
@@ -86,24 +88,23 @@ impl MeshScene {
         let MeshSceneSettings { mesh, materials, shading, dent, scene, .. } = settings;
         let touched =
             TouchedMesh::new(mesh.clone(), materials.clone(), (scene.friction, *shading), *dent)?;
-        let start = settings.start();
-        let nearest = mesh.nearest(start, FAR_MM);
+        let start = settings.start()?;
+        let nearest = mesh.nearest(start.at, FAR_MM);
         let high = nearest.map_or(FAR_MM, |nearest| {
-            length([0, 1, 2].map(|axis| start[axis] - nearest.point[axis]))
+            length([0, 1, 2].map(|axis| start.at[axis] - nearest.point[axis]))
         });
         Ok(Self {
             touched,
             rendering: ForceRendering::new(scene, &settings.bodies, -high)?,
             shares: FIRST_ALONE,
             last: SceneTick {
-                device: start,
-                proxy: start,
+                device: start.at,
+                proxy: start.at,
                 normal: [0.0, 0.0, 1.0],
                 ..SceneTick::default()
             },
             contact: None,
             settings: *scene,
-            middle: settings.middle(),
             start,
         })
     }
@@ -136,13 +137,8 @@ impl MeshScene {
         &self.settings
     }
 
-    /// [`MeshSceneSettings::middle`].
-    pub fn middle(&self) -> [f64; 3] {
-        self.middle
-    }
-
     /// [`MeshSceneSettings::start`].
-    pub fn start(&self) -> [f64; 3] {
+    pub fn start(&self) -> SceneStart {
         self.start
     }
 
@@ -185,8 +181,9 @@ impl HandLedMeshScene {
     /// At rest, the stylus above the mesh.
     pub fn new(settings: &MeshSceneSettings) -> Result<Self, MeshSceneError> {
         let SceneSettings { device, period, .. } = settings.scene;
-        let device = SimulatedDevice::new(device, period, settings.middle(), settings.start())?;
-        Ok(Self { scene: MeshScene::new(settings)?, device })
+        let scene = MeshScene::new(settings)?;
+        let SceneStart { middle, at, .. } = scene.start();
+        Ok(Self { device: SimulatedDevice::new(device, period, middle, at)?, scene })
     }
 
     /// One tick, led by a hand.

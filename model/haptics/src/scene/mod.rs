@@ -13,6 +13,7 @@ mod no_force_reason;
 mod path;
 mod rendering;
 mod settings;
+mod start;
 
 pub use device::{DeviceSettings, HandPose, Pose, SimulatedDevice};
 pub use hand_led::HandLedScene;
@@ -20,6 +21,7 @@ pub use mesh::{HandLedMeshScene, MeshScene, MeshSceneError, MeshSceneSettings};
 pub use no_force_reason::NoForceReason;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
+pub use start::{SceneStart, StartPlace};
 
 use crate::Flags;
 use crate::surface::{

@@ -33,7 +33,6 @@ impl Default for DentSettings {
 pub struct Dent {
     settings: DentSettings,
     sunk: Box<[f64]>,
-    is_sunk: Box<[bool]>,
     /// Those that have; as many as there are vertices at most, so that it never grows.
     list: Vec<u32>,
     distance: GeodesicDistance,
@@ -59,7 +58,6 @@ impl Dent {
         Ok(Self {
             settings,
             sunk: vec![0.0; vertices].into(),
-            is_sunk: vec![false; vertices].into(),
             list: Vec::with_capacity(vertices),
             distance: GeodesicDistance::new(mesh),
         })
@@ -80,12 +78,12 @@ impl Dent {
                 let index = vertex as usize;
                 let deep = depth - self.settings.slope * distance;
                 if deep > self.sunk[index] {
-                    self.sunk[index] = deep;
-                    report.moved += 1;
-                    if !self.is_sunk[index] {
-                        self.is_sunk[index] = true;
+                    // Those in the list are below rest.
+                    if self.sunk[index] <= 0.0 {
                         self.list.push(vertex);
                     }
+                    self.sunk[index] = deep;
+                    report.moved += 1;
                 }
             }
         }
@@ -99,7 +97,6 @@ impl Dent {
             let sunk = &mut self.sunk[vertex as usize];
             *sunk = self.settings.recovery.step(*sunk, 0.0);
             if *sunk <= 0.0 {
-                self.is_sunk[vertex as usize] = false;
                 self.list.swap_remove(at);
             } else {
                 at += 1;

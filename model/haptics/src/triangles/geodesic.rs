@@ -14,36 +14,51 @@ use super::vector::{Vector, dot, length, minus};
 /// A vertex whose distance falls by less than this share after it was passed is not passed again: far below the error of the method.
 const PASS_AGAIN: f64 = 1e-9;
 
+/// A way that is longer than another by this share is longer whatever the roundings of both, which are some 1e-16.
+const CLEARLY: f64 = 1e-12;
+/// The same where squares of distances are subtracted, from an edge that is no shorter than a thousandth of them.
+const CLEARLY_ACROSS: f64 = 1e-9;
+
 /// Vertices in a row beyond the reach that are passed, too: a straight way to a vertex within crosses edges with an end beyond.
 const BEYOND: u8 = 2;
 
 /// Storage of a search, made once for a mesh.
 #[derive(Clone, Debug)]
 pub struct GeodesicDistance {
-    distance: Box<[f64]>,
-    /// In the pass of this number a vertex was first seen, and passed.
-    seen: Box<[u32]>,
-    passed: Box<[u32]>,
+    vertices: Box<[Vertex]>,
+    /// The two other corners of the faces around each vertex, in the order of `TriangleMesh::around`.
+    others: Box<[[u32; 2]]>,
     pass: u32,
     reach: f64,
-    beyond: Box<[u8]>,
     found: Vec<u32>,
     heap: VertexHeap,
+}
+
+/// All that a search needs of a vertex, in one line of the processor's cache: a search at a new place waits mostly for memory.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Vertex {
+    at: Vector,
+    distance: f64,
+    /// The pass in which it was first seen, and that in which it was passed.
+    seen: u32,
+    passed: u32,
+    beyond: u8,
 }
 
 impl GeodesicDistance {
     #[must_use]
     pub fn new(mesh: &TriangleMesh) -> Self {
-        let vertices = mesh.points.len();
+        let count = mesh.points.len();
+        let vertex =
+            |&at: &Vector| Vertex { at, distance: f64::INFINITY, seen: 0, passed: 0, beyond: 0 };
         Self {
-            distance: vec![f64::INFINITY; vertices].into(),
-            seen: vec![0; vertices].into(),
-            passed: vec![0; vertices].into(),
+            vertices: mesh.points.iter().map(vertex).collect(),
+            others: others(mesh),
             pass: 0,
             reach: 0.0,
-            beyond: vec![0; vertices].into(),
-            found: Vec::with_capacity(vertices),
-            heap: VertexHeap::new(vertices),
+            found: Vec::with_capacity(count),
+            heap: VertexHeap::new(count),
         }
     }
 
@@ -59,19 +74,21 @@ impl GeodesicDistance {
         // Vertices that are passed again are few; this only bounds the time whatever the mesh.
         let mut left = 4 * mesh.points.len();
         while left > 0
-            && let Some(vertex) = self.heap.pop(&self.distance)
+            && let Some(vertex) = self.heap.pop()
         {
             left -= 1;
-            self.passed[vertex as usize] = self.pass;
-            for &face in mesh.faces_around(vertex) {
-                self.cross(mesh, vertex, face);
+            self.vertices[vertex as usize].passed = self.pass;
+            let [from, to] = [0, 1].map(|step| mesh.around_first[vertex as usize + step] as usize);
+            for index in from..to {
+                self.cross(vertex, self.others[index]);
             }
         }
     }
 
     /// Vertices of the last search and their distances in mm, in the order in which they were first reached.
     pub fn found(&self) -> impl Iterator<Item = (u32, f64)> {
-        let all = self.found.iter().map(|&vertex| (vertex, self.distance[vertex as usize]));
+        let distance = |vertex: u32| self.vertices[vertex as usize].distance;
+        let all = self.found.iter().map(move |&vertex| (vertex, distance(vertex)));
         all.filter(|(_, distance)| *distance <= self.reach)
     }
 
@@ -81,59 +98,101 @@ impl GeodesicDistance {
         self.pass = self.pass.wrapping_add(1);
         if self.pass == 0 {
             // After 4 thousand million searches the numbers repeat.
-            self.seen.fill(0);
-            self.passed.fill(0);
+            for vertex in &mut self.vertices {
+                (vertex.seen, vertex.passed) = (0, 0);
+            }
             self.pass = 1;
         }
     }
 
     /// What a passed vertex gives the two others of a face.
     #[inline(always)]
-    fn cross(&mut self, mesh: &TriangleMesh, vertex: u32, face: u32) {
-        let corners = mesh.faces[face as usize];
-        let Some(corner) = super::shading::corner_of(corners, vertex) else { return };
-        let [one, other] = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
-        let at = |vertex: u32| mesh.points[vertex as usize];
-        let distance = self.distance[vertex as usize];
-        let beyond = if distance > self.reach { self.beyond[vertex as usize] + 1 } else { 1 };
+    fn cross(&mut self, vertex: u32, [one, other]: [u32; 2]) {
+        let Vertex { at, distance, beyond, .. } = self.vertices[vertex as usize];
+        let beyond = if distance > self.reach { beyond + 1 } else { 1 };
         for (to, with) in [(one, other), (other, one)] {
-            let (here, there) = (minus(at(vertex), at(to)), minus(at(with), at(to)));
+            let (to_one, with_one) = (&self.vertices[to as usize], &self.vertices[with as usize]);
+            let limit = to_one.limit(self.pass);
+            let here = minus(at, to_one.at);
             // A corner that was passed before has no longer way than along this edge, but may have one across the triangle: the front
             // around a source that is near is round.
-            let is_before =
-                self.passed[to as usize] == self.pass && self.distance[to as usize] <= distance;
-            let mut best = if is_before { f64::INFINITY } else { distance + length(here) };
-            if self.passed[with as usize] == self.pass {
-                let known = [distance, self.distance[with as usize]];
-                if let Some(across) = unfold(here, there, known) {
+            let mut best = f64::INFINITY;
+            let (room, squared) = (limit - distance, dot(here, here));
+            if room > 0.0 && squared <= room * room * (1.0 + CLEARLY) {
+                best = distance + squared.sqrt();
+            }
+            if with_one.passed == self.pass {
+                let there = minus(with_one.at, to_one.at);
+                let known = [distance, with_one.distance];
+                if !is_too_long(here, there, known, limit)
+                    && let Some(across) = unfold(here, there, known)
+                {
                     best = best.min(across);
                 }
             }
-            self.offer(to, best, beyond);
+            if best < limit {
+                self.offer(to, best, beyond);
+            }
         }
     }
 
     /// `beyond`: the how manieth it is outside the reach, if it is.
+    #[inline(always)]
     fn offer(&mut self, vertex: u32, distance: f64, beyond: u8) {
         if distance.is_nan() || (distance > self.reach && beyond > BEYOND) {
             return;
         }
-        let index = vertex as usize;
-        if self.seen[index] != self.pass {
-            self.seen[index] = self.pass;
-            self.found.push(vertex);
-        } else if distance >= self.distance[index] {
+        let one = &mut self.vertices[vertex as usize];
+        if distance >= one.limit(self.pass) {
             return;
-        } else if self.passed[index] == self.pass {
-            if distance >= self.distance[index] * (1.0 - PASS_AGAIN) {
-                return;
-            }
-            self.passed[index] = 0;
         }
-        self.distance[index] = distance;
-        self.beyond[index] = beyond;
-        self.heap.raise(vertex, &self.distance);
+        if one.seen != self.pass {
+            one.seen = self.pass;
+            self.found.push(vertex);
+        }
+        one.passed = 0;
+        one.distance = distance;
+        one.beyond = beyond;
+        self.heap.raise(vertex, distance);
     }
+}
+
+impl Vertex {
+    /// No distance from here on changes it in a pass.
+    #[inline(always)]
+    fn limit(&self, pass: u32) -> f64 {
+        match (self.seen == pass, self.passed == pass) {
+            (false, _) => f64::INFINITY,
+            (true, false) => self.distance,
+            (true, true) => self.distance * (1.0 - PASS_AGAIN),
+        }
+    }
+}
+
+fn others(mesh: &TriangleMesh) -> Box<[[u32; 2]]> {
+    let mut others = Vec::with_capacity(mesh.around.len());
+    for vertex in 0..mesh.points.len() as u32 {
+        others.extend(mesh.faces_around(vertex).iter().map(|&face| {
+            let corners = mesh.faces[face as usize];
+            // Every face around a vertex has it as a corner.
+            let corner = super::shading::corner_of(corners, vertex).unwrap_or(0);
+            [corners[(corner + 1) % 3], corners[(corner + 2) % 3]]
+        }));
+    }
+    others.into()
+}
+
+/// Whether [`unfold`] gives `limit` or more, as far as that is seen without roots and divisions: the way across is no shorter than the
+/// hypotenuse over the heights of the source and the third corner above the edge. Half of all triangles end here.
+#[inline(always)]
+fn is_too_long(a: Vector, b: Vector, [to_a, to_b]: [f64; 2], limit: f64) -> bool {
+    let ab = minus(b, a);
+    let squared = dot(ab, ab);
+    // Feet of both on the edge, times its length.
+    let (source, corner) = (0.5 * (squared + to_a * to_a - to_b * to_b), dot(a, ab));
+    let sides = to_a * to_a + dot(a, a);
+    let heights = (sides * (1.0 - CLEARLY_ACROSS) - limit * limit) * squared;
+    heights > source * source + corner * corner && 1e6 * squared > to_a * to_a
 }
 
 /// The distance of the third corner where the straight way from the source to it crosses the edge of the first two, whose ways from the

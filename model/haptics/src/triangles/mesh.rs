@@ -147,6 +147,12 @@ impl TriangleMesh {
         super::vector::dot(way, self.normal_for_sign(nearest)) >= 0.0
     }
 
+    /// Outward unit normal at a point of the surface: of a corner or an edge, that of the triangles around.
+    pub fn normal(&self, at: &SurfacePoint) -> [f64; 3] {
+        let own = self.face_normals[at.face as usize];
+        unit(self.normal_for_sign(at)).unwrap_or(own)
+    }
+
     /// Where a straight way first meets a triangle: on closed parts from outside, on open ones from either side.
     pub fn first_hit(&self, from: [f64; 3], to: [f64; 3]) -> Option<MeshHit> {
         self.tree.first_hit(self, from, to, |_| false)

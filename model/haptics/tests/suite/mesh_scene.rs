@@ -3,7 +3,7 @@
 use super::mesh_support::{apart, mesh};
 use palpate_haptics::scene::{
     HandLedMeshScene, HandLedScene, HandPose, MeshScene, MeshSceneError, MeshSceneSettings,
-    NoForceReason, Pose, Scene, ScenePath, SceneSettings,
+    NoForceReason, Pose, Scene, ScenePath, SceneSettings, StartPlace,
 };
 use palpate_haptics::triangles::shapes::{phantom, plate, stomach};
 use palpate_haptics::triangles::{DentSettings, MaterialMap, Shading, TriangleMesh};
@@ -17,6 +17,7 @@ fn settings(mesh: TriangleMesh) -> MeshSceneSettings {
         bodies: vec![scene.body],
         shading: Shading::Smooth,
         dent: DentSettings::default(),
+        start: StartPlace::Middle,
         mesh,
         scene,
     }
@@ -53,7 +54,7 @@ fn a_flat_mesh_feels_like_the_grid() {
 #[test]
 fn a_hand_presses_a_stomach() {
     let settings = settings(mesh(stomach()));
-    let start = settings.start();
+    let start = settings.start().unwrap().at;
     let run = || {
         let mut led = HandLedMeshScene::new(&settings).unwrap();
         let mut deepest = 0.0f64;

@@ -2,10 +2,11 @@
 
 use super::scene::SceneFrame;
 use super::stylus::Stylus;
-use palpate_haptics::Period;
 use palpate_haptics::scene::{
-    DeviceSettings, HandPose, MeshScene, Pose, Scene, SceneError, ScenePath, SceneTick,
+    HandPose, MeshScene, Pose, Scene, ScenePath, SceneSettings, SceneStart, SceneTick,
+    SimulatedDevice,
 };
+use palpate_haptics::{Period, SettingError};
 use std::fmt::Debug;
 use triple_buffer::Input;
 
@@ -17,12 +18,10 @@ pub trait LoopScene: Debug + Send + 'static {
     /// What others see of it, about sixty times a second.
     type Frame: Clone + Debug + Send + 'static;
 
-    fn period(&self) -> Period;
+    /// Device, loop and guards.
+    fn settings(&self) -> &SceneSettings;
 
-    fn device(&self) -> &DeviceSettings;
-
-    /// The simulated device over its tissue.
-    fn stylus(&self, path: Laps) -> Result<(Stylus, Input<HandPose>), SceneError>;
+    fn start(&self) -> SceneStart;
 
     /// Must not allocate, lock or wait.
     fn render(&mut self, pose: Pose, elapsed: u64) -> SceneTick;
@@ -33,21 +32,33 @@ pub trait LoopScene: Debug + Send + 'static {
 
     /// Must not allocate.
     fn update(&self, frame: &mut Self::Frame);
-}
-
-impl LoopScene for Scene {
-    type Frame = SceneFrame;
 
     fn period(&self) -> Period {
         self.settings().period
     }
 
-    fn device(&self) -> &DeviceSettings {
-        &self.settings().device
+    /// The simulated device at the start.
+    fn simulated_device(&self) -> Result<SimulatedDevice, SettingError> {
+        let SceneStart { middle, at, .. } = self.start();
+        SimulatedDevice::new(self.settings().device, self.period(), middle, at)
     }
 
-    fn stylus(&self, path: Laps) -> Result<(Stylus, Input<HandPose>), SceneError> {
-        Stylus::new(*self.settings(), path)
+    /// The same with a hand on a path, and what moves the hand afterwards.
+    fn stylus(&self, path: Laps) -> Result<(Stylus, Input<HandPose>), SettingError> {
+        let at = (*self.settings(), self.start());
+        Ok(Stylus::on(self.simulated_device()?, at, path))
+    }
+}
+
+impl LoopScene for Scene {
+    type Frame = SceneFrame;
+
+    fn settings(&self) -> &SceneSettings {
+        Scene::settings(self)
+    }
+
+    fn start(&self) -> SceneStart {
+        SceneStart::of_square(Scene::settings(self))
     }
 
     fn render(&mut self, pose: Pose, elapsed: u64) -> SceneTick {
@@ -71,16 +82,12 @@ impl LoopScene for Scene {
 impl LoopScene for MeshScene {
     type Frame = SceneTick;
 
-    fn period(&self) -> Period {
-        self.settings().period
+    fn settings(&self) -> &SceneSettings {
+        MeshScene::settings(self)
     }
 
-    fn device(&self) -> &DeviceSettings {
-        &self.settings().device
-    }
-
-    fn stylus(&self, path: Laps) -> Result<(Stylus, Input<HandPose>), SceneError> {
-        Stylus::from_start(*self.settings(), (self.middle(), self.start()), path)
+    fn start(&self) -> SceneStart {
+        MeshScene::start(self)
     }
 
     fn render(&mut self, pose: Pose, elapsed: u64) -> SceneTick {

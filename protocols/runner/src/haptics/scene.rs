@@ -222,7 +222,7 @@ impl<S: LoopScene> SceneLoop<S> {
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
         let period = scene.period();
-        if device.settings() != scene.device() {
+        if *device.settings() != scene.settings().device {
             return Err(
                 "the scene has the settings of a different device; give the scene the settings of the connected device".into(),
             );

@@ -334,6 +334,7 @@ pub(super) fn plain(text: &str) -> String {
 mod tests {
     use super::super::scene_mesh::MaterialBody;
     use super::*;
+    use palpate_haptics::scene::StartPlace;
     use palpate_haptics::triangles::Shading;
     use palpate_haptics::triangles::files::MeshUnit;
 
@@ -367,8 +368,10 @@ mod tests {
             bodies: bodies.to_vec(),
             shading: Shading::Flat,
             reach_mm: 1.0 / 3.0,
+            start: StartPlace::Near([0.1 + 0.2, -1e-7, 3.0]),
         };
         let plainest = SceneMesh {
+            start: StartPlace::Vertex(17),
             sha256: None,
             materials: None,
             materials_sha256: None,
@@ -412,6 +415,19 @@ mod tests {
             ("[mesh]\nfile = \"a.stl\"\nnodes = 5", "line 3: mesh.nodes: "),
             ("[mesh]\nfile = \"a.stl\"\nsha256 = \"12\"", "line 3: mesh.sha256: "),
             ("[mesh]\nfile = \"a.stl\"\nunit = \"inch\"", "line 3: mesh.unit: give \"mm\""),
+            ("[mesh]\nstart_vertex = 1", "line 2: mesh.start_vertex: "),
+            (
+                "[mesh]\nfile = \"a.stl\"\nstart_mm = [1, 2]",
+                "line 3: mesh.start_mm: give 3 numbers",
+            ),
+            (
+                "[mesh]\nfile = \"a.stl\"\nstart_vertex = -1",
+                "line 3: mesh.start_vertex: give a whole",
+            ),
+            (
+                "[mesh]\nfile = \"a.stl\"\nstart_mm = [1, 2, 3.5]\nstart_vertex = 4",
+                "line 4: mesh.start_vertex: give either",
+            ),
             ("[mesh]\nfile = \"a.stl\"\n[bodies.pad]\nmu1 = 1", "line 4: 'bodies.pad.mu1'"),
             (
                 "[tissue]\nsource = \"b\"\n[mesh]\nfile = \"a.stl\"\nbodies = [\"thesis\"]",

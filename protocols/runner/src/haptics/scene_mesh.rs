@@ -2,8 +2,9 @@
 
 use super::scene_file::{format_body, plain, read_body};
 use palpate_drivers::rig_file::fields::Fields;
+use palpate_haptics::scene::StartPlace;
 use palpate_haptics::triangles::files::{MeshFormat, MeshUnit};
-use palpate_haptics::triangles::{DentSettings, MOST_MATERIALS, Shading};
+use palpate_haptics::triangles::{DentSettings, LARGEST_MM, MOST_FACES, MOST_MATERIALS, Shading};
 use palpate_model::viscoelastic::ModifiedKelvin;
 
 /// Which mesh a scene has in place of a square of tissue, and of what it is.
@@ -24,6 +25,7 @@ pub struct SceneMesh {
     pub shading: Shading,
     /// Nothing sinks further than this from a contact, in mm along the surface.
     pub reach_mm: f64,
+    pub start: StartPlace,
 }
 
 /// The force model of a material.
@@ -36,7 +38,7 @@ pub struct MaterialBody {
 }
 
 /// Keys that mean something only with a file.
-const KEYS: [&str; 7] = [
+const KEYS: [&str; 9] = [
     "mesh.sha256",
     "mesh.unit",
     "mesh.materials",
@@ -44,6 +46,8 @@ const KEYS: [&str; 7] = [
     "mesh.bodies",
     "mesh.shading",
     "mesh.reach_mm",
+    "mesh.start_mm",
+    "mesh.start_vertex",
 ];
 
 /// Keys of a square of tissue.
@@ -74,8 +78,8 @@ pub(super) fn read(fields: &mut Fields) -> Option<SceneMesh> {
         materials_sha256: read_hash(fields, "mesh.materials_sha256"),
         bodies: read_bodies(fields),
         shading: shading.unwrap_or_default(),
-        // As far as a mesh may be large.
-        reach_mm: fields.number("mesh.reach_mm", 0.0, 10_000.0).unwrap_or(usual),
+        reach_mm: fields.number("mesh.reach_mm", 0.0, LARGEST_MM).unwrap_or(usual),
+        start: read_start(fields),
         file: file?,
     };
     if MeshFormat::of_name(&mesh.file).is_none() {
@@ -112,6 +116,19 @@ fn read_hash(fields: &mut Fields, key: &str) -> Option<String> {
     Some(hash.to_ascii_lowercase())
 }
 
+fn read_start(fields: &mut Fields) -> StartPlace {
+    // The frame of a file may have its origin far from the mesh.
+    let near = fields.numbers("mesh.start_mm", -1e6, 1e6).map(StartPlace::Near);
+    // Three vertices of each triangle at most.
+    let most = 3 * MOST_FACES as u64 - 1;
+    let vertex = fields.whole_number("mesh.start_vertex", 0, most);
+    if near.is_some() && vertex.is_some() {
+        fields.mistake("mesh.start_vertex", "give either start_mm or start_vertex, not both");
+    }
+    let vertex = vertex.map(|vertex| StartPlace::Vertex(vertex as usize));
+    near.or(vertex).unwrap_or_default()
+}
+
 fn read_bodies(fields: &mut Fields) -> Vec<MaterialBody> {
     let names = fields.texts("mesh.bodies").unwrap_or_default();
     if names.len() > MOST_MATERIALS {
@@ -137,6 +154,11 @@ impl SceneMesh {
         }
         lines.push(text("shading", self.shading.name()));
         lines.push(format!("reach_mm = {:?}", self.reach_mm));
+        match self.start {
+            StartPlace::Middle => {}
+            StartPlace::Near(place) => lines.push(format!("start_mm = {place:?}")),
+            StartPlace::Vertex(vertex) => lines.push(format!("start_vertex = {vertex}")),
+        }
         for (index, one) in self.bodies.iter().enumerate() {
             let is_first = self.bodies.iter().position(|other| other.name == one.name);
             if let Some(body) = one.body.filter(|_| is_first == Some(index)) {

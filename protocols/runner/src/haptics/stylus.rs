@@ -1,8 +1,10 @@
 //! The simulated haptic device with a hand that follows a path, then a pointer.
 
+use super::loop_scene::Laps;
+use palpate_haptics::SettingError;
 use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{
-    DeviceSettings, HandPose, Pose, SceneError, ScenePath, SceneSettings, SimulatedDevice,
+    DeviceSettings, HandPose, Pose, ScenePath, SceneSettings, SceneStart, SimulatedDevice,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +15,7 @@ use triple_buffer::{Input, Output, triple_buffer};
 pub struct Stylus {
     device: SimulatedDevice,
     settings: SceneSettings,
-    /// From the scene of a path to this one in mm.
-    shift: [f64; 3],
+    start: SceneStart,
     path: Option<ScenePath>,
     laps: u32,
     pointed: Output<HandPose>,
@@ -25,27 +26,26 @@ pub struct Stylus {
 }
 
 impl Stylus {
-    /// Starts over the middle of the tissue and follows the path `laps` times; the input moves the hand afterwards.
+    /// Starts over the middle of a square of tissue and follows the path `laps` times; the input moves the hand afterwards.
     pub fn new(
         settings: SceneSettings,
-        path: (Option<ScenePath>, u32),
-    ) -> Result<(Self, Input<HandPose>), SceneError> {
-        let (middle, start) = (settings.middle(), settings.start());
-        Self::from_start(settings, (middle, start), path)
+        path: Laps,
+    ) -> Result<(Self, Input<HandPose>), SettingError> {
+        let device = SimulatedDevice::of(&settings)?;
+        Ok(Self::on(device, (settings, SceneStart::of_square(&settings)), path))
     }
 
-    /// Starts at `start` with the workspace around `middle`, in mm; the path is moved with the start.
-    pub fn from_start(
-        settings: SceneSettings,
-        (middle, start): ([f64; 3], [f64; 3]),
-        (path, laps): (Option<ScenePath>, u32),
-    ) -> Result<(Self, Input<HandPose>), SceneError> {
-        let hand = HandPose { at: start, turn: [0.0; 3] };
+    /// On a device at the start of a scene; the path of a square is moved there.
+    pub(super) fn on(
+        device: SimulatedDevice,
+        (settings, start): (SceneSettings, SceneStart),
+        (path, laps): Laps,
+    ) -> (Self, Input<HandPose>) {
+        let hand = HandPose { at: start.at, turn: [0.0; 3] };
         let (input, pointed) = triple_buffer(&hand);
-        let usual = settings.start();
         let stylus = Self {
-            device: SimulatedDevice::new(settings.device, settings.period, middle, start)?,
-            shift: [0, 1, 2].map(|axis| start[axis] - usual[axis]),
+            device,
+            start,
             settings,
             path,
             laps,
@@ -55,7 +55,7 @@ impl Stylus {
             hand,
             force: [0.0; 3],
         };
-        Ok((stylus, input))
+        (stylus, input)
     }
 
     /// True from the end of the path on; without a path, from the start.
@@ -67,8 +67,7 @@ impl Stylus {
         let t = self.settings.period.time_of(self.ticks).seconds().0;
         match self.path {
             Some(path) if t <= path.seconds() * f64::from(self.laps) => {
-                let HandPose { at, turn } = path.at(t % path.seconds(), &self.settings);
-                HandPose { at: [0, 1, 2].map(|axis| at[axis] + self.shift[axis]), turn }
+                self.start.moved(path.at(t % path.seconds(), &self.settings), &self.settings)
             }
             _ => {
                 self.is_over.store(true, Ordering::Relaxed);
