@@ -13,7 +13,7 @@ use palpate_runner::haptics::scene::{
     COLUMNS, Columns, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
 use palpate_runner::haptics::scene_file::SceneFile;
-use palpate_runner::haptics::{LoopScene, SceneEnd, SceneFrame, SceneLoop};
+use palpate_runner::haptics::{LoopScene, MeshFrame, SceneEnd, SceneFrame, SceneLoop};
 use palpate_sessions::ticks::{SETTINGS_FILE, TickRecording, has_columns};
 use serde::Serialize;
 use std::path::Path;
@@ -23,20 +23,9 @@ use std::time::Duration;
 /// Interval between two looks at a running scene: half a frame.
 const LOOK: Duration = Duration::from_millis(8);
 
-/// A scene file with its body, and what is to be known of that; without a file the scene that is built in. Its tissue is a square.
+/// A scene file with its body, and what is to be known of that; without a file the scene that is built in. Paths of a mesh become
+/// absolute, with the SHA-256 of what is there.
 pub fn read_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
-    let read = read_any_scene(file)?;
-    match (&read.0.mesh, file) {
-        (Some(_), Some(path)) => Err(format!(
-            "the tissue of {} is a mesh, which only the command line runs so far; open a scene without mesh.file here",
-            path.display()
-        )),
-        _ => Ok(read),
-    }
-}
-
-/// The same, its tissue a square or a mesh. Paths of a mesh become absolute, with the SHA-256 of what is there.
-pub fn read_any_scene(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
     let Some(path) = file else { return Ok((SceneFile::default(), Vec::new())) };
     let called = path.display().to_string();
     let text = std::fs::read_to_string(path)
@@ -129,8 +118,8 @@ impl Shown for Scene {
 }
 
 impl Shown for MeshScene {
-    fn shown(frame: &SceneTick) -> &SceneTick {
-        frame
+    fn shown(frame: &MeshFrame) -> &SceneTick {
+        &frame.tick
     }
 
     fn ticks(&self) -> u64 {
@@ -250,7 +239,7 @@ impl SeenTicks {
 
 /// The finished recording of a scene, if it has one.
 #[must_use]
-pub fn finish_scene_recording(end: SceneEnd) -> FinishedRecording {
+pub fn finish_scene_recording<S: LoopScene>(end: SceneEnd<S>) -> FinishedRecording {
     let hash = end.scene.hash();
     Some(end.recorded?.map(|counts| (counts, hash)))
 }

@@ -7,6 +7,7 @@ use palpate_haptics::surface::SurfaceRecovery;
 use palpate_haptics::triangles::files::{MeshFormat, read_mesh};
 use palpate_haptics::triangles::{DentSettings, MaterialMap, TriangleMesh, TriangleSoup};
 use palpate_model::units::Seconds;
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_runner::haptics::scene_file::{SceneFile, THESIS};
 use palpate_runner::haptics::scene_mesh::SceneMesh;
 use palpate_sessions::text::sha256;
@@ -58,52 +59,70 @@ pub(super) fn read_mesh_scene(
     mesh: &SceneMesh,
     beside: Option<&Path>,
 ) -> Result<(MeshScene, MeshReport), String> {
-    let settings = mesh_scene_settings(file, mesh, beside)?;
+    let read = ReadMesh::read(file, mesh, beside)?;
     let report = MeshReport {
         file: mesh.file.clone(),
         sha256: mesh.sha256.clone().unwrap_or_default(),
-        triangles: settings.mesh.faces().len(),
-        vertices: settings.mesh.points().len(),
-        materials: settings.materials.materials(),
+        triangles: read.mesh.faces().len(),
+        vertices: read.mesh.points().len(),
+        materials: read.materials.materials(),
     };
-    let scene =
-        MeshScene::new(&settings).map_err(|err| format!("the scene '{}': {err}", file.name))?;
-    Ok((scene, report))
+    Ok((read.scene(file)?, report))
 }
 
-/// What a scene on a mesh is made of.
-fn mesh_scene_settings(
-    file: &SceneFile,
-    mesh: &SceneMesh,
-    beside: Option<&Path>,
-) -> Result<MeshSceneSettings, String> {
-    let here = Path::new("");
-    let mut name = mesh.file.clone();
-    let (_, bytes) = open(&mut name, mesh.sha256.as_deref(), here, beside)?;
-    let format = MeshFormat::of_name(&name)
-        .ok_or_else(|| format!("{name} is no mesh file; give OBJ, STL, GLB or glTF"))?;
-    let refused = |err: &dyn std::fmt::Display| format!("{name}: {err}");
-    let soup = read_mesh(format, &bytes, mesh.unit).map_err(|err| refused(&err))?;
-    let colours = soup.colours.clone();
-    let triangles = TriangleMesh::new(TriangleSoup { colours: Vec::new(), ..soup })
-        .map_err(|err| refused(&err))?;
-    let bodies: Vec<_> = match mesh.bodies.len() {
-        0 => vec![file.body],
-        _ => mesh.bodies.iter().filter_map(|one| one.body).collect(),
-    };
-    let materials = read_materials(mesh, &triangles, (&colours, bodies.len()), beside)?;
-    let scene = file.settings(palpate_haptics::scene::SceneSettings::default().nodes)?;
-    let recovery = SurfaceRecovery::new(Seconds(scene.recovery_s), scene.period.seconds())
-        .map_err(|err| format!("the scene '{}': {err}", file.name))?;
-    Ok(MeshSceneSettings {
-        mesh: Arc::new(triangles),
-        materials,
-        bodies,
-        shading: mesh.shading,
-        dent: DentSettings { slope: file.slope, reach_mm: mesh.reach_mm, recovery },
-        start: mesh.start,
-        scene,
-    })
+/// A mesh with its materials and their force models, from the files that a scene names.
+#[derive(Clone, Debug)]
+pub struct ReadMesh {
+    pub mesh: Arc<TriangleMesh>,
+    pub materials: MaterialMap,
+    /// Of each material.
+    pub bodies: Vec<ModifiedKelvin>,
+}
+
+impl ReadMesh {
+    /// The mesh of a scene; `None` where its tissue is a square.
+    pub fn of(file: &SceneFile) -> Result<Option<Self>, String> {
+        file.mesh.as_ref().map(|mesh| Self::read(file, mesh, None)).transpose()
+    }
+
+    fn read(file: &SceneFile, mesh: &SceneMesh, beside: Option<&Path>) -> Result<Self, String> {
+        let here = Path::new("");
+        let mut name = mesh.file.clone();
+        let (_, bytes) = open(&mut name, mesh.sha256.as_deref(), here, beside)?;
+        let format = MeshFormat::of_name(&name)
+            .ok_or_else(|| format!("{name} is no mesh file; give OBJ, STL, GLB or glTF"))?;
+        let refused = |err: &dyn std::fmt::Display| format!("{name}: {err}");
+        let soup = read_mesh(format, &bytes, mesh.unit).map_err(|err| refused(&err))?;
+        let colours = soup.colours.clone();
+        let triangles = TriangleMesh::new(TriangleSoup { colours: Vec::new(), ..soup })
+            .map_err(|err| refused(&err))?;
+        let bodies: Vec<_> = match mesh.bodies.len() {
+            0 => vec![file.body],
+            _ => mesh.bodies.iter().filter_map(|one| one.body).collect(),
+        };
+        let materials = read_materials(mesh, &triangles, (&colours, bodies.len()), beside)?;
+        Ok(Self { mesh: Arc::new(triangles), materials, bodies })
+    }
+
+    /// A scene on it, at rest.
+    pub fn scene(&self, file: &SceneFile) -> Result<MeshScene, String> {
+        let mesh = file.mesh.as_ref().ok_or_else(|| {
+            format!("the scene '{}' has no mesh; report this bug in palpate", file.name)
+        })?;
+        let scene = file.settings(palpate_haptics::scene::SceneSettings::default().nodes)?;
+        let recovery = SurfaceRecovery::new(Seconds(scene.recovery_s), scene.period.seconds())
+            .map_err(|err| format!("the scene '{}': {err}", file.name))?;
+        let settings = MeshSceneSettings {
+            mesh: Arc::clone(&self.mesh),
+            materials: self.materials.clone(),
+            bodies: self.bodies.clone(),
+            shading: mesh.shading,
+            dent: DentSettings { slope: file.slope, reach_mm: mesh.reach_mm, recovery },
+            start: mesh.start,
+            scene,
+        };
+        MeshScene::new(&settings).map_err(|err| format!("the scene '{}': {err}", file.name))
+    }
 }
 
 /// By the table of materials, else by the colours, else all of one material.
@@ -174,7 +193,7 @@ fn in_folder(folder: &Path, path: &Path) -> Option<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{SceneHand, check_scene, play_scene, read_any_scene, read_scene, replay};
+    use crate::scene::{SceneHand, check_scene, play_scene, read_scene, replay};
     use palpate_haptics::scene::ScenePath;
     use palpate_haptics::triangles::files::{write_glb, write_stl};
     use palpate_haptics::triangles::shapes::{ball, phantom};
@@ -201,7 +220,7 @@ mod tests {
         let at = tempfile::tempdir().unwrap();
         let mesh = put(at.path(), "organs/phantom.glb", write_glb(&phantom()));
         let path = put(at.path(), "painted.toml", PAINTED);
-        let (scene, notes) = read_any_scene(Some(&path)).unwrap();
+        let (scene, notes) = read_scene(Some(&path)).unwrap();
         assert!(notes.is_empty(), "{notes:?}");
         let read = scene.mesh.as_ref().unwrap();
         assert_eq!(Path::new(&read.file), std::path::absolute(&mesh).unwrap());
@@ -213,8 +232,7 @@ mod tests {
         check_scene(&scene).unwrap();
         // What is shown reads back to the same.
         let shown = put(at.path(), "elsewhere/shown.toml", scene.text());
-        assert_eq!(read_any_scene(Some(&shown)).unwrap().0, scene);
-        assert!(read_scene(Some(&path)).unwrap_err().contains("mesh.file"));
+        assert_eq!(read_scene(Some(&shown)).unwrap().0, scene);
     }
 
     #[test]
@@ -222,7 +240,7 @@ mod tests {
         let at = tempfile::tempdir().unwrap();
         let mesh = put(at.path(), "organs/phantom.glb", write_glb(&phantom()));
         let path = put(at.path(), "painted.toml", PAINTED);
-        let (scene, _) = read_any_scene(Some(&path)).unwrap();
+        let (scene, _) = read_scene(Some(&path)).unwrap();
         let folder = at.path().join("poke");
         let hand = SceneHand::Simulated(ScenePath::Poke, 1);
         let played = play_scene(&scene, hand, Some(&folder), &mut |_| {}).unwrap();
@@ -267,7 +285,7 @@ mod tests {
             (format!("file = \"ball.stl\"\nsha256 = \"{}\"", "0".repeat(64)), "another file"),
         ] {
             let path = put(at.path(), "scene.toml", format!("[mesh]\n{lines}\n"));
-            let read = read_any_scene(Some(&path));
+            let read = read_scene(Some(&path));
             let refused = read.and_then(|(scene, _)| check_scene(&scene)).unwrap_err();
             assert!(refused.contains(expected), "{lines}: {refused}");
         }
@@ -276,6 +294,6 @@ mod tests {
             "scene.toml",
             format!("[mesh]\nfile = \"ball.stl\"\n{bodies}\nmaterials = \"map.csv\"\n"),
         );
-        check_scene(&read_any_scene(Some(&path)).unwrap().0).unwrap();
+        check_scene(&read_scene(Some(&path)).unwrap().0).unwrap();
     }
 }

@@ -10,9 +10,7 @@ use clap::{Args, Subcommand};
 use palpate_analysis::population::library_member;
 use palpate_analysis::progress::Progress;
 use palpate_analysis::report::scene::{bench_text, device_lines, plan_text, played_text};
-use palpate_analysis::scene::{
-    SceneHand, SceneRun, check_scene, play_scene, read_any_scene, replay,
-};
+use palpate_analysis::scene::{SceneHand, SceneRun, check_scene, play_scene, read_scene, replay};
 use palpate_analysis::scene_bench::{bench, plan_scene, replan_scene, scene_from_plan};
 use palpate_analysis::scene_device::{DeviceName, OpenDevice, SceneToTouch, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
@@ -145,7 +143,7 @@ pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure
 }
 
 fn read(file: Option<&Path>, output: &Output) -> Result<SceneFile, Failure> {
-    let (scene, notes) = read_any_scene(file).map_err(Failure::usage)?;
+    let (scene, notes) = read_scene(file).map_err(Failure::usage)?;
     notes.iter().for_each(|note| output.note(note));
     Ok(scene)
 }

@@ -11,13 +11,6 @@ pub fn along(from: Vec3, direction: Vec3, length: f64) -> Vec3 {
     [0, 1, 2].map(|axis| from[axis] + length * direction[axis])
 }
 
-/// Unit vectors to the right and away from the eye as seen from above: what keys move along.
-#[must_use]
-pub fn ground(camera: &Camera) -> [[f64; 2]; 2] {
-    let [[x, y, _], ..] = camera.axes();
-    [[x, y], [-y, x]]
-}
-
 /// A point on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenPoint {
@@ -68,13 +61,18 @@ impl Lens {
         self.unit() / (FIELD_OF_VIEW / 2.0).tan() / distance
     }
 
+    /// The eye, and the direction, of no particular length, that it sees at a point of the screen.
+    #[must_use]
+    pub fn ray(&self, at: Pos2) -> [Vec3; 2] {
+        let from = at - self.rect.center();
+        let place = [from.x, -from.y].map(|part| f64::from(part) / self.unit());
+        [self.camera.eye(self.eye), self.camera.ray(place, self.eye)]
+    }
+
     /// The place at height `z` that is seen at a point of the screen; `None` above the horizon.
     #[must_use]
     pub fn pick(&self, at: Pos2, z: f64) -> Option<[f64; 2]> {
-        let from = at - self.rect.center();
-        let place = [from.x, -from.y].map(|part| f64::from(part) / self.unit());
-        let ray = self.camera.ray(place, self.eye);
-        let eye = self.camera.eye(self.eye);
+        let [eye, ray] = self.ray(at);
         let length = (z - eye[2]) / ray[2];
         let [x, y, _] = along(eye, ray, length);
         (length > 0.0 && length.is_finite()).then_some([x, y])
@@ -85,6 +83,12 @@ impl Lens {
 mod tests {
     use super::*;
     use eframe::egui::vec2;
+
+    /// Unit vectors to the right and away from the eye as seen from above.
+    fn ground(camera: &Camera) -> [[f64; 2]; 2] {
+        let [[x, y, _], ..] = camera.axes();
+        [[x, y], [-y, x]]
+    }
 
     fn picture() -> Rect {
         Rect::from_min_size(pos2(10.0, 20.0), vec2(400.0, 300.0))

@@ -3,8 +3,8 @@
 use super::camera::Lens;
 use super::detail::PictureDetail;
 use super::graphics::PictureGraphics;
-use super::hand::{ToolTarget, stylus};
-use super::look::{SceneLook, deepest_of};
+use super::hand::{ToolGround, ToolTarget, stylus};
+use super::look::{PicturedTissue, SceneLook, SeenRanges};
 use super::overlay::OverlayPainter;
 use crate::widgets::{NamedControl, quiet_ui, tokens_of};
 use eframe::egui::{
@@ -12,9 +12,8 @@ use eframe::egui::{
     Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, vec2,
 };
 use eframe::egui_wgpu::Callback;
-use palpate_haptics::surface::Heights;
 use palpate_tissue_view::{
-    AdapterAbilities, Camera, DetailLevel, EyeLayout, Picture, Probe, SurfaceData, TissueCallback,
+    AdapterAbilities, Camera, DetailLevel, EyeLayout, Picture, PictureShape, Probe, TissueCallback,
     Vec3,
 };
 use std::sync::Arc;
@@ -27,17 +26,13 @@ const ORBIT: [f64; 2] = [0.008, 0.1];
 const ZOOM: [f64; 2] = [0.002, 1.15];
 /// Depth per point of the wheel, in mm.
 const WHEEL_MM: f64 = 0.02;
-/// How far below the surface the camera looks at first, in lengths of the scene: all of the block is in the picture.
-const LOWER: f64 = 0.08;
 /// Room for the line below the picture.
 const FOOT: f32 = 20.0;
 
 /// The scene at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct ScenePicture<'a> {
-    pub now: Heights<'a>,
-    /// Its heights at rest, in mm.
-    pub rest: &'a [f64],
+    pub tissue: PicturedTissue<'a>,
     /// Where the tip of the device is, in mm.
     pub device: Vec3,
     /// Yaw, pitch and roll of the stylus in rad.
@@ -54,38 +49,39 @@ pub struct ScenePicture<'a> {
 #[derive(Clone, Debug)]
 pub struct SceneView {
     camera: Camera,
-    extent: [f64; 2],
+    /// What the camera was fitted to; `None` before the first picture.
+    shape: Option<PictureShape>,
     hand: ToolTarget,
     pub look: SceneLook,
     detail: PictureDetail,
-    /// The deepest depth since the scene began: colours do not change their meaning while one looks.
-    deepest: f64,
+    seen: SeenRanges,
 }
 
-/// Looks at the middle of the block that is drawn, so that its near corner is in the picture.
-fn first_camera([wide, high]: [f64; 2]) -> Camera {
-    let below = LOWER * wide.max(high);
-    Camera::of([wide, high]).looking_at([wide / 2.0, high / 2.0, -below])
+fn first_camera(ground: &ToolGround) -> Camera {
+    match ground {
+        ToolGround::Square(extent) => Camera::of(*extent),
+        ToolGround::Mesh(mesh) => Camera::around(mesh.bounds()),
+    }
 }
 
 impl SceneView {
-    /// Of a surface of these lengths in mm.
+    /// Of the tissue that the hand is over.
     #[must_use]
-    pub fn of(extent: [f64; 2]) -> Self {
+    pub fn of(hand: ToolTarget) -> Self {
         Self {
-            camera: first_camera(extent),
-            extent,
-            hand: ToolTarget::above(extent),
+            camera: first_camera(hand.ground()),
+            shape: None,
+            hand,
             look: SceneLook::default(),
             detail: PictureDetail::default(),
-            deepest: 0.0,
+            seen: SeenRanges::default(),
         }
     }
 
-    /// The same of a surface of other lengths in mm, looked at from the start.
-    pub fn resize(&mut self, extent: [f64; 2]) {
+    /// The same of other tissue, looked at from the start.
+    pub fn take_tissue(&mut self, hand: ToolTarget) {
         let (look, detail) = (self.look, self.detail.clone());
-        *self = Self { look, detail, ..Self::of(extent) };
+        *self = Self { look, detail, ..Self::of(hand) };
     }
 
     /// Where the pointer and the keys want the tool.
@@ -93,13 +89,43 @@ impl SceneView {
         &self.hand
     }
 
-    /// The longer side in mm.
+    /// The longest side of the tissue in mm.
     pub fn side_mm(&self) -> f64 {
-        self.extent[0].max(self.extent[1])
+        let [low, high] = self.hand.ground().bounds();
+        [0, 1, 2].map(|axis| high[axis] - low[axis]).into_iter().fold(0.0, f64::max)
     }
 
     pub fn reset(&mut self) {
-        self.camera = first_camera(self.extent);
+        self.camera = first_camera(self.hand.ground());
+        self.shape = None;
+    }
+
+    /// The box of what is drawn, lowest and highest corner in mm: of a square with its sides.
+    fn bounds(&self) -> [Vec3; 2] {
+        let [low, high] = self.hand.ground().bounds();
+        match self.hand.ground() {
+            ToolGround::Square(_) => {
+                [[low[0], low[1], -self.look.thickness_mm(self.side_mm())], high]
+            }
+            ToolGround::Mesh(_) => [low, high],
+        }
+    }
+
+    /// All of the tissue is in the picture, whatever its shape; what was turned and zoomed stays so.
+    fn fit(&mut self, rect: Rect) {
+        let now = PictureShape::new([rect.width(), rect.height()].map(f64::from), self.eyes());
+        self.camera = match self.shape.replace(now) {
+            None => self.camera.fitted(self.bounds(), now),
+            Some(before) if before != now => self.camera.reshaped(self.bounds(), [before, now]),
+            Some(_) => self.camera,
+        };
+    }
+
+    fn eyes(&self) -> EyeLayout {
+        match self.look.has_two_eyes {
+            true => EyeLayout::SideBySide,
+            false => EyeLayout::Single,
+        }
     }
 
     /// Draws the scene in the space there is, and below it how; the hand follows pointer and keys.
@@ -113,9 +139,9 @@ impl SceneView {
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let response = response.named(NAME);
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, NAME));
+        self.fit(rect);
         self.take_pointer(ui, &response, rect);
         self.take_keys(ui, &response);
-        self.deepest = self.deepest.max(deepest_of(shown.now, shown.rest));
         let frame_ms = graphics.frame_ms.filter(|_| shown.is_running);
         let drawn = graphics
             .abilities()
@@ -158,36 +184,34 @@ impl SceneView {
                 font: TextStyle::Small.resolve(ui.style()),
             };
             above.touch(&lens, shown, self.side_mm());
-            if let Some(legend) = look.legend(self.deepest) {
+            if let Some(legend) = look.legend(&self.seen) {
                 above.legend(lens.rect, &legend);
             }
         }
         Ok(level)
     }
 
-    /// The heights and the probe as the loop computed them.
+    /// The tissue and the probe as the loop computed them.
     fn picture(
-        &self,
+        &mut self,
         shown: &ScenePicture,
         level: DetailLevel,
         ui: &Ui,
     ) -> Result<Picture, String> {
-        let surface = self.look.field(shown.now, shown.rest).map_err(|err| err.to_string())?;
+        let surface = self.look.surface(shown.tissue).map_err(|err| err.to_string())?;
+        self.seen.take(self.look.colours, shown.tissue, &surface);
         let [length, _] = stylus(shown.turn);
         let drawn = self.look.probe;
         let probe = Probe::new([0.0; 3], drawn.radius_mm(self.side_mm()))
             .and_then(|probe| probe.of_kind(drawn.kind()).with_axis(length))
             .and_then(|probe| probe.with_tip_at(shown.device));
         Ok(Picture {
-            surface: Arc::new(SurfaceData::Field(surface)),
+            surface: Arc::new(surface),
             // A device that is lost has no place.
             probe: probe.ok(),
             camera: self.camera,
-            eyes: match self.look.has_two_eyes {
-                true => EyeLayout::SideBySide,
-                false => EyeLayout::Single,
-            },
-            look: self.look.look(self.side_mm(), self.deepest, tokens_of(ui)),
+            eyes: self.eyes(),
+            look: self.look.look(self.side_mm(), &self.seen, tokens_of(ui)),
             level,
         })
     }
@@ -197,7 +221,7 @@ impl SceneView {
         let parts = [
             frame_ms.map(|frame_ms| format!("{frame_ms:.0} ms a frame")),
             Some(level.to_string()),
-            self.look.contour_words(self.deepest),
+            self.look.contour_words(&self.seen),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         quiet_ui(ui, parts.join("; "));
@@ -211,11 +235,11 @@ impl SceneView {
         }
     }
 
-    /// The place on the surface at rest under a point of the screen.
-    fn pick(&self, rect: Rect, at: Pos2) -> Option<[f64; 2]> {
+    /// The eye and the direction that it sees at a point of the screen.
+    fn ray(&self, rect: Rect, at: Pos2) -> Option<[Vec3; 2]> {
         let lenses = self.lenses(rect);
         let under = lenses.iter().find(|lens| lens.rect.contains(at)).or(lenses.first())?;
-        under.pick(at, 0.0)
+        Some(under.ray(at))
     }
 
     fn take_pointer(&mut self, ui: &Ui, response: &Response, rect: Rect) {
@@ -235,9 +259,9 @@ impl SceneView {
             events.any(|event| matches!(event, Event::PointerMoved(_)))
         });
         if let Some(at) = pointer.filter(|_| presses || is_moved)
-            && let Some(place) = self.pick(rect, at)
+            && let Some(ray) = self.ray(rect, at)
         {
-            self.hand.go(place);
+            self.hand.go_to_seen(ray);
         }
         if presses {
             response.request_focus();
@@ -303,15 +327,19 @@ fn pixels(rect: Rect, pixels_per_point: f32) -> [u32; 2] {
 mod tests {
     use super::*;
     use eframe::egui::{CentralPanel, Context, Modifiers, RawInput, pos2};
-    use palpate_haptics::surface::Grid;
+    use palpate_haptics::surface::{Grid, Heights};
+    use palpate_tissue_view::ElasticModel;
 
     /// One frame of a picture of 800 by 600 points.
     fn frame(ctx: &Context, view: &mut SceneView, time: f64, events: Vec<Event>) -> Response {
         let grid = Grid::new(31, 31, 2.0).unwrap();
         let heights = vec![0.0; grid.nodes()];
         let shown = ScenePicture {
-            now: Heights::new(grid, &heights).unwrap(),
-            rest: &heights,
+            tissue: PicturedTissue::Square {
+                now: Heights::new(grid, &heights).unwrap(),
+                rest: &heights,
+                model: ElasticModel::default(),
+            },
             device: view.hand().at(),
             turn: [0.0, 0.5, 0.0],
             contact: None,
@@ -350,13 +378,14 @@ mod tests {
 
     #[test]
     fn a_button_held_presses_where_the_pointer_is_until_it_is_let_go() {
-        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let (ctx, mut view) = (Context::default(), SceneView::of(ToolTarget::above([60.0, 60.0])));
         let at = pos2(420.0, 330.0);
         let rect = frame(&ctx, &mut view, 0.0, Vec::new()).rect;
         frame(&ctx, &mut view, 0.1, vec![Event::PointerMoved(at)]);
         assert!(view.hand().at()[2] > 0.0);
-        let picked = view.pick(rect, at).unwrap();
-        assert!((view.hand().at()[0] - picked[0]).abs() < 1e-9);
+        let [eye, ray] = view.ray(rect, at).unwrap();
+        let picked = eye[0] - ray[0] * eye[2] / ray[2];
+        assert!((view.hand().at()[0] - picked).abs() < 1e-9);
         let before = view.camera;
         frame(&ctx, &mut view, 0.2, vec![button(at, PointerButton::Primary, true)]);
         for step in 3..8 {
@@ -370,7 +399,7 @@ mod tests {
 
     #[test]
     fn the_other_button_turns_the_scene_and_presses_nothing() {
-        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let (ctx, mut view) = (Context::default(), SceneView::of(ToolTarget::above([60.0, 60.0])));
         let at = pos2(420.0, 330.0);
         frame(&ctx, &mut view, 0.0, vec![Event::PointerMoved(at)]);
         frame(&ctx, &mut view, 0.1, vec![button(at, PointerButton::Secondary, true)]);
@@ -384,12 +413,12 @@ mod tests {
 
     #[test]
     fn keys_reach_the_picture_that_has_the_focus() {
-        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let (ctx, mut view) = (Context::default(), SceneView::of(ToolTarget::above([60.0, 60.0])));
         let response = frame(&ctx, &mut view, 0.0, Vec::new());
         let down = || vec![key(Key::PageDown, Modifiers::NONE)];
-        let start = *view.hand();
+        let start = view.hand().clone();
         frame(&ctx, &mut view, 0.1, down());
-        assert_eq!(*view.hand(), start, "without the focus a key is another's");
+        assert_eq!(view.hand().at(), start.at(), "without the focus a key is another's");
         response.request_focus();
         frame(&ctx, &mut view, 0.2, down());
         assert!(view.hand().at()[2] < start.at()[2]);

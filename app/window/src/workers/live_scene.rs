@@ -1,17 +1,20 @@
 //! The scene of the window: computed along a path, or in a loop of its own, and its past for the plots.
 
+use super::scene_tissue::{SceneInstant, ShownFrame, TissueScene};
 use super::trail::{TIMING_S, forget_old};
+use palpate_analysis::scene::finish_scene_recording;
 use palpate_analysis::scene_device::{DeviceReport, DeviceUse, OpenDevice};
+use palpate_analysis::tick_replay::FinishedRecording;
 use palpate_haptic_devices::DeviceMonitor;
-use palpate_haptics::LawSettings;
 use palpate_haptics::margin::{LoopDevice, Margin, MarginSettings};
-use palpate_haptics::scene::{HandLedScene, HandPose, Scene, ScenePath, SceneSettings, SceneTick};
-use palpate_haptics::surface::{Grid, Heights, MeshError};
+use palpate_haptics::scene::{HandPose, ScenePath, SceneSettings, SceneTick};
+use palpate_haptics::{LawSettings, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
-use palpate_runner::haptics::SceneLoop;
 use palpate_runner::haptics::scene::SceneRecorder;
 use palpate_runner::haptics::timing::LoopTiming;
+use palpate_runner::haptics::{LoopScene, SceneLoop};
 use std::collections::VecDeque;
+use std::fmt::Debug;
 
 /// Ticks between two points of a computed path.
 const TICKS_PER_POINT: u64 = 10;
@@ -28,12 +31,8 @@ pub struct ForcePoint {
 }
 
 impl ForcePoint {
-    fn of(tick: &SceneTick, settings: &SceneSettings) -> Self {
-        Self {
-            t: settings.period.time_of(tick.tick).seconds().0,
-            force: force_of(tick),
-            depth: tick.depth,
-        }
+    fn of(tick: &SceneTick, period: Period) -> Self {
+        Self { t: period.time_of(tick.tick).seconds().0, force: force_of(tick), depth: tick.depth }
     }
 }
 
@@ -42,37 +41,6 @@ impl ForcePoint {
 pub fn force_of(tick: &SceneTick) -> f64 {
     let [x, y, z] = tick.force;
     x.hypot(y).hypot(z)
-}
-
-/// A tick of a scene, and its surface then.
-#[derive(Clone, Debug)]
-pub struct SceneInstant {
-    pub tick: SceneTick,
-    grid: Grid,
-    heights: Vec<f64>,
-    rest: Vec<f64>,
-}
-
-impl SceneInstant {
-    fn of(scene: &Scene) -> Self {
-        let field = scene.field();
-        Self {
-            tick: scene.last(),
-            grid: *field.grid(),
-            heights: field.heights().to_vec(),
-            // A scene's tissue is flat at rest.
-            rest: vec![0.0; field.heights().len()],
-        }
-    }
-
-    pub fn now(&self) -> Result<Heights<'_>, MeshError> {
-        Heights::new(self.grid, &self.heights)
-    }
-
-    /// Its heights at rest in mm.
-    pub fn rest(&self) -> &[f64] {
-        &self.rest
-    }
 }
 
 /// The margin of a scene's loop through `device` where it is now.
@@ -137,37 +105,109 @@ pub struct ComputedPath {
 
 /// Computes a scene along a path. `is_going` receives the share done, and cancels by returning false.
 pub fn compute_path(
-    settings: SceneSettings,
+    scene: TissueScene,
     path: ScenePath,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<ComputedPath, String> {
-    let mut led = HandLedScene::new(settings).map_err(|err| err.to_string())?;
-    let mut deepest = SceneInstant::of(&led.scene);
+    match scene {
+        TissueScene::Square(scene) => compute(*scene, path, is_going),
+        TissueScene::Mesh(scene) => compute(*scene, path, is_going),
+    }
+}
+
+fn compute<S: LoopScene<Frame: ShownFrame>>(
+    mut scene: S,
+    path: ScenePath,
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<ComputedPath, String> {
+    let (settings, start) = (*scene.settings(), scene.start());
+    let period = settings.period;
+    let mut device = scene.simulated_device().map_err(|err| err.to_string())?;
+    let mut frame = scene.frame();
     let mut trail = Vec::new();
-    let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
+    let mut deepest = *frame.tick();
+    let mut force = [0.0; 3];
+    let ticks = (path.seconds() / period.seconds().0).ceil() as u64;
     for tick in 1..=ticks {
-        let t = settings.period.time_of(tick).seconds().0;
-        let tick_now = led.tick(path.at(t, &settings));
+        let t = period.time_of(tick).seconds().0;
+        device.follow(start.moved(path.at(t, &settings), &settings), force, 1);
+        let tick_now = scene.render(device.pose(), 1);
+        force = tick_now.force;
         if !tick.is_multiple_of(TICKS_PER_POINT) {
             continue;
         }
-        trail.push(ForcePoint::of(&tick_now, &settings));
-        if tick_now.depth > deepest.tick.depth {
-            deepest.tick = tick_now;
-            let now = led.scene.field().heights();
-            deepest.heights.copy_from_slice(now);
+        trail.push(ForcePoint::of(&tick_now, period));
+        if tick_now.depth > deepest.depth {
+            deepest = tick_now;
+            // All of it: since the last frame other parts have moved and come back.
+            frame = scene.frame();
         }
         if !is_going(tick as f64 / ticks as f64) {
             return Err("the computation was cancelled".into());
         }
     }
-    Ok(ComputedPath { settings, path, deepest, trail })
+    Ok(ComputedPath { settings, path, deepest: SceneInstant::of(&frame)?, trail })
+}
+
+/// A loop that ticks a scene of any tissue.
+trait RunningLoop: Debug + Send {
+    fn point(&self, hand: HandPose);
+    fn is_over(&self) -> bool;
+    fn is_alive(&self) -> bool;
+    fn timing(&self) -> LoopTiming;
+    fn priority(&self) -> String;
+    /// The newest moment, if it is later than a tick.
+    fn after(&mut self, tick: u64) -> Option<Result<SceneInstant, String>>;
+    /// Ends it, and its recording after everything is written.
+    fn finish(self: Box<Self>) -> FinishedRecording;
+}
+
+impl<S: LoopScene<Frame: ShownFrame>> RunningLoop for SceneLoop<S> {
+    fn point(&self, hand: HandPose) {
+        SceneLoop::point(self, hand);
+    }
+
+    fn is_over(&self) -> bool {
+        SceneLoop::is_over(self)
+    }
+
+    fn is_alive(&self) -> bool {
+        SceneLoop::is_alive(self)
+    }
+
+    fn timing(&self) -> LoopTiming {
+        SceneLoop::timing(self)
+    }
+
+    fn priority(&self) -> String {
+        self.granted_priority().to_string()
+    }
+
+    fn after(&mut self, tick: u64) -> Option<Result<SceneInstant, String>> {
+        let frame = self.view();
+        (frame.tick().tick > tick).then(|| SceneInstant::of(frame))
+    }
+
+    fn finish(self: Box<Self>) -> FinishedRecording {
+        self.stop().and_then(finish_scene_recording)
+    }
+}
+
+/// A loop that was taken out to be ended.
+#[derive(Debug)]
+pub struct EndingLoop(Box<dyn RunningLoop>);
+
+impl EndingLoop {
+    /// Waits for the disk.
+    pub fn finish(self) -> FinishedRecording {
+        self.0.finish()
+    }
 }
 
 /// A scene that runs or ran last.
 #[derive(Debug)]
 pub struct LiveScene {
-    live: Option<SceneLoop>,
+    live: Option<Box<dyn RunningLoop>>,
     settings: SceneSettings,
     moment: SceneInstant,
     trail: VecDeque<ForcePoint>,
@@ -179,14 +219,25 @@ pub struct LiveScene {
 }
 
 impl LiveScene {
-    /// Starts the loop; `settings` are those of the device that leads it.
+    /// Starts the loop; the settings of the scene are those of the device that leads it.
     pub fn start(
-        settings: SceneSettings,
+        scene: TissueScene,
         lead: SceneLead,
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
-        let scene = Scene::new(settings).map_err(|err| err.to_string())?;
-        let moment = SceneInstant::of(&scene);
+        match scene {
+            TissueScene::Square(scene) => Self::begin(*scene, lead, recorder),
+            TissueScene::Mesh(scene) => Self::begin(*scene, lead, recorder),
+        }
+    }
+
+    fn begin<S: LoopScene<Frame: ShownFrame>>(
+        scene: S,
+        lead: SceneLead,
+        recorder: Option<SceneRecorder>,
+    ) -> Result<Self, String> {
+        let settings = *scene.settings();
+        let moment = SceneInstant::of(&scene.frame())?;
         let is_led = matches!(lead, SceneLead::Path(_));
         let (live, device) = match lead {
             SceneLead::Path(path) => (SceneLoop::start(scene, Some(path), recorder)?, None),
@@ -203,9 +254,9 @@ impl LiveScene {
             timing: live.timing(),
             timing_read_at: 0.0,
             is_led,
-            priority: live.granted_priority().to_string(),
+            priority: RunningLoop::priority(&live),
             device,
-            live: Some(live),
+            live: Some(Box::new(live)),
         })
     }
 
@@ -215,20 +266,12 @@ impl LiveScene {
             return Ok(());
         };
         live.point(hand);
-        self.is_led = !live.is_over();
-        let frame = live.view();
-        if frame.tick.tick > self.moment.tick.tick {
-            let spacing = frame.side_mm / (frame.nodes - 1) as f64;
-            let grid = Grid::new(frame.nodes, frame.nodes, spacing);
-            self.moment.grid = grid.map_err(|err| err.to_string())?;
-            self.moment.tick = frame.tick;
-            self.moment.heights.clear();
-            let heights = frame.heights.iter().copied().map(f64::from);
-            self.moment.heights.extend(heights);
-            self.moment.rest.resize(frame.heights.len(), 0.0);
-            self.trail.push_back(ForcePoint::of(&frame.tick, &self.settings));
-        }
+        self.is_led = self.is_led && !live.is_over();
         let period = self.settings.period;
+        if let Some(moment) = live.after(self.moment.tick.tick) {
+            self.moment = moment?;
+            self.trail.push_back(ForcePoint::of(&self.moment.tick, period));
+        }
         let now = period.time_of(self.moment.tick.tick).seconds().0;
         forget_old(&mut self.trail, now, |point| point.t);
         if now - self.timing_read_at >= TIMING_S {
@@ -253,10 +296,10 @@ impl LiveScene {
     }
 
     /// Takes the loop out to be ended, as its recording waits for the disk.
-    pub fn stop(&mut self) -> Option<SceneLoop> {
+    pub fn stop(&mut self) -> Option<EndingLoop> {
         let live = self.live.take()?;
         self.timing = live.timing();
-        Some(live)
+        Some(EndingLoop(live))
     }
 
     pub fn settings(&self) -> &SceneSettings {
@@ -299,26 +342,67 @@ impl LiveScene {
 
 #[cfg(test)]
 mod tests {
+    use super::super::scene_tissue::{MeshTissue, ShownTissue, elastic_model};
     use super::*;
+    use palpate_runner::haptics::scene_file::SceneFile;
 
-    #[test]
-    fn a_computed_poke_is_as_deep_as_the_hand_and_ends_above() {
-        let settings = SceneSettings { nodes: 41, max_shear_mm: 1.5, ..SceneSettings::default() };
-        let poke = || compute_path(settings, ScenePath::Poke, &mut |_| true).unwrap();
+    fn lowest(instant: &SceneInstant) -> f64 {
+        match &instant.tissue {
+            ShownTissue::Square { heights, .. } => heights.iter().copied().fold(0.0, f64::min),
+            ShownTissue::Mesh(sunk) => sunk.iter().map(|one| -one.depth).fold(0.0, f64::min),
+        }
+    }
+
+    fn assert_is_a_poke(scene: impl Fn() -> TissueScene) {
+        let poke = || compute_path(scene(), ScenePath::Poke, &mut |_| true).unwrap();
         let one = poke();
         let deepest = &one.deepest.tick;
         // The hand goes 8 mm deep; the force holds the stylus back.
         assert!(deepest.depth > 4.0 && deepest.depth <= 8.2, "{}", deepest.depth);
-        let low = one.deepest.heights.iter().copied().fold(0.0, f64::min);
-        assert!((low + deepest.depth).abs() < 0.5, "{low}");
+        // Nodes are not where the stylus is, and a dent of slope 1 is as much less deep there.
+        let low = lowest(&one.deepest);
+        assert!((low + deepest.depth).abs() < 1.5, "{low} {}", deepest.depth);
         assert!(force_of(deepest) > 0.1);
         let last = one.trail.last().unwrap();
         assert!(last.depth == 0.0 && (last.t - ScenePath::Poke.seconds()).abs() < 0.02);
         // The same bits every time, so that pictures of it are equal.
         let again = poke();
         assert_eq!(one.trail, again.trail);
-        assert_eq!(one.deepest.heights, again.deepest.heights);
-        let cut = compute_path(settings, ScenePath::Poke, &mut |share| share < 0.5);
+        assert_eq!(one.deepest.tissue, again.deepest.tissue);
+        let cut = compute_path(scene(), ScenePath::Poke, &mut |share| share < 0.5);
         assert!(cut.unwrap_err().contains("was cancelled"));
+    }
+
+    #[test]
+    fn a_computed_poke_is_as_deep_as_the_hand_and_ends_above() {
+        let file = SceneFile { nodes: Some(41), slope: 1.0, ..SceneFile::default() };
+        assert_is_a_poke(|| TissueScene::of(&file, None).unwrap());
+    }
+
+    #[test]
+    fn a_mesh_of_a_scene_file_is_poked_and_its_vertices_have_the_model_of_their_material() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pad.obj");
+        // A square pad of 60 mm in 4 mm steps.
+        let steps = 0..=15;
+        let mut text = String::new();
+        for row in steps.clone() {
+            for column in steps.clone() {
+                text += &format!("v {} {} 0\n", 4 * column, 4 * row);
+            }
+        }
+        for row in 0..15 {
+            for column in 1..=15 {
+                let (here, above) = (16 * row + column, 16 * (row + 1) + column);
+                text += &format!("f {here} {} {} {above}\n", here + 1, above + 1);
+            }
+        }
+        std::fs::write(&path, text).unwrap();
+        let scene = folder.path().join("pad.toml");
+        std::fs::write(&scene, "name = \"pad\"\n[mesh]\nfile = \"pad.obj\"\n").unwrap();
+        let (file, _) = palpate_analysis::scene::read_scene(Some(&scene)).unwrap();
+        let mesh = MeshTissue::of(&file).unwrap().unwrap();
+        assert_eq!(mesh.models, vec![elastic_model(&file.body); 256]);
+        assert_is_a_poke(|| TissueScene::of(&file, Some(&mesh)).unwrap());
     }
 }

@@ -8,6 +8,7 @@ mod path_dialog;
 pub mod player;
 pub mod queue_desk;
 pub mod review;
+pub mod scene_tissue;
 pub mod station;
 mod task;
 pub mod trail;

@@ -1,5 +1,6 @@
 //! What a loop needs of a scene, whether its tissue is a square of heights or a mesh of triangles.
 
+use super::mesh_frame::MeshFrame;
 use super::scene::SceneFrame;
 use super::stylus::Stylus;
 use palpate_haptics::scene::{
@@ -78,9 +79,8 @@ impl LoopScene for Scene {
     }
 }
 
-/// Of a mesh the newest tick is seen.
 impl LoopScene for MeshScene {
-    type Frame = SceneTick;
+    type Frame = MeshFrame;
 
     fn settings(&self) -> &SceneSettings {
         MeshScene::settings(self)
@@ -98,11 +98,11 @@ impl LoopScene for MeshScene {
         MeshScene::hash(self)
     }
 
-    fn frame(&self) -> SceneTick {
-        self.last()
+    fn frame(&self) -> MeshFrame {
+        MeshFrame::new(self)
     }
 
-    fn update(&self, frame: &mut SceneTick) {
-        *frame = self.last();
+    fn update(&self, frame: &mut MeshFrame) {
+        frame.update(self);
     }
 }

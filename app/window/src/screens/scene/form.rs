@@ -77,7 +77,7 @@ impl SceneForm {
 
     /// Takes what was read of a file.
     pub fn fill(&mut self, read: SceneFile, mut notes: Vec<String>) {
-        if read.nodes.is_none() {
+        if read.nodes.is_none() && read.mesh.is_none() {
             notes.push("The file has no mesh size; plan the mesh on the Trade screen.".into());
         }
         self.notes = notes;
@@ -191,13 +191,20 @@ impl SceneForm {
     /// Draws what it is made of.
     pub fn parts_ui(&mut self, ui: &mut Ui) {
         section_ui(ui, "Tissue and mesh");
-        quantity_ui(ui, "side", "mm", &mut self.side);
-        quantity_ui(ui, "nodes", "along a side", &mut self.nodes);
+        match &self.read.mesh {
+            None => {
+                quantity_ui(ui, "side", "mm", &mut self.side);
+                quantity_ui(ui, "nodes", "along a side", &mut self.nodes);
+            }
+            Some(mesh) => quiet_ui(ui, &mesh.file),
+        }
         quantity_ui(ui, "slope", "steepest", &mut self.slope);
         quantity_ui(ui, "friction", "of the tissue", &mut self.friction);
-        let [(least, _), (most, _)] = INERT;
-        let words = format!("{least} and {most} have no effect: nodes move along z only");
-        quiet_ui(ui, words);
+        if self.read.mesh.is_none() {
+            let [(least, _), (most, _)] = INERT;
+            let words = format!("{least} and {most} have no effect: nodes move along z only");
+            quiet_ui(ui, words);
+        }
         let recovery = self.read.recovery_s.unwrap_or(self.read.body.tau_eps);
         let cut = match self.read.cut_mm > 0.0 {
             true => format!("; displacements of {} mm or less are ignored", self.read.cut_mm),

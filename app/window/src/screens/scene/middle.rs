@@ -1,14 +1,18 @@
 //! The picture of the scene, and force and depth over time below it.
 
-use super::SceneScreen;
+use super::{SceneScreen, ViewedTissue};
 use crate::plots::figure::strip_ui;
 use crate::scene::graphics::PictureGraphics;
+use crate::scene::look::PicturedTissue;
 use crate::scene::view::ScenePicture;
 use crate::widgets::{NamedControl, alarm_ui, placeholder_ui, quiet_ui};
-use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene, SceneInstant};
+use crate::workers::live_scene::{ComputedPath, ForcePoint, LiveScene};
+use crate::workers::scene_tissue::{SceneInstant, ShownTissue, elastic_model};
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Ui, vec2};
 use palpate_figures::figure::{Ink, PlotSeries};
+use palpate_haptics::surface::Heights;
+use palpate_model::viscoelastic::ModifiedKelvin;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PictureSource {
@@ -25,6 +29,7 @@ const HEAD: f32 = 32.0;
 
 struct ShownScene<'a> {
     instant: &'a SceneInstant,
+    body: ModifiedKelvin,
     trail: Vec<ForcePoint>,
     /// Seconds along the plots.
     shown: [f64; 2],
@@ -48,6 +53,7 @@ fn shown_scene<'a>(
             };
             Ok(ShownScene {
                 instant: live.moment(),
+                body: live.settings().body,
                 trail: live.trail().copied().collect(),
                 shown: [end - PAST_S, end],
                 title: title.to_owned(),
@@ -57,6 +63,7 @@ fn shown_scene<'a>(
             let at = computed.settings.period.time_of(computed.deepest.tick.tick);
             Ok(ShownScene {
                 instant: &computed.deepest,
+                body: computed.settings.body,
                 trail: computed.trail.clone(),
                 shown: [0.0, computed.path.seconds()],
                 title: format!(
@@ -84,7 +91,7 @@ impl SceneScreen {
                 self.view.reset();
             }
         });
-        let ShownScene { instant, trail, shown, title } =
+        let ShownScene { instant, body, trail, shown, title } =
             match shown_scene(self.side, self.live.as_ref(), self.computed.answer()) {
                 Ok(shown_scene) => shown_scene,
                 Err(None) => {
@@ -98,14 +105,24 @@ impl SceneScreen {
                 Err(Some(reason)) => return alarm_ui(ui, reason),
             };
         quiet_ui(ui, title);
-        let now = match instant.now() {
-            Ok(now) => now,
-            Err(reason) => return alarm_ui(ui, reason.to_string()),
-        };
         let tick = &instant.tick;
+        let heights = match &instant.tissue {
+            ShownTissue::Square { grid, heights, .. } => Heights::new(*grid, heights).map(Some),
+            ShownTissue::Mesh(_) => Ok(None),
+        };
+        let tissue = match (heights, &instant.tissue, &self.viewed) {
+            (Err(reason), ..) => return alarm_ui(ui, reason.to_string()),
+            (Ok(Some(now)), ShownTissue::Square { rest, .. }, _) => {
+                PicturedTissue::Square { now, rest, model: elastic_model(&body) }
+            }
+            (Ok(_), ShownTissue::Mesh(sunk), ViewedTissue::Mesh(tissue)) => {
+                PicturedTissue::Mesh { tissue, sunk }
+            }
+            // Another scene was opened since.
+            (Ok(_), ..) => return placeholder_ui(ui, "nothing computed yet"),
+        };
         let picture = ScenePicture {
-            now,
-            rest: instant.rest(),
+            tissue,
             device: tick.device,
             turn: tick.turn,
             contact: tick.is_contact().then_some(tick.proxy),

@@ -8,18 +8,20 @@ mod right;
 
 use super::screen::{Commands, PaletteAction, Reaction, Screen, ScreenEntry, UiCommand, Workbench};
 use super::tape::{TapePanel, loop_button_ui};
+use crate::scene::hand::ToolTarget;
 use crate::scene::look::SceneLook;
 use crate::scene::view::SceneView;
 use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
 use crate::workers::live_scene::{
-    ComputedPath, LiveScene, SceneInstant, SceneLead, compute_path, simulated_loop,
+    ComputedPath, LiveScene, SceneLead, compute_path, simulated_loop,
 };
+use crate::workers::scene_tissue::{MeshTissue, SceneInstant, TissueScene};
 use crate::workers::{BackgroundTask, PathPurpose};
 use eframe::egui::{Context, Key, Ui};
 use form::{HandChoice, SceneForm};
 use middle::PictureSource;
 use palpate_analysis::progress::Progress;
-use palpate_analysis::scene::{finish_scene_recording, read_scene, replay};
+use palpate_analysis::scene::{check_scene, read_scene, replay};
 use palpate_analysis::scene_device::{DeviceReport, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_haptics::margin::LoopDevice;
@@ -29,9 +31,7 @@ use palpate_runner::haptics::scene_file::SceneFile;
 use plan::PlannedScene;
 use serde_json::Value;
 use std::path::Path;
-
-/// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
-const TURN: [f64; 3] = [0.0, -0.5, 0.0];
+use std::sync::Arc;
 
 /// Why nothing else is started meanwhile.
 const OPENING: &str = "the device of the scene is being opened";
@@ -47,7 +47,9 @@ pub const SCREEN: ScreenEntry = ScreenEntry {
 
 pub struct SceneScreen {
     form: SceneForm,
-    reading: BackgroundTask<(SceneFile, Vec<String>)>,
+    reading: BackgroundTask<ReadScene>,
+    /// The mesh of the form's scene; `None` where its tissue is a square.
+    mesh: Option<Arc<MeshTissue>>,
     computed: BackgroundTask<ComputedPath>,
     /// A device that is being opened for the scene of the form.
     opening: BackgroundTask<(OpenDevice, DeviceReport)>,
@@ -60,8 +62,37 @@ pub struct SceneScreen {
     planned: Option<PlannedScene>,
     side: PictureSource,
     view: SceneView,
-    /// The length of the side that the view was made for, in mm.
-    viewed_mm: f64,
+    /// What the view was made for.
+    viewed: ViewedTissue,
+}
+
+/// A scene file that was read, with its mesh.
+struct ReadScene {
+    file: SceneFile,
+    notes: Vec<String>,
+    mesh: Option<MeshTissue>,
+}
+
+/// The tissue in the picture.
+#[derive(Clone, Debug)]
+enum ViewedTissue {
+    /// Of this side in mm.
+    Square(f64),
+    Mesh(Arc<MeshTissue>),
+}
+
+impl ViewedTissue {
+    fn of(settings: &SceneSettings, mesh: Option<&Arc<MeshTissue>>) -> Self {
+        mesh.map_or(Self::Square(settings.side_mm), |mesh| Self::Mesh(Arc::clone(mesh)))
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Square(one), Self::Square(other)) => one.to_bits() == other.to_bits(),
+            (Self::Mesh(one), Self::Mesh(other)) => Arc::ptr_eq(one, other),
+            _ => false,
+        }
+    }
 }
 
 /// What the numbers on the right are of.
@@ -78,6 +109,7 @@ impl Default for SceneScreen {
         Self {
             form,
             reading: BackgroundTask::default(),
+            mesh: None,
             computed: BackgroundTask::default(),
             opening: BackgroundTask::default(),
             is_shown: false,
@@ -87,8 +119,8 @@ impl Default for SceneScreen {
             tape: TapePanel::default(),
             planned: None,
             side: PictureSource::Computed,
-            view: SceneView::of([side; 2]),
-            viewed_mm: side,
+            view: SceneView::of(ToolTarget::above([side; 2])),
+            viewed: ViewedTissue::Square(side),
         }
     }
 }
@@ -135,18 +167,24 @@ impl SceneScreen {
         }
         let named = self.form.file.trim().to_owned();
         self.reading.start("scene-read", ctx, move |_| {
-            read_scene((!named.is_empty()).then_some(Path::new(&named)))
+            let (file, notes) = read_scene((!named.is_empty()).then_some(Path::new(&named)))?;
+            let mesh = MeshTissue::of(&file)?;
+            Ok(ReadScene { file, notes, mesh })
         });
     }
 
     /// Computes the scene of the form along its path.
     fn compute(&mut self, ctx: &Context) {
-        let Ok(settings) = self.form.settings() else { return };
-        let path = self.form.path();
+        let Ok(file) = self.form.scene_file() else { return };
+        let (path, mesh) = (self.form.path(), self.mesh.clone());
+        if let Err(reason) = self.look_at(&file) {
+            self.refusal = Some(reason);
+            return;
+        }
         self.side = PictureSource::Computed;
-        self.look_at(&settings);
         self.computed.start("scene-path", ctx, move |progress| {
-            compute_path(settings, path, &mut |share| progress.share(share, "the path"))
+            let scene = TissueScene::of(&file, mesh.as_deref())?;
+            compute_path(scene, path, &mut |share| progress.share(share, "the path"))
         });
     }
 
@@ -159,10 +197,12 @@ impl SceneScreen {
             HandChoice::Path(path) => self.begin(ctx, SceneLead::Path(path)),
             HandChoice::Pointer => self.begin(ctx, SceneLead::Pointer),
             HandChoice::Device => {
-                let wanted = (self.form.device(), self.form.settings());
-                let (Ok(choice), Ok(settings)) = wanted else { return };
+                let wanted = (self.form.device(), self.form.scene_file());
+                let (Ok(choice), Ok(file)) = wanted else { return };
                 self.refusal = None;
-                self.opening.start("scene-device", ctx, move |_| open_device(&choice, &settings));
+                self.opening.start("scene-device", ctx, move |_| {
+                    open_device(&choice, &check_scene(&file)?)
+                });
             }
         }
     }
@@ -177,12 +217,12 @@ impl SceneScreen {
                     SENSED_COLUMNS
                 }
             };
-            let settings = file.settings(file.nodes.unwrap_or_default())?;
-            self.look_at(&settings);
+            self.look_at(&file)?;
+            let scene = TissueScene::of(&file, self.mesh.as_deref())?;
             let text = file.text();
             let begin = |folder: &Path| SceneRecorder::start(folder, &text, columns);
             let recorder = self.tape.begin(ctx, begin)?;
-            let live = LiveScene::start(settings, lead, recorder)?;
+            let live = LiveScene::start(scene, lead, recorder)?;
             Ok((live, file))
         });
         match started {
@@ -199,12 +239,21 @@ impl SceneScreen {
         }
     }
 
-    /// Resets the camera where the size of the tissue has changed.
-    fn look_at(&mut self, settings: &SceneSettings) {
-        if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
-            self.viewed_mm = settings.side_mm;
-            self.view.resize([settings.side_mm; 2]);
+    /// Looks at the tissue of a scene from the start, where it is not the one in the picture.
+    fn look_at(&mut self, file: &SceneFile) -> Result<(), String> {
+        let settings = file.settings(file.nodes.unwrap_or(SceneSettings::default().nodes))?;
+        let tissue = ViewedTissue::of(&settings, self.mesh.as_ref());
+        if !tissue.is(&self.viewed) {
+            self.view.take_tissue(match &self.mesh {
+                None => ToolTarget::above([settings.side_mm; 2]),
+                Some(mesh) => {
+                    let scene = mesh.read.scene(file)?;
+                    ToolTarget::over(Arc::clone(&mesh.read.mesh), scene.start())
+                }
+            });
+            self.viewed = tissue;
         }
+        Ok(())
     }
 
     /// What is on the screen: the scene that runs or ran, or the computed path.
@@ -282,12 +331,14 @@ impl Screen for SceneScreen {
         self.tape.poll();
         self.computed.poll();
         if self.reading.poll() {
-            match self.reading.answer() {
-                Some(Ok((file, notes))) => {
+            match self.reading.take_answer() {
+                Some(Ok(ReadScene { file, notes, mesh })) => {
                     self.refusal = None;
-                    self.form.fill(file.clone(), notes.clone());
+                    self.mesh = mesh.map(Arc::new);
+                    self.form.fill(file, notes);
+                    self.compute(ctx);
                 }
-                Some(Err(reason)) => self.refusal = Some(reason.clone()),
+                Some(Err(reason)) => self.refusal = Some(reason),
                 None => {}
             }
         }
@@ -298,7 +349,7 @@ impl Screen for SceneScreen {
                 None => {}
             }
         }
-        let hand = HandPose { at: self.view.hand().at(), turn: TURN };
+        let hand = HandPose { at: self.view.hand().at(), turn: self.view.hand().turn() };
         if let Some(Err(reason)) = self.live.as_mut().map(|live| live.poll(hand)) {
             self.refusal = Some(reason);
             self.tape.cut_off();
@@ -361,7 +412,7 @@ impl Screen for SceneScreen {
         // A device that is still being opened is closed as soon as it is open.
         self.opening = BackgroundTask::default();
         if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
-            self.tape.end(move || live.stop().and_then(finish_scene_recording));
+            self.tape.end(move || live.finish());
         }
     }
 
