@@ -129,14 +129,21 @@ impl SceneForm {
     /// What the scene is made of, or the first thing that is wrong.
     pub fn settings(&self) -> Result<SceneSettings, String> {
         let file = self.scene_file()?;
-        file.settings(file.nodes.unwrap_or_default())
+        file.settings(SceneSettings::default().nodes)
     }
 
     /// The same as a scene file.
     pub fn scene_file(&self) -> Result<SceneFile, String> {
+        // A mesh has no side and no nodes along it.
+        let (nodes, side_mm) = match self.read.mesh {
+            None => {
+                (Some(self.nodes.named_value("nodes")? as usize), self.side.named_value("side")?)
+            }
+            Some(_) => (None, self.read.side_mm),
+        };
         Ok(SceneFile {
-            nodes: Some(self.nodes.named_value("nodes")? as usize),
-            side_mm: self.side.named_value("side")?,
+            nodes,
+            side_mm,
             slope: self.slope.named_value("slope")?,
             friction: self.friction.named_value("friction")?,
             rate_hz: self.rate.named_value("rate")?,

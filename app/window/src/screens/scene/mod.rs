@@ -241,7 +241,7 @@ impl SceneScreen {
 
     /// Looks at the tissue of a scene from the start, where it is not the one in the picture.
     fn look_at(&mut self, file: &SceneFile) -> Result<(), String> {
-        let settings = file.settings(file.nodes.unwrap_or(SceneSettings::default().nodes))?;
+        let settings = file.settings(SceneSettings::default().nodes)?;
         let tissue = ViewedTissue::of(&settings, self.mesh.as_ref());
         if !tissue.is(&self.viewed) {
             self.view.take_tissue(match &self.mesh {

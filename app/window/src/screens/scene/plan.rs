@@ -30,7 +30,8 @@ impl PlannedScene {
 impl SceneScreen {
     /// Plans what stands in the form, once there are curves of this computer.
     pub(super) fn plan(&mut self, curves: Option<&SceneCurves>) {
-        let (Some(curves), Ok(file)) = (curves, self.form.scene_file()) else {
+        let file = self.form.scene_file().ok().filter(|file| file.mesh.is_none());
+        let (Some(curves), Some(file)) = (curves, file) else {
             self.planned = None;
             return;
         };
@@ -49,6 +50,9 @@ impl SceneScreen {
             fact_ui(ui, "force", force);
             fact_ui(ui, "shape", format!("{} mm", one.shape_mm));
             fact_ui(ui, "tick", format!("{} µs", one.tick_us));
+        }
+        if self.mesh.is_some() {
+            return quiet_ui(ui, "The triangles of a mesh from a file are not planned.");
         }
         let verdict = match &self.planned {
             None => Err("measure the cost of a scene on the Trade screen first".to_owned()),
