@@ -76,6 +76,7 @@ pub struct HapiBoard {
     fault: Option<HapiFault>,
     fault_at: Option<Nanos>,
     zero_since: Option<Nanos>,
+    /// Packets with torques received.
     packets: u64,
 }
 
@@ -102,10 +103,6 @@ impl HapiBoard {
             zero_since: Some(Nanos::ZERO),
             packets: 0,
         })
-    }
-
-    pub fn arm(&self) -> &HapiArm {
-        &self.arm
     }
 
     /// Begins a fault, or ends it.
@@ -161,12 +158,6 @@ impl HapiBoard {
     #[must_use]
     pub fn is_set_up(&self) -> bool {
         self.ports.iter().all(|port| port.motor.is_some() && port.encoder.is_some())
-    }
-
-    /// Packets with torques received.
-    #[must_use]
-    pub fn packets(&self) -> u64 {
-        self.packets
     }
 
     /// Bytes of the computer.

@@ -11,7 +11,6 @@ struct PanelState {
     force: [f64; 2],
     torques: [f64; 2],
     is_set_up: bool,
-    packets: u64,
 }
 
 /// A handle to an emulated board in use; clones operate the same one.
@@ -56,18 +55,11 @@ impl HapiPanel {
         self.state().is_set_up
     }
 
-    /// Packets with torques received.
-    #[must_use]
-    pub fn packets(&self) -> u64 {
-        self.state().packets
-    }
-
     pub(super) fn show(&self, board: &HapiBoard) {
         let mut state = self.state();
         state.fault_at = board.fault_at();
         state.force = board.force();
         state.torques = board.torques();
         state.is_set_up = board.is_set_up();
-        state.packets = board.packets();
     }
 }

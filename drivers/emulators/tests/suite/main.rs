@@ -5,6 +5,7 @@ mod cells;
 mod galil;
 mod galil_driver;
 mod grbl;
+mod hapi;
 mod inverse;
 mod sidecar;
 mod stand;

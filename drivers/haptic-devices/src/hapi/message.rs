@@ -8,9 +8,8 @@ pub const DEVICE: u8 = 5;
 const SETUP: u8 = 1;
 const TORQUES: u8 = 2;
 /// A command that no firmware knows and every one passes over. As the upper bytes of a number it is less than 1e-36.
-pub const PADDING: u8 = 3;
-/// Bytes of a packet with torques, and of its answer.
-pub const EXCHANGE: usize = 10;
+const PADDING: u8 = 3;
+/// Bytes of an answer.
 pub const ANSWER: usize = 9;
 /// Values of a packet with torques: as many bytes can be missing of one that was cut.
 const VALUES: usize = 8;
@@ -20,7 +19,7 @@ const SETUP_VALUES: usize = 16;
 /// direction.
 pub const TORQUE_MAX_N_M: f64 = 0.123;
 /// Angles of motors 1 and 2 in the home position, in degrees.
-pub const HOME_DEGREES: [f64; 2] = [168.0, 12.0];
+const HOME_DEGREES: [f64; 2] = [168.0, 12.0];
 
 /// How two motors and their encoders are connected: motor 1 to port 2 and motor 2 to port 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +92,9 @@ pub fn parse_angles(answer: &[u8; ANSWER]) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Bytes of a packet with torques.
+    const EXCHANGE: usize = 10;
 
     fn hex(bytes: &[u8]) -> String {
         bytes.iter().map(|byte| format!("{byte:02x}")).collect()

@@ -17,8 +17,5 @@ mod exchange;
 mod message;
 
 pub use device::{HapiDevice, HapiError, HapiOptions};
-pub use exchange::{BEAT, Exchange, HapiFault, LineState};
-pub use message::{
-    ANSWER, BoardSetup, EXCHANGE, HOME_DEGREES, PADDING, TORQUE_MAX_N_M, parse_angles, write_setup,
-    write_torques, write_zero,
-};
+pub use exchange::{Exchange, HapiFault, LineState};
+pub use message::{BoardSetup, TORQUE_MAX_N_M, write_setup, write_zero};

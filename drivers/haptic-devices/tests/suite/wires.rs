@@ -177,6 +177,9 @@ fn pose_of_a_thread_that_does_not_run_is_not_taken() {
     let monitor = device.monitor();
     tick_until(&mut device, &monitor, |report| report.stop == ForceStop::None);
     // Nothing between the calls: the scene's ticks passed, and no report came. A report may come between two of them.
-    let is_gone = |device: &mut InverseDevice| device.sense(1000).at[0].is_nan();
+    let is_gone = |device: &mut InverseDevice| {
+        device.sense(1);
+        device.sense(1000).at[0].is_nan()
+    };
     until(|| is_gone(&mut device).then_some(()), || "an old pose is taken".into());
 }
