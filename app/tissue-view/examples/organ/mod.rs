@@ -24,25 +24,31 @@ pub struct Organ {
     /// The model of each vertex.
     pub models: Vec<ElasticModel>,
     pub probe: Option<Probe>,
+    /// How far the camera goes around from where it begins, in rad.
+    turn: f64,
+    /// How far the shaft leans along x, as a share of its direction along the normal.
+    tilt: f64,
 }
 
 impl Organ {
     pub fn stomach() -> Result<Self, Box<dyn Error>> {
         let mut organ = Self::at_rest(stomach())?;
         // On the front of the body.
-        organ.press([28.0, -80.0, -5.0], 7.0)?;
+        organ.tilt = -0.9;
+        organ.press([24.0, -80.0, 20.0], 7.0)?;
         Ok(organ)
     }
 
     /// The phantom with a stiffer nodule, nothing on it.
     pub fn phantom() -> Result<Self, Box<dyn Error>> {
-        Self::at_rest(phantom())
+        // The nodule is in front.
+        Ok(Self { turn: 0.9, ..Self::at_rest(phantom())? })
     }
 
     /// The same with the ball beside the nodule.
     pub fn pressed_phantom() -> Result<Self, Box<dyn Error>> {
         let mut organ = Self::phantom()?;
-        organ.press([NODULE_MM[0] - 12.0, NODULE_MM[1] - 8.0, 60.0], 6.0)?;
+        organ.press([NODULE_MM[0] - 26.0, NODULE_MM[1] - 16.0, 60.0], 5.0)?;
         Ok(organ)
     }
 
@@ -63,6 +69,8 @@ impl Organ {
             dent: Dent::new(&mesh, settings)?,
             mesh,
             probe: None,
+            turn: 0.0,
+            tilt: 0.0,
         })
     }
 
@@ -84,7 +92,7 @@ impl Organ {
                 self.dent.tick(&self.mesh, Some((&near, x.hypot(y).hypot(z))));
             }
         }
-        let tilted = along(along(normal, [0.0, 0.0, 1.0], 0.55), [1.0, 0.0, 0.0], 0.25);
+        let tilted = along(along(normal, [0.0, 0.0, 1.0], 0.6), [1.0, 0.0, 0.0], self.tilt);
         let probe = Probe::new(centre, RADIUS_MM)?.with_axis(tilted)?;
         self.probe = Some(probe.above(along(on.point, normal, -0.5 * depth_mm), normal)?);
         Ok(())
@@ -108,7 +116,9 @@ impl Organ {
     }
 
     pub fn camera(&self, shape: PictureShape) -> Camera {
-        Camera::around(self.mesh.bounds()).fitted(self.mesh.bounds(), shape)
+        let mut camera = Camera::around(self.mesh.bounds());
+        camera.orbit(self.turn, 0.0);
+        camera.fitted_to(self.mesh.points(), shape)
     }
 }
 

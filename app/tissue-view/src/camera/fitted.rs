@@ -43,38 +43,27 @@ impl Camera {
     }
 
     /// The same direction of view, from as near as all of a box is in the picture for each eye, and in its middle.
-    ///
-    /// A corner at `r` to the right of the eye and `a` ahead is in the picture if `|r| <= a t`, where `t` is the tangent of
-    /// half the angle from edge to edge. That bounds the eye's place by a straight line for each corner and edge: what is
-    /// left is a triangle in each direction, and the nearest place is the tip of the smaller one.
     #[must_use]
     pub fn fitted(self, bounds: [Vec3; 2], shape: PictureShape) -> Self {
+        self.fitted_to(&corners(bounds), shape)
+    }
+
+    /// The same for points in mm, as those of a mesh, which leave the corners of their box free.
+    #[must_use]
+    pub fn fitted_to(self, points: &[Vec3], shape: PictureShape) -> Self {
         let axes = self.axes();
-        let [right, up, away] = axes;
-        let tangent = (FIELD_OF_VIEW / 2.0).tan() * (1.0 - ROOM);
-        let middle_ahead =
-            dot([0, 1, 2].map(|axis| (bounds[0][axis] + bounds[1][axis]) / 2.0), away);
-        let corners = (0..8).map(|corner: usize| {
-            let place = [0, 1, 2].map(|axis| bounds[corner >> axis & 1][axis]);
-            axes.map(|axis| dot(place, axis))
+        let seen = points.iter().map(|point| axes.map(|axis| dot(*point, axis)));
+        let seen = FramedPoints::new(seen.collect());
+        let high = (FIELD_OF_VIEW / 2.0).tan() * (1.0 - ROOM);
+        let tangents = [high * shape.aspect_of_eye(), high];
+        let ahead = [0, 1].map(|across| seen.reach(across, tangents[across], shape.eyes)[0]);
+        let ahead = ahead[0].min(ahead[1]);
+        let place = [0, 1].map(|across| seen.middle(across, tangents[across], (ahead, shape.eyes)));
+        let place = [place[0], place[1], seen.middle_ahead];
+        let target = [0, 1, 2].map(|axis| {
+            place[0] * axes[0][axis] + place[1] * axes[1][axis] + place[2] * axes[2][axis]
         });
-        // How far ahead the eye may be, and where across, for a tangent and shifts of the eyes.
-        let reach = |across: usize, tangent: f64, eyes: &[Eye]| {
-            let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
-            for corner in corners.clone() {
-                for eye in eyes {
-                    let shift = eye.side() * EYES_APART * (corner[2] - middle_ahead);
-                    low = low.max(corner[across] + shift - tangent * corner[2]);
-                    high = high.min(corner[across] + shift + tangent * corner[2]);
-                }
-            }
-            [(high - low) / (2.0 * tangent), (high + low) / 2.0]
-        };
-        let [ahead_x, to_right] = reach(0, tangent * shape.aspect_of_eye(), shape.eyes.eyes());
-        let [ahead_y, to_top] = reach(1, tangent, &[Eye::Single]);
-        let target = [0, 1, 2]
-            .map(|axis| to_right * right[axis] + to_top * up[axis] + middle_ahead * away[axis]);
-        let distance = (middle_ahead - ahead_x.min(ahead_y)) / self.size;
+        let distance = (seen.middle_ahead - ahead) / self.size;
         if !(distance.is_finite() && distance > 0.0 && target.iter().all(|part| part.is_finite())) {
             return self;
         }
@@ -91,6 +80,61 @@ impl Camera {
     }
 }
 
+/// The eight corners of a box.
+fn corners([low, high]: [Vec3; 2]) -> [Vec3; 8] {
+    std::array::from_fn(|corner| {
+        [0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] })
+    })
+}
+
+/// Points to the right, up and ahead, in mm.
+struct FramedPoints {
+    points: Vec<Vec3>,
+    /// Where the target is.
+    middle_ahead: f64,
+}
+
+/// Halvings of the angle to the outermost point: to 2e-10 of it.
+const HALVINGS: u32 = 32;
+
+impl FramedPoints {
+    fn new(points: Vec<Vec3>) -> Self {
+        let [near, far] = [f64::min, f64::max].map(|pick: fn(f64, f64) -> f64| {
+            points.iter().map(|point| point[2]).reduce(pick).unwrap_or(f64::NAN)
+        });
+        Self { points, middle_ahead: (near + far) / 2.0 }
+    }
+
+    /// How far ahead the eye may be, and how far across it is then, for a tangent of half the angle from edge to edge.
+    ///
+    /// A point at `r` to the right of the eye and `a` ahead is in the picture if `|r| <= a t`. That bounds the eye's place by a
+    /// straight line for each point and edge. What is left is a triangle, and its tip is the furthest place ahead.
+    fn reach(&self, across: usize, tangent: f64, eyes: EyeLayout) -> [f64; 2] {
+        // Eyes are beside each other, not above.
+        let eyes = if across == 0 { eyes.eyes() } else { &[Eye::Single] };
+        let [mut low, mut high] = [f64::NEG_INFINITY, f64::INFINITY];
+        for point in &self.points {
+            for eye in eyes {
+                let shift = eye.side() * EYES_APART * (point[2] - self.middle_ahead);
+                low = low.max(point[across] + shift - tangent * point[2]);
+                high = high.min(point[across] + shift + tangent * point[2]);
+            }
+        }
+        [(high - low) / (2.0 * tangent), (high + low) / 2.0]
+    }
+
+    /// How far across the eye is if points are to be as far from both edges, from a place this far ahead: the tip of the
+    /// triangle whose tangent has it there.
+    fn middle(&self, across: usize, tangent: f64, (ahead, eyes): (f64, EyeLayout)) -> f64 {
+        let [mut narrow, mut wide] = [0.0, tangent];
+        for _ in 0..HALVINGS {
+            let half = (narrow + wide) / 2.0;
+            if self.reach(across, half, eyes)[0] < ahead { narrow = half } else { wide = half }
+        }
+        self.reach(across, wide, eyes)[1]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,23 +142,19 @@ mod tests {
     const BLOCK: [Vec3; 2] = [[0.0, 0.0, -7.2], [60.0, 60.0, 0.0]];
     const ORGAN: [Vec3; 2] = [[-40.0, -45.0, -95.0], [180.0, 50.0, 110.0]];
 
-    fn corners([low, high]: [Vec3; 2]) -> impl Iterator<Item = Vec3> {
-        (0..8).map(move |corner: usize| {
-            [0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] })
-        })
-    }
-
-    /// Furthest corner from the middle of its eye's picture to the right and up, in halves of the picture.
-    fn furthest(camera: &Camera, bounds: [Vec3; 2], shape: PictureShape) -> [f64; 2] {
+    /// Left, right, lower and upper end of what the eyes see of points, in halves of the picture.
+    fn ends(camera: &Camera, points: &[Vec3], shape: PictureShape) -> [[f64; 2]; 2] {
         let aspect = shape.aspect / shape.eyes.eyes().len() as f64;
-        let mut furthest = [0.0_f64; 2];
+        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for &eye in shape.eyes.eyes() {
-            for corner in corners(bounds) {
-                let [x, y] = camera.see(corner, eye).unwrap().at;
-                furthest = [furthest[0].max(x.abs() / aspect), furthest[1].max(y.abs())];
+            for point in points {
+                let [x, y] = camera.see(*point, eye).unwrap().at;
+                for (end, at) in ends.iter_mut().zip([x / aspect, y]) {
+                    *end = [end[0].min(at), end[1].max(at)];
+                }
             }
         }
-        furthest
+        ends
     }
 
     #[test]
@@ -126,15 +166,33 @@ mod tests {
                 for step in 0..=27 {
                     for eyes in [EyeLayout::Single, EyeLayout::SideBySide] {
                         let shape = PictureShape { aspect: 0.3 + 0.1 * f64::from(step), eyes };
-                        let [x, y] = furthest(&camera.fitted(bounds, shape), bounds, shape);
-                        // The free room is exact; 1e-9 for rounding.
-                        let edge = 1.0 - ROOM + 1e-9;
-                        assert!(x <= edge && y <= edge, "{shape:?}: {x} {y}");
-                        assert!(x.max(y) > edge - 2e-9, "{shape:?}: {x} {y} could be nearer");
+                        let [x, y] = ends(&camera.fitted(bounds, shape), &corners(bounds), shape);
+                        // Halvings end at 2e-10 of an angle.
+                        let edge = 1.0 - ROOM + 1e-8;
+                        assert!(x[1] <= edge && y[1] <= edge, "{shape:?}: {x:?} {y:?}");
+                        assert!(x[1].max(y[1]) > edge - 2e-8, "{shape:?}: could be nearer");
+                        assert!((x[0] + x[1]).abs() < 1e-8 && (y[0] + y[1]).abs() < 1e-8);
                     }
                 }
             }
         }
+    }
+
+    #[test]
+    fn points_that_leave_the_corners_of_their_box_free_are_seen_from_nearer() {
+        let shape = PictureShape { aspect: 1.6, eyes: EyeLayout::SideBySide };
+        let middles: Vec<Vec3> = (0..6)
+            .map(|side: usize| {
+                let mut place = [0, 1, 2].map(|axis| (ORGAN[0][axis] + ORGAN[1][axis]) / 2.0);
+                place[side / 2] = ORGAN[side % 2][side / 2];
+                place
+            })
+            .collect();
+        let camera = Camera::around(ORGAN).fitted_to(&middles, shape);
+        assert!(camera.distance_mm() < 0.8 * camera.fitted(ORGAN, shape).distance_mm());
+        let [x, y] = ends(&camera, &middles, shape);
+        assert!(x[1].max(y[1]) < 1.0 && (x[0] + x[1]).abs() + (y[0] + y[1]).abs() < 1e-8);
+        assert_eq!(camera.fitted_to(&[], shape), camera);
     }
 
     #[test]
