@@ -8,8 +8,7 @@ use super::tick_replay::{
 };
 use palpate_haptic_devices::InverseDevice;
 use palpate_haptics::scene::{
-    MeshScene, NoForceReason, Pose, Scene, ScenePath, SceneStart, SceneTick,
-    SimulatedDevice,
+    MeshScene, NoForceReason, Pose, Scene, ScenePath, SceneStart, SceneTick, SimulatedDevice,
 };
 use palpate_runner::haptics::scene::{
     COLUMNS, Columns, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,

@@ -111,7 +111,8 @@ fn worst_margin(
             .assess_stroke(deepest, speed)
     };
     let ratio = |margin: &MarginReport| margin.ratio().unwrap_or(f64::INFINITY);
-    bodies.iter().map(|body| of(*body)).fold(of(scene.body), |worst, one| {
-        if ratio(&one) < ratio(&worst) { one } else { worst }
-    })
+    bodies
+        .iter()
+        .map(|body| of(*body))
+        .fold(of(scene.body), |worst, one| if ratio(&one) < ratio(&worst) { one } else { worst })
 }

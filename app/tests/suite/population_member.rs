@@ -100,7 +100,8 @@ fn materials_of_a_mesh_are_specimens_of_a_population() {
     std::fs::write(at.join("box.obj"), BOX).unwrap();
     std::fs::write(at.join("map.csv"), "vertex,material\n4,1\n5,1\n").unwrap();
     let bodies = ["population:pad#1", "population:pad#2"];
-    let mesh = format!("[mesh]\nfile = \"box.obj\"\nmaterials = \"map.csv\"\nbodies = {bodies:?}\n");
+    let mesh =
+        format!("[mesh]\nfile = \"box.obj\"\nmaterials = \"map.csv\"\nbodies = {bodies:?}\n");
     let shown = show("box.toml", &mesh);
     for name in bodies {
         // The same specimen as the tissue of a square.

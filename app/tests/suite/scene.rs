@@ -112,7 +112,8 @@ fn a_mesh_is_touched_through_a_device_and_computed_again() {
     });
     let mut count = 0;
     for place in sensed {
-        let apart = [12.0, 30.0, 40.0].iter().zip(&place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let apart =
+            [12.0, 30.0, 40.0].iter().zip(&place).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         assert!(apart.sqrt() < 25.0, "{place:?}");
         count += 1;
     }

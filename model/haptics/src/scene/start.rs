@@ -72,11 +72,7 @@ impl SceneStart {
     }
 
     /// Before a place, if there is no other tissue.
-    fn along(
-        mesh: &TriangleMesh,
-        place: [f64; 3],
-        out: [f64; 3],
-    ) -> Result<Self, MeshSceneError> {
+    fn along(mesh: &TriangleMesh, place: [f64; 3], out: [f64; 3]) -> Result<Self, MeshSceneError> {
         let at = before(place, START_HEIGHT_MM, out);
         // Outwards: only on this way do closed parts show their outer side.
         if mesh.first_hit(before(place, BEFORE_MM, out), at).is_some() {
@@ -92,9 +88,8 @@ impl SceneStart {
         let way = [0, 1, 2].map(|axis| pose.at[axis] - usual[axis]);
         let turned = self.turned(way);
         // Where nothing is turned, a square's own path keeps its bits.
-        let at = [0, 1, 2].map(|axis| {
-            pose.at[axis] + (self.at[axis] - usual[axis]) + (turned[axis] - way[axis])
-        });
+        let at = [0, 1, 2]
+            .map(|axis| pose.at[axis] + (self.at[axis] - usual[axis]) + (turned[axis] - way[axis]));
         HandPose { at, ..pose }
     }
 

@@ -416,8 +416,14 @@ mod tests {
             ("[mesh]\nfile = \"a.stl\"\nsha256 = \"12\"", "line 3: mesh.sha256: "),
             ("[mesh]\nfile = \"a.stl\"\nunit = \"inch\"", "line 3: mesh.unit: give \"mm\""),
             ("[mesh]\nstart_vertex = 1", "line 2: mesh.start_vertex: "),
-            ("[mesh]\nfile = \"a.stl\"\nstart_mm = [1, 2]", "line 3: mesh.start_mm: give 3 numbers"),
-            ("[mesh]\nfile = \"a.stl\"\nstart_vertex = -1", "line 3: mesh.start_vertex: give a whole"),
+            (
+                "[mesh]\nfile = \"a.stl\"\nstart_mm = [1, 2]",
+                "line 3: mesh.start_mm: give 3 numbers",
+            ),
+            (
+                "[mesh]\nfile = \"a.stl\"\nstart_vertex = -1",
+                "line 3: mesh.start_vertex: give a whole",
+            ),
             (
                 "[mesh]\nfile = \"a.stl\"\nstart_mm = [1, 2, 3.5]\nstart_vertex = 4",
                 "line 4: mesh.start_vertex: give either",
