@@ -87,7 +87,7 @@ impl GeodesicDistance {
 
     /// Vertices of the last search and their distances in mm, in the order in which they were first reached.
     pub fn found(&self) -> impl Iterator<Item = (u32, f64)> {
-        let distance = |vertex: u32| self.vertices[vertex as usize].distance;
+        let distance = move |vertex: u32| self.vertices[vertex as usize].distance;
         let all = self.found.iter().map(move |&vertex| (vertex, distance(vertex)));
         all.filter(|(_, distance)| *distance <= self.reach)
     }
@@ -219,4 +219,34 @@ fn unfold(a: Vector, b: Vector, [to_a, to_b]: [f64; 2]) -> Option<f64> {
     }
     let wide = corner_x - x;
     Some(((wide * wide + high * high) * squared).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::random::SplitMix;
+
+    /// Triangles from equilateral to slivers of a millionth, sources near and far, and limits a rounding to a tenth beside the way itself.
+    #[test]
+    fn a_way_that_is_seen_to_be_too_long_is_too_long() {
+        let mut random = SplitMix::seeded(7);
+        let mut number = || random.below(2_000_001) as f64 / 1e6 - 1.0;
+        let (mut ways, mut seen) = (0, 0);
+        for round in 0..1_000_000 {
+            let [thin, far, near] =
+                [round % 7, round / 7 % 3, round / 21 % 16].map(|power| 10.0_f64.powi(power));
+            let a = [number(), number(), number()];
+            let b = a.map(|part| part + number() / thin);
+            let source = [far * number(), far * number(), far * number()];
+            let known = [length(minus(a, source)), length(minus(b, source))];
+            let Some(across) = unfold(a, b, known) else { continue };
+            let limit = across * (1.0 + number() / near);
+            let is_seen = is_too_long(a, b, known, limit);
+            assert!(!is_seen || across >= limit, "{a:?} {b:?} {known:?}: {across} {limit}");
+            ways += 1;
+            seen += usize::from(is_seen);
+        }
+        // Some are seen without a root.
+        assert!(ways > 30_000 && seen > ways / 100, "{seen} of {ways}");
+    }
 }
