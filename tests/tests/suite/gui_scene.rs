@@ -10,6 +10,7 @@ use palpate_tests::flow::{TestWindow, WindowFlow, screen_of};
 use palpate_window::screens::scene::SceneScreen;
 use palpate_window::screens::screen::Screen;
 use palpate_window::screens::trade::TradeScreen;
+use palpate_window::workers::scene_tissue::ShownTissue;
 use std::path::Path;
 
 fn open() -> WindowFlow {
@@ -160,6 +161,54 @@ fn a_real_device_is_opened_judged_with_its_delay_and_leads_the_stylus() {
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(2);
     assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
+    flow.wait_for_words("ticks recorded");
+    flow.click("Replay recording");
+    flow.wait("the replay", |window| replayed(window).is_some());
+    assert_eq!(replayed(&flow.window), Some(Ok(true)));
+}
+
+/// A square pad of 60 mm in steps of 4 mm, as Wavefront OBJ.
+fn pad_obj() -> String {
+    let mut text = String::new();
+    for node in 0..256 {
+        text += &format!("v {} {} 0\n", 4 * (node % 16), 4 * (node / 16));
+    }
+    for cell in 0..225 {
+        let here = 16 * (cell / 15) + cell % 15 + 1;
+        text += &format!("f {here} {} {} {}\n", here + 1, here + 17, here + 16);
+    }
+    text
+}
+
+#[test]
+fn a_mesh_is_computed_felt_recorded_and_replayed() {
+    let mut flow = open();
+    let folder = flow.folder.path().to_owned();
+    std::fs::write(folder.join("pad.obj"), pad_obj()).unwrap();
+    let text = "name = \"pad of triangles\"\n[mesh]\nfile = \"pad.obj\"\n";
+    read(&mut flow, &folder.join("pad.toml"), text, "pad of triangles");
+    flow.wait("the path", |window| {
+        let found = screen_of::<SceneScreen>(window).computed_path();
+        let found = found.and_then(|one| one.as_ref().ok());
+        found.is_some_and(|one| matches!(one.deepest.tissue, ShownTissue::Mesh(_)))
+    });
+    flow.window.run_steps(2);
+    assert!(flow.says("poke, computed: the deepest point"));
+    assert!(flow.says("The triangles of a mesh from a file are not planned"));
+    assert!(flow.window.query_by_label("nodes").is_none());
+    flow.window.check_accessibility();
+    let recording = folder.join("poke");
+    flow.type_into("record to", &recording.display().to_string());
+    flow.click("Start the scene");
+    flow.wait("a force", |window| {
+        felt(window).is_some_and(|(depth, force)| depth > 2.0 && force > 0.05)
+    });
+    flow.wait("the end of the path", |window| {
+        let touch = screen_of::<SceneScreen>(window).live_scene().unwrap();
+        touch.is_running() && !touch.is_led()
+    });
+    flow.window.key_press(Key::Escape);
+    flow.window.run_steps(2);
     flow.wait_for_words("ticks recorded");
     flow.click("Replay recording");
     flow.wait("the replay", |window| replayed(window).is_some());
