@@ -1,9 +1,5 @@
 //! Meshes of triangles: a ball against its closed form, an organ with a dent against rays, colours of a painted phantom.
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail and print as tests do"
-)]
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do")]
 
 use super::colours::linear;
 use super::off_screen;

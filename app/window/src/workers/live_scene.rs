@@ -74,14 +74,14 @@ pub enum SceneLead {
     /// The simulated hand, where it is pointed.
     Pointer,
     /// A person's hand on a device that was opened for the scene.
-    Device(OpenDevice, DeviceReport),
+    Device(OpenDevice, Box<DeviceReport>),
 }
 
 /// The device of a scene that runs or ran.
 #[derive(Debug)]
 pub struct PlayedDevice {
     /// What was known before the first touch.
-    pub report: DeviceReport,
+    pub report: Box<DeviceReport>,
     looped: LoopDevice,
     monitor: DeviceMonitor,
 }

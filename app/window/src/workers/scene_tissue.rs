@@ -50,7 +50,7 @@ impl MeshTissue {
 /// The relaxed force of a body.
 #[must_use]
 pub fn elastic_model(body: &ModifiedKelvin) -> ElasticModel {
-    ElasticModel { mu: [body.mu1, body.mu2, body.mu3] }
+    ElasticModel { mu: body.mu }
 }
 
 /// A scene to be computed or to run.

@@ -344,7 +344,9 @@ impl Screen for SceneScreen {
         }
         if self.opening.poll() {
             match self.opening.take_answer() {
-                Some(Ok((device, report))) => self.begin(ctx, SceneLead::Device(device, report)),
+                Some(Ok((device, report))) => {
+                    self.begin(ctx, SceneLead::Device(device, Box::new(report)))
+                }
                 Some(Err(reason)) => self.refusal = Some(reason),
                 None => {}
             }
