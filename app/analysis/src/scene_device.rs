@@ -33,6 +33,7 @@ pub enum DeviceChoice {
 }
 
 /// A device that a scene can use.
+#[derive(Debug)]
 pub struct OpenDevice {
     pub device: Box<dyn HapticDevice>,
     /// A look at it while the scene's loop has it.
