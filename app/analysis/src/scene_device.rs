@@ -78,6 +78,7 @@ impl DeviceName {
 }
 
 /// A device that a scene can use.
+#[derive(Debug)]
 pub struct OpenDevice {
     pub device: Box<dyn HapticDevice>,
     /// Damping, friction, steps and delay of the loop through it, as the margin needs them.
