@@ -18,6 +18,7 @@ mod picture;
 mod probe;
 mod quantity;
 mod surface;
+mod thinning;
 
 pub use callback::TissueCallback;
 pub use camera::{Camera, Eye, FIELD_OF_VIEW, PictureShape, ProjectedPoint, Vec3};

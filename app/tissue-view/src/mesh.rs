@@ -3,6 +3,8 @@
 use crate::camera::{Vec3, cross, dot, minus};
 use crate::quantity::{ElasticModel, ModelQuantity};
 use crate::surface::{SurfaceError, check_count, check_finite};
+use crate::thinning::{Thinning, is_closed};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Triangles with normals, made ready for the graphics processor.
@@ -12,6 +14,10 @@ pub struct MeshData {
     pub(crate) nodes: Vec<[f32; 8]>,
     /// One allocation for all pictures of a shape: that it is the same says that the triangles are.
     pub(crate) indices: Arc<[u32]>,
+    /// `None` where all nodes are drawn at every level of detail.
+    thinning: Option<Arc<Thinning>>,
+    /// Whether its inner side is never seen.
+    pub(crate) is_closed: bool,
     /// The longest side of the box at rest.
     pub(crate) size_mm: f64,
     /// Of the box at rest.
@@ -77,10 +83,31 @@ impl MeshData {
                 .map(|(place, normal)| node(*place, *normal, 0.0))
                 .collect(),
             indices: indices.into(),
+            thinning: None,
+            is_closed: false,
             // No division by the size of a point.
             size_mm: sides.into_iter().fold(1e-3, f64::max),
             bounds: [low, high],
         })
+    }
+
+    /// Whether levels of detail leave nodes out.
+    pub(crate) fn is_thinned(&self) -> bool {
+        self.thinning.is_some()
+    }
+
+    /// The triangles where one of so many nodes along each direction is drawn. Nodes that are not at rest all are, and so
+    /// are those that one of them would stand for.
+    pub(crate) fn drawn(&self, every: u32) -> Cow<'_, [u32]> {
+        let standing = self.thinning.as_ref().and_then(|thinning| thinning.standing(every));
+        let Some(standing) = standing else { return Cow::Borrowed(&self.indices) };
+        let is_at_rest = |node: u32| self.nodes[node as usize][7] == 0.0;
+        let of = |node: u32| {
+            let other = standing[node as usize];
+            if is_at_rest(node) && is_at_rest(other) { other } else { node }
+        };
+        let faces = self.indices.chunks_exact(3).map(|face| [0, 1, 2].map(|at| of(face[at])));
+        faces.filter(|[a, b, c]| a != b && b != c && c != a).flatten().collect()
     }
 
     /// With a number for each node that colours stand for.
@@ -150,8 +177,12 @@ impl MeshShape {
             *at += 1;
         }
         let mut shape = Self { rest, places: places.to_vec(), around_first, around };
-        for (index, place) in places.iter().enumerate() {
-            let normal = shape.normal(places, index);
+        let normals: Vec<Vec3> =
+            (0..places.len()).map(|node| shape.normal(node, |index| places[index])).collect();
+        let indices = &shape.rest.indices;
+        shape.rest.thinning = Some(Arc::new(Thinning::new(places, &normals, indices)));
+        shape.rest.is_closed = is_closed(places, indices);
+        for (index, (place, normal)) in places.iter().zip(normals).enumerate() {
             shape.rest.nodes[index] = node(*place, normal, 0.0);
         }
         Ok(shape)
@@ -169,28 +200,36 @@ impl MeshShape {
         moved: impl IntoIterator<Item = MovedNode>,
     ) -> Result<MeshData, SurfaceError> {
         let mut data = self.rest.clone();
-        let mut places = self.places.clone();
-        let mut touched = vec![false; places.len()];
-        let nodes = places.len();
+        let nodes = self.places.len();
+        // Which of the moved a node is, counted from 1; and whether its normal is another.
+        let (mut which, mut is_touched) = (vec![0_u32; nodes], vec![false; nodes]);
+        let (mut places, mut touched) = (Vec::new(), Vec::new());
         for MovedNode { node, place, depth_mm } in moved {
             let index = node as usize;
-            let Some(there) = places.get_mut(index) else {
+            let Some(which) = which.get_mut(index) else {
                 return Err(SurfaceError::MovedNode { node, nodes });
             };
             if !(place.iter().sum::<f64>() + depth_mm).is_finite() {
                 return Err(SurfaceError::NotFinite { what: "place or depth", node: index });
             }
-            *there = place;
+            places.push(place);
+            *which = places.len() as u32;
             data.nodes[index] = self::node(place, [0.0; 3], depth_mm);
             for &corner in self.corners_around(index) {
                 let first = corner as usize / 3 * 3;
-                for &near in &data.indices[first..first + 3] {
-                    touched[near as usize] = true;
+                for &near in &self.rest.indices[first..first + 3] {
+                    if !std::mem::replace(&mut is_touched[near as usize], true) {
+                        touched.push(near as usize);
+                    }
                 }
             }
         }
-        for (index, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
-            let normal = self.normal(&places, index).map(|part| part as f32);
+        let place = |index: usize| match which[index] {
+            0 => self.places[index],
+            one => places[one as usize - 1],
+        };
+        for index in touched {
+            let normal = self.normal(index, place).map(|part| part as f32);
             data.nodes[index][3..6].copy_from_slice(&normal);
         }
         Ok(data)
@@ -203,11 +242,11 @@ impl MeshShape {
 
     /// Unit normal of a node: that of each triangle around, weighted so that it is exact for corners on a sphere (Max,
     /// "Weights for computing vertex normals from facet normals", J. Graph. Tools 4(2) (1999) 1-6). Up where there is none.
-    fn normal(&self, places: &[Vec3], node: usize) -> Vec3 {
+    fn normal(&self, node: usize, place: impl Fn(usize) -> Vec3) -> Vec3 {
         let mut sum = [0.0; 3];
         for &corner in self.corners_around(node) {
             let (first, step) = (corner as usize / 3 * 3, corner as usize % 3);
-            let at = |turn: usize| places[self.rest.indices[first + (step + turn) % 3] as usize];
+            let at = |turn: usize| place(self.rest.indices[first + (step + turn) % 3] as usize);
             let (one, other) = (minus(at(1), at(0)), minus(at(2), at(0)));
             let squares = dot(one, one) * dot(other, other);
             if squares > 0.0 {
@@ -287,6 +326,42 @@ mod tests {
         let refused = shape.displaced([MovedNode { node: 6, ..moved }]).unwrap_err();
         assert_eq!(refused, SurfaceError::MovedNode { node: 6, nodes: 6 });
         assert!(shape.displaced([MovedNode { depth_mm: f64::NAN, ..moved }]).is_err());
+    }
+
+    #[test]
+    fn a_thinned_mesh_has_fewer_triangles_and_all_of_a_dent() {
+        const SIDE: u32 = 21;
+        let places: Vec<Vec3> = (0..SIDE * SIDE)
+            .map(|node| [f64::from(node % SIDE), f64::from(node / SIDE), 0.0])
+            .collect();
+        let cells = (0..SIDE - 1).flat_map(|row| (0..SIDE - 1).map(move |x| row * SIDE + x));
+        let faces: Vec<[u32; 3]> =
+            cells.flat_map(|a| [[a, a + 1, a + SIDE + 1], [a, a + SIDE + 1, a + SIDE]]).collect();
+        let shape = MeshShape::new(&places, &faces).unwrap();
+        assert!(!shape.rest.is_closed);
+        let middle = SIDE * SIDE / 2;
+        let moved = MovedNode { node: middle, place: [10.0, 10.0, -1.0], depth_mm: 1.0 };
+        for data in [shape.at_rest(), shape.displaced([moved]).unwrap()] {
+            assert!(
+                matches!(data.drawn(1), Cow::Borrowed(indices) if indices.len() == 3 * faces.len())
+            );
+            let counts = [2, 3, 4].map(|every| data.drawn(every).len());
+            assert!(counts.iter().all(|count| count * 2 < 3 * faces.len()), "{counts:?}");
+            // Seen from above nothing is folded and nothing is missing but a rim of cells.
+            for every in [2, 3, 4] {
+                let area: f64 = data
+                    .drawn(every)
+                    .chunks_exact(3)
+                    .map(|face| {
+                        let [a, b, c] = [0, 1, 2].map(|at| places[face[at] as usize]);
+                        cross(minus(b, a), minus(c, a))[2] / 2.0
+                    })
+                    .sum();
+                let rim = 20.0 - f64::from(every) * 1.5;
+                assert!((rim * rim..=400.0).contains(&area), "{every}: {area}");
+            }
+        }
+        assert!(shape.displaced([moved]).unwrap().drawn(4).contains(&middle));
     }
 
     #[test]

@@ -168,12 +168,12 @@ impl SurfaceData {
         (least <= greatest).then(|| [least, greatest].map(f64::from))
     }
 
-    /// A level as it is for this surface: of a mesh all triangles are drawn at every level.
+    /// A level as it is for this surface: of [`MeshData::new`] all triangles are drawn at every level.
     #[must_use]
     pub fn level(&self, level: DetailLevel) -> DetailLevel {
         match self {
-            Self::Field(_) => level,
-            Self::Mesh(_) => DetailLevel { every: 1, ..level },
+            Self::Mesh(mesh) if !mesh.is_thinned() => DetailLevel { every: 1, ..level },
+            _ => level,
         }
     }
 

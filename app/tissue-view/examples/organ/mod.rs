@@ -48,7 +48,7 @@ impl Organ {
     /// The same with the ball beside the nodule.
     pub fn pressed_phantom() -> Result<Self, Box<dyn Error>> {
         let mut organ = Self::phantom()?;
-        organ.press([NODULE_MM[0] - 26.0, NODULE_MM[1] - 16.0, 60.0], 5.0)?;
+        organ.press([NODULE_MM[0] + 6.0, NODULE_MM[1] - 26.0, 60.0], 5.0)?;
         Ok(organ)
     }
 

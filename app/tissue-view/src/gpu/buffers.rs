@@ -51,6 +51,8 @@ pub(super) struct SceneBuffers {
     shown_ramp: Option<ColourRamp>,
     pub surface: Option<Triangles>,
     lines: Option<FieldLines>,
+    /// One of so many nodes of a mesh is drawn.
+    every: u32,
     pub probe: Option<Triangles>,
     probe_shape: Option<(f64, ProbeKind, f64)>,
 }
@@ -145,6 +147,7 @@ impl SceneBuffers {
             shown_ramp: None,
             surface: None,
             lines: None,
+            every: 1,
             probe: None,
             probe_shape: None,
         }
@@ -185,7 +188,10 @@ impl SceneBuffers {
                     SurfaceData::Mesh(mesh) => Some(mesh),
                     SurfaceData::Field(_) => None,
                 });
-                changes.any |= !is_same && self.update_mesh(device, queue, before, mesh);
+                let every = picture.level.every.max(1);
+                if !is_same || every != self.every {
+                    changes.any |= self.update_mesh(device, queue, before, (mesh, every));
+                }
                 changes
             }
         }
@@ -197,21 +203,39 @@ impl SceneBuffers {
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         before: Option<&MeshData>,
-        now: &MeshData,
+        (now, every): (&MeshData, u32),
     ) -> bool {
         self.lines = None;
         let before = before.filter(|one| Arc::ptr_eq(&one.indices, &now.indices));
-        if let (Some(before), Some(Triangles { nodes: Some(nodes), .. })) = (before, &self.surface)
-        {
-            let changed = changed_rows(&before.nodes, &now.nodes, 1);
-            if let Some([first, end]) = changed {
-                let bytes = bytemuck::cast_slice(now.nodes[first..end].as_flattened());
-                queue.write_buffer(nodes, (first * size_of::<[f32; 8]>()) as u64, bytes);
-            }
-            return changed.is_some();
+        let there = self.surface.as_ref().filter(|there| there.nodes.is_some());
+        let (Some(before), Some(there)) = (before, there) else {
+            self.surface = triangles(device, &now.nodes, &now.indices);
+            self.every = 1;
+            self.update_mesh_triangles(queue, now, every);
+            return true;
+        };
+        let changed = changed_rows(&before.nodes, &now.nodes, 1);
+        if let (Some([first, end]), Some(nodes)) = (changed, &there.nodes) {
+            let bytes = bytemuck::cast_slice(now.nodes[first..end].as_flattened());
+            queue.write_buffer(nodes, (first * size_of::<[f32; 8]>()) as u64, bytes);
         }
-        self.surface = triangles(device, &now.nodes, &now.indices);
-        true
+        // Which nodes are left out depends on which have moved.
+        let is_other = every != self.every || (every > 1 && changed.is_some());
+        if is_other {
+            self.update_mesh_triangles(queue, now, every);
+        }
+        is_other || changed.is_some()
+    }
+
+    /// The triangles of a level of detail, in the buffer that has room for all.
+    fn update_mesh_triangles(&mut self, queue: &wgpu::Queue, now: &MeshData, every: u32) {
+        let Some(there) = &mut self.surface else { return };
+        if (self.every, every) != (1, 1) {
+            let indices = now.drawn(every);
+            queue.write_buffer(&there.indices, 0, bytemuck::cast_slice(&indices));
+            there.count = indices.len() as u32;
+        }
+        self.every = every;
     }
 
     fn update_field(
@@ -377,7 +401,10 @@ fn triangles<const N: usize>(
             bytemuck::cast_slice(nodes),
             wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
         )),
-        indices: buffer(bytemuck::cast_slice(indices), wgpu::BufferUsages::INDEX),
+        indices: buffer(
+            bytemuck::cast_slice(indices),
+            wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+        ),
         count: indices.len() as u32,
     })
 }

@@ -222,7 +222,9 @@ impl TissueRenderer {
                 pass.draw(0..side_vertices(field, picture.level.every.max(1)), 0..1);
             }
             (Part::Probe, _) => draw_triangles(pass, self.buffers.probe.as_ref()),
-            (Part::Field | Part::Mesh, _) => draw_triangles(pass, self.buffers.surface.as_ref()),
+            (Part::Field | Part::Mesh | Part::OpenMesh, _) => {
+                draw_triangles(pass, self.buffers.surface.as_ref())
+            }
             (Part::Sides, SurfaceData::Mesh(_)) => {}
         }
     }
@@ -274,7 +276,8 @@ fn parts_of(picture: &Picture) -> Vec<Part> {
             parts.extend([Part::Field, Part::Sides]);
         }
         SurfaceData::Field(_) => parts.push(Part::Field),
-        SurfaceData::Mesh(_) => parts.push(Part::Mesh),
+        SurfaceData::Mesh(mesh) if mesh.is_closed => parts.push(Part::Mesh),
+        SurfaceData::Mesh(_) => parts.push(Part::OpenMesh),
     }
     parts
 }

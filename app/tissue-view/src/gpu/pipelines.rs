@@ -13,7 +13,9 @@ pub(super) const OPENNESS: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Part {
     Field,
+    /// A mesh without an inner side that can be seen.
     Mesh,
+    OpenMesh,
     Sides,
     Probe,
 }
@@ -89,6 +91,8 @@ pub(super) struct PipelineParts<'a> {
     pub format: wgpu::TextureFormat,
     pub samples: u32,
     pub has_depth: bool,
+    /// Whether triangles are drawn that face away.
+    pub has_back: bool,
 }
 
 pub(super) fn pipeline(device: &wgpu::Device, parts: &PipelineParts) -> wgpu::RenderPipeline {
@@ -117,7 +121,10 @@ pub(super) fn pipeline(device: &wgpu::Device, parts: &PipelineParts) -> wgpu::Re
             compilation_options: compilation_options.clone(),
             buffers: parts.buffers,
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState {
+            cull_mode: (!parts.has_back).then_some(wgpu::Face::Back),
+            ..wgpu::PrimitiveState::default()
+        },
         depth_stencil: parts.has_depth.then_some(depth),
         multisample: wgpu::MultisampleState {
             count: parts.samples,
@@ -192,6 +199,7 @@ impl Pipelines {
                 format: OPENNESS,
                 samples: 1,
                 has_depth: false,
+                has_back: true,
             };
             pipeline(device, &parts)
         })
@@ -216,12 +224,12 @@ fn scene_pipeline(
     let (mesh, probe) = (buffer(8, &mesh), buffer(6, &probe));
     let (vertex, buffers): (_, &[_]) = match key.part {
         Part::Field => ("field_vertex", &[]),
-        Part::Mesh => ("mesh_vertex", &mesh),
+        Part::Mesh | Part::OpenMesh => ("mesh_vertex", &mesh),
         Part::Sides => ("side_vertex", &[]),
         Part::Probe => ("probe_vertex", &probe),
     };
     let fragment = match (key.output, key.part) {
-        (Output::Colours, Part::Field | Part::Mesh) => "tissue_colour",
+        (Output::Colours, Part::Field | Part::Mesh | Part::OpenMesh) => "tissue_colour",
         (Output::Colours, Part::Sides) => "side_colour",
         (Output::Colours, Part::Probe) => "probe_colour",
         (Output::Normals, Part::Probe) => "probe_normal",
@@ -238,6 +246,7 @@ fn scene_pipeline(
         format: if key.output == Output::Colours { COLOUR } else { NORMAL },
         samples: key.samples,
         has_depth: true,
+        has_back: !matches!(key.part, Part::Mesh | Part::Probe),
     };
     pipeline(device, &parts)
 }

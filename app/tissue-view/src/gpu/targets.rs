@@ -125,6 +125,7 @@ impl CopyPipeline {
             format: window,
             samples: 1,
             has_depth: false,
+            has_back: true,
         };
         let pipeline = pipeline(device, &parts);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {

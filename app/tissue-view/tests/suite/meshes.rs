@@ -9,8 +9,9 @@ use palpate_haptics::surface::SurfaceRecovery;
 use palpate_haptics::triangles::shapes::{NODULE_MM, ball, phantom};
 use palpate_haptics::triangles::{Dent, DentSettings, MaterialMap, TriangleMesh};
 use palpate_tissue_view::{
-    Camera, ColourRamp, ElasticModel, Eye, EyeLayout, LEVELS, MeshData, MeshShape, ModelQuantity,
-    MovedNode, OffScreen, Picture, PictureShape, Probe, ProbeKind, SurfaceData, SurfaceStyle,
+    Camera, ColourRamp, DetailLevel, ElasticModel, Eye, EyeLayout, Image, LEVELS, MeshData,
+    MeshShape, ModelQuantity, MovedNode, OffScreen, Picture, PictureShape, Probe, ProbeKind,
+    SurfaceData, SurfaceStyle,
 };
 use std::sync::Arc;
 
@@ -138,6 +139,36 @@ fn only_what_moved_is_uploaded_and_the_picture_is_that_of_all() {
     // Another mesh of as many nodes.
     let turned = MeshShape::new(mesh.points(), &mesh.faces()[1..]).unwrap();
     assert_eq!(draw(&mut one, turned.at_rest()), draw(&mut other, turned.at_rest()));
+}
+
+#[test]
+fn a_thinned_organ_stays_where_it_is() {
+    let Some(mut off_screen) = off_screen() else { return };
+    let mesh = organ();
+    let data = shape(&mesh).displaced(dent(&mesh)).unwrap();
+    let camera = Camera::around(mesh.bounds()).fitted(mesh.bounds(), WIDE);
+    let mut picture = picture(data, camera);
+    let full = off_screen.normals(&picture, SIZE).unwrap();
+    let count =
+        |image: &Image<[f32; 4]>| image.pixels.iter().filter(|pixel| pixel[3] > 0.0).count();
+    // Back and forth: what was left out comes back.
+    for every in [2, 3, 4, 1] {
+        picture.level = DetailLevel { every, ..LEVELS[1] };
+        let image = off_screen.normals(&picture, SIZE).unwrap();
+        let pairs = image.pixels.iter().zip(&full.pixels);
+        let both = pairs.filter(|(one, other)| one[3] > 0.0 && other[3] > 0.0);
+        let mut off: Vec<f32> = both.map(|(one, other)| (one[3] - other[3]).abs()).collect();
+        off.sort_by(f32::total_cmp);
+        let median = off[off.len() / 2];
+        println!("every {every}: {} of {} pixels, {median:.3} mm off", count(&image), count(&full));
+        if every == 1 {
+            assert_eq!(image, full);
+        } else {
+            assert_ne!(image, full);
+        }
+        // Edges are 3.6 mm, so a cell is up to 14 mm wide: a chord of that is 1 mm inside where the radius is 25 mm.
+        assert!(median < 1.0 && count(&image) * 10 > count(&full) * 9);
+    }
 }
 
 #[test]
