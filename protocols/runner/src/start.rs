@@ -59,7 +59,7 @@ pub struct RunRequest {
     pub to_acknowledge: Vec<String>,
     pub after_stop: AfterStop,
     pub answers: PromptResponder,
-    /// Source of leads for a step that follows; without it such a step times out.
+    /// Source of leads for a step that follows; a plan with such a step is refused without it.
     pub leader: Option<SharedLeadSource>,
 }
 
@@ -88,6 +88,12 @@ pub(super) fn start(
     context: RigContext<'_>,
 ) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
+    if request.leader.is_none() && request.plan.needs_lead() {
+        return Err(refused(format!(
+            "the step 'follow' of {} needs a master, and this run has none; run the protocol with 'palpate haptics slave', which supplies the master",
+            request.plan.name
+        )));
+    }
     let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
     let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);
     preview.check_start(request.is_acknowledged).map_err(refused)?;

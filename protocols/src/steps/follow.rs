@@ -1,11 +1,13 @@
-//! A slave that goes where it is led, one move after another: a controller takes a new target only at rest, so the
-//! slave is behind its lead by about the duration of a move.
+//! A slave that goes where it is led. Where the controller takes a new target only at rest, the slave makes one move after
+//! another and is behind its lead by about the duration of a move. Where it takes targets on the way, the slave gets every
+//! one, and is behind by the time in which it brakes from its speed.
 //!
 //! In doubt it stops: a lead that stops coming leaves it where it is, and after a while the step ends.
 
 use super::prelude::*;
 use crate::preview::SETTLE_SECS;
 use palpate_model::Nanos;
+use palpate_model::rig::AxisStatus;
 use palpate_model::rig::command::pulses_from_position;
 
 /// Go where a lead from outside says, such as the master of a master-slave system, within bounds that no lead can
@@ -17,9 +19,25 @@ pub struct Follow {
     pub depth_max: Depth,
 }
 
-/// No protocol asks for it: what leads is a program.
 pub(super) const FACTS: StepFacts = StepFacts {
-    about: "Follow the positions that a master sends.",
+    about: "Follow the depths that a master sends. Only a run with a master has this step: `palpate haptics slave --protocol FILE`.",
+    keys: &[
+        Key::needed("for", QuantityKind::Time, "duration"),
+        Key::needed("speed", QuantityKind::Speed, "greatest speed of the slave"),
+        Key::needed(
+            "depth_max",
+            QuantityKind::Length,
+            "greatest depth; the slave goes no deeper, wherever the master is",
+        ),
+    ],
+    build: Some(|args| {
+        Ok(Follow {
+            duration: args.seconds("for")?,
+            speed: args.speed("speed")?,
+            depth_max: Depth(args.number("depth_max")?),
+        }
+        .into())
+    }),
     needs: FROM_SURFACE,
     gives: &[Need::Inside],
     is_measuring: true,
@@ -74,6 +92,8 @@ pub(crate) struct FollowRun {
     led_at: Nanos,
     is_lost: bool,
     is_stopping: bool,
+    /// The newest target of a rig that takes them on the way, since the last stop.
+    tracked: Option<i64>,
     is_refusal_reported: bool,
 }
 
@@ -94,14 +114,52 @@ impl Executable for Follow {
             led_at: cx.now,
             is_lost: false,
             is_stopping: false,
+            tracked: None,
             is_refusal_reported: false,
         })
     }
 }
 
+impl FollowRun {
+    /// The pulse to go to: where it is led, as far as the plan and the travel allow.
+    fn target(&self, cx: &Context<'_>) -> Option<i64> {
+        let wanted = self.wanted?.position_from(self.surface);
+        let wanted = pulses_from_position(wanted, cx.rig().mm_per_pulse);
+        // Home is the end of the way out.
+        Some(wanted.clamp(0, self.deepest_pulses.max(0)))
+    }
+
+    fn is_at_rest(&self, cx: &mut Context<'_>) -> Result<bool, String> {
+        // A controller may show motion for as long as it takes targets, so only a stop has a time limit there.
+        if self.tracked.is_some() && cx.status().has(AxisStatus::MOVING) {
+            return Ok(false);
+        }
+        cx.at_rest()
+    }
+
+    fn stop(&mut self, cx: &mut Context<'_>) {
+        self.is_stopping = true;
+        self.tracked = None;
+        cx.stop_move();
+    }
+
+    /// Sends the newest target, where the one before was accepted.
+    fn track(&mut self, cx: &mut Context<'_>) -> Result<(), String> {
+        let Some(target) = self.target(cx) else {
+            return Ok(());
+        };
+        let before = self.tracked.unwrap_or(cx.pulses());
+        if target != before && cx.is_acknowledged() {
+            cx.track_to_pulses(target, self.speed)?;
+            self.tracked = Some(target);
+        }
+        Ok(())
+    }
+}
+
 impl RunningStep for FollowRun {
     fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
-        let at_rest = cx.at_rest()?;
+        let at_rest = self.is_at_rest(cx)?;
         let silent = cx.now.since(self.led_at).seconds();
         let is_lost = silent > SILENT_MAX;
         if is_lost && !self.is_lost {
@@ -110,25 +168,27 @@ impl RunningStep for FollowRun {
         }
         self.is_lost = is_lost;
         let is_over = reading.tick >= self.until_tick || silent > LOST;
-        if !at_rest {
-            if (is_lost || is_over) && !self.is_stopping {
-                self.is_stopping = true;
-                cx.stop_move();
-            }
+        // At rest too a controller that takes targets is stopped, so that it takes no more.
+        if (is_lost || is_over) && !self.is_stopping && (!at_rest || self.tracked.is_some()) {
+            self.stop(cx);
+            return Ok(Progress::Continue);
+        }
+        // Behind a stop that waits for its answer a controller could drop the next target.
+        let is_stopped = at_rest && (!cx.rig().takes_targets || cx.is_acknowledged());
+        if self.is_stopping && !is_stopped {
             return Ok(Progress::Continue);
         }
         self.is_stopping = false;
-        if is_over {
+        if is_over && at_rest {
             return Ok(Progress::Done);
         }
-        if let Some(wanted) = self.wanted {
-            let wanted = wanted.position_from(self.surface);
-            let wanted = pulses_from_position(wanted, cx.rig().mm_per_pulse);
-            // Home is the end of the way out.
-            let target = wanted.clamp(0, self.deepest_pulses.max(0));
-            if target != cx.pulses() {
-                cx.move_to_pulses(target, self.speed)?;
-            }
+        if cx.rig().takes_targets {
+            self.track(cx)?;
+        } else if at_rest
+            && let Some(target) = self.target(cx)
+            && target != cx.pulses()
+        {
+            cx.move_to_pulses(target, self.speed)?;
         }
         Ok(Progress::Continue)
     }
