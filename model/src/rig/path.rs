@@ -255,7 +255,7 @@ impl PathTracker {
         if reading.status.has(AxisStatus::MOVING) {
             let way = (reading.pulses - before) as f64 * self.mm_per_pulse;
             if passed > 0.0 {
-                let share = 1.0 - (-passed / SPEED_OVER.0).exp();
+                let share = passed / (passed + SPEED_OVER.0);
                 self.velocity.0 += share * (way / passed - self.velocity.0);
             }
             self.motion = Motion::Tracking(span);

@@ -1,6 +1,6 @@
 //! A slave that goes where it is led. Where the controller takes a new target only at rest, the slave makes one move after
 //! another and is behind its lead by about the duration of a move. Where it takes targets on the way, the slave gets every
-//! one, and is behind by the time in which it brakes from its speed.
+//! one. Going at `v` to where it can stop at `a`, it would be `v^2 / (2 a)` behind, and so it is sent ahead by as much.
 //!
 //! In doubt it stops: a lead that stops coming leaves it where it is, and after a while the step ends.
 
@@ -80,6 +80,15 @@ const SILENT_MAX: Seconds = Seconds(0.5);
 /// hangs to come back.
 const LOST: Seconds = Seconds(5.0);
 
+/// Time over which the speed of a lead is averaged: some leads, 5 ms apart, and short beside the motion of a hand.
+const LEAD_SPEED_OVER: Seconds = Seconds(0.02);
+
+/// Longest time between two leads of one motion: ten of them.
+const LEAD_GAP: Seconds = Seconds(0.05);
+
+/// Time from a lead to its effect: half the 5 ms between two leads, and a sample or two of the controller.
+const LEAD_ANSWER: Seconds = Seconds(0.004);
+
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FollowRun {
     speed: MmPerS,
@@ -90,6 +99,8 @@ pub(crate) struct FollowRun {
     /// Where it is to be; none before the first lead.
     wanted: Option<Depth>,
     led_at: Nanos,
+    /// Speed of the lead towards the tissue, at most that of the slave.
+    lead_speed: MmPerS,
     is_lost: bool,
     is_stopping: bool,
     /// The newest target of a rig that takes them on the way, since the last stop.
@@ -112,6 +123,7 @@ impl Executable for Follow {
             deepest_pulses: (deepest / cx.rig().mm_per_pulse + 1e-6).floor() as i64,
             wanted: None,
             led_at: cx.now,
+            lead_speed: MmPerS(0.0),
             is_lost: false,
             is_stopping: false,
             tracked: None,
@@ -127,6 +139,32 @@ impl FollowRun {
         let wanted = pulses_from_position(wanted, cx.rig().mm_per_pulse);
         // Home is the end of the way out.
         Some(wanted.clamp(0, self.deepest_pulses.max(0)))
+    }
+
+    /// The pulse to go to on the way: ahead of the lead by the way of the brake and that of the lead until it has effect.
+    fn target_ahead(&self, cx: &Context<'_>) -> Option<i64> {
+        let (wanted, speed) = (self.wanted?, self.lead_speed.0);
+        let brake = speed * speed.abs() / (2.0 * cx.rig().acceleration.0);
+        let ahead = Depth(wanted.0 + brake + speed * LEAD_ANSWER.0);
+        let pulses = ahead.position_from(self.surface).0 / cx.rig().mm_per_pulse;
+        // A counter shows the last whole pulse below the place, so that it follows within one where the target is above.
+        // 1e-6 of a pulse forgives the rounding of what is a whole number of them.
+        Some(((pulses - 1e-6).ceil() as i64).clamp(0, self.deepest_pulses.max(0)))
+    }
+
+    /// Takes a lead and its speed.
+    fn lead(&mut self, depth: Depth, now: Nanos) {
+        let passed = now.since(self.led_at).seconds();
+        let before = self.wanted.replace(depth);
+        self.led_at = now;
+        self.lead_speed = match before {
+            Some(before) if passed > Seconds(0.0) && passed <= LEAD_GAP => {
+                let way = ((depth.0 - before.0) / passed.0).clamp(-self.speed.0, self.speed.0);
+                let share = passed.0 / (passed.0 + LEAD_SPEED_OVER.0);
+                MmPerS(self.lead_speed.0 + share * (way - self.lead_speed.0))
+            }
+            _ => MmPerS(0.0),
+        };
     }
 
     fn is_at_rest(&self, cx: &mut Context<'_>) -> Result<bool, String> {
@@ -145,7 +183,7 @@ impl FollowRun {
 
     /// Sends the newest target, where the one before was accepted.
     fn track(&mut self, cx: &mut Context<'_>) -> Result<(), String> {
-        let Some(target) = self.target(cx) else {
+        let Some(target) = self.target_ahead(cx) else {
             return Ok(());
         };
         let before = self.tracked.unwrap_or(cx.pulses());
@@ -198,10 +236,7 @@ impl RunningStep for FollowRun {
             return None;
         };
         match depth.filter(|depth| depth.0.is_finite()) {
-            Some(depth) => {
-                self.wanted = Some(depth);
-                self.led_at = cx.now;
-            }
+            Some(depth) => self.lead(depth, cx.now),
             // It is as good as none: should no other come, the slave stops.
             None if self.is_refusal_reported => {}
             None => {

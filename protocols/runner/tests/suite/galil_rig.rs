@@ -77,6 +77,8 @@ pub struct GalilRig {
     wire: SharedWire,
     session: GalilSession,
     description: RigDescription,
+    /// What came later than it was asked for.
+    held: Option<RigEvent>,
 }
 
 impl GalilRig {
@@ -112,16 +114,19 @@ impl GalilRig {
         let clock: HostClock = Arc::new(move || shared.lock().now);
         let connected = connect(&mut wire.clone(), &clock, &settings, &"galil".into()).unwrap();
         let session = GalilSession::new(settings, &connected, clock());
-        Self { wire, session, description: connected.description }
+        Self { wire, session, description: connected.description, held: None }
     }
 
     fn turn(&mut self, until: Nanos) {
         let now = self.wire.lock().now;
         self.session.note_attendance(now);
-        while let Some(line) = self.session.take_line(now) {
-            self.wire.write(&line).unwrap();
-        }
-        let now = self.wire.lock().now;
+        let now = loop {
+            let now = self.wire.lock().now;
+            match self.session.take_line(now) {
+                Some(line) => self.wire.write(&line).unwrap(),
+                None => break now,
+            }
+        };
         let wait = self.session.next_at(now).min(until).since(now);
         let wait = wait.min(Nanos(500_000)).max(Nanos(20_000));
         let mut buffer = [0_u8; 256];
@@ -143,10 +148,17 @@ impl Rig for GalilRig {
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
         loop {
-            if let Some((at, body)) = self.session.take_event() {
-                return Some(RigEvent::new(at, body));
+            let event = self.held.take().or_else(|| {
+                self.session.take_event().map(|(at, body)| RigEvent::new(at, body))
+            });
+            // A turn may end a little behind `until`, by the ways over the wire: what it brings waits for the next call.
+            if event.as_ref().is_some_and(|event| event.at > until) {
+                self.held = event;
+                return None;
             }
-            // A turn may end a little behind `until`, by two ways over the wire: what it brings waits for the next call.
+            if event.is_some() {
+                return event;
+            }
             if self.wire.lock().now >= until {
                 return None;
             }

@@ -7,7 +7,7 @@ use palpate_haptics::Period;
 use palpate_haptics::rig::{HandPath, SimulatedHand};
 use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::metadata::SessionLabels;
-use palpate_model::rig::{Limits, Phase};
+use palpate_model::rig::{AxisStatus, Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::engine::Operator;
@@ -129,8 +129,8 @@ fn check_end(session: &Session, outcome: &str) {
 }
 
 /// The hand of the guide: 10 mm at up to 2 mm/s for 30 s. A slave that goes at v and can brake at a from v to its target is
-/// `v^2 / (2 a)` behind it, `v / (2 a)` in time: 16 ms at 2 mm/s and 61.44 mm/s^2. To that a lead adds 5 ms of age at most,
-/// and command, filter of the pulses and sample 2 ms each.
+/// `v^2 / (2 a)` behind it, `v / (2 a)` in time: 16 ms at 2 mm/s and 61.44 mm/s^2. It is sent ahead by so much, and what is
+/// left is the age of a lead, 5 ms at most, the command, the filter of the pulses, and a whole pulse.
 #[test]
 fn slave_of_the_guide_lags_less_than_30_ms() {
     let rig = GalilRig::new();
@@ -206,11 +206,11 @@ fn lead_that_is_lost_stops_the_slave_on_the_way_and_is_followed_again() {
     assert!((8.9..9.2).contains(&end), "{end}");
     let lost = session.entries.iter().filter(|entry| entry.body["record"] == "lead_lost");
     assert_eq!(lost.count(), 2);
-    // Once where the lead was lost, once where it was lost again, and the three of the steps before.
+    // Once each time.
     assert!(commands(&session, "stop") >= 2);
 }
 
-/// The end of a run that something ends while a lead moves the slave, and a run that is led so.
+/// A lead without end, and what says that the slave follows it.
 fn led_for_ever() -> (SharedLeadSource, Receiver<()>) {
     let (sender, moving) = sync_channel(1);
     let leader = along(move |t| {
@@ -242,10 +242,8 @@ fn operator_stops_a_slave_on_the_way_and_no_target_follows() {
         let last = |name: &str| session.entries.iter().rposition(|one| one.body["command"] == name);
         let stop = last(if choice == Operator::Halt { "halt" } else { "stop" });
         assert!(last("track") < stop, "{choice:?}");
-        // At rest within the brake of 12 mm/s, 0.2 s.
-        let rows = &session.rows;
-        let [end, before] = [1, 50].map(|back| rows[rows.len() - back].pulses);
-        assert_eq!(end, before, "{choice:?}");
+        let end = session.rows.last().unwrap();
+        assert!(!AxisStatus(end.status).has(AxisStatus::MOVING), "{choice:?}");
     }
 }
 

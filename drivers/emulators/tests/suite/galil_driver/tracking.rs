@@ -2,6 +2,7 @@
 
 use super::bench::{Host, thesis, to, try_connect, wired};
 use palpate_drivers::galil::GalilSettings;
+use palpate_drivers::wire::Dialogue;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilModel};
 use palpate_model::Nanos;
@@ -174,4 +175,40 @@ fn mode_that_something_else_has_ended_is_noticed() {
         panic!("{:?}", host.faults);
     };
     assert!(detail.contains("position tracking"), "{detail}");
+}
+
+#[test]
+fn path_of_a_tracking_axis_is_refused_where_it_cannot_have_come() {
+    let mut host = enabled(&thesis());
+    let mut path = PathTracker::new(&host.connected.description);
+    let RigCommand::Track(wanted) = track(400, 9.0) else { panic!("no target") };
+    for reading in host.readings.drain(..) {
+        path.on_reading(&reading).unwrap();
+    }
+    path.on_track(wanted);
+    host.tell(RigCommand::Track(wanted));
+    host.pass(0.3);
+    for reading in &host.readings {
+        path.on_reading(reading).unwrap();
+    }
+    // 9 mm/s, as it shows in whole pulses: one in 20 ms is 0.75 mm/s.
+    assert!((path.velocity().0 - 9.0).abs() < 0.75, "{:?}", path.velocity());
+    let mut next = host.newest();
+    next.tick += 1;
+    // Three samples of 0.6 pulses, and a pulse; either way.
+    for (by, is_believed) in [(0, true), (2, true), (5, false), (-2, true), (-5, false)] {
+        let mut reading = next;
+        reading.pulses += by;
+        let result = path.clone().on_reading(&reading);
+        assert_eq!(result.is_ok(), is_believed, "{by}: {result:?}");
+    }
+    // Slowly beyond the target and the way of the brake, 0.66 mm.
+    let mut beyond = host.newest();
+    let mut refused = None;
+    while refused.is_none() && beyond.pulses < 1000 {
+        (beyond.tick, beyond.pulses) = (beyond.tick + 2, beyond.pulses + 1);
+        refused = path.on_reading(&beyond).err();
+    }
+    let refused = refused.unwrap();
+    assert!((444..=447).contains(&refused.reported_pulses), "{refused:?}");
 }
