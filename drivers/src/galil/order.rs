@@ -223,8 +223,7 @@ impl GalilOrder {
     fn send_target(&mut self, made: MoveTo, settings: &GalilSettings) -> OrderStep {
         let a = settings.axis;
         let target = settings.sign() * made.target_pulses;
-        let commands =
-            vec![format!("PA{a}={target}"), format!("PA{a}=?"), format!("MG _PT{a}")];
+        let commands = vec![format!("PA{a}={target}"), format!("PA{a}=?"), format!("MG _PT{a}")];
         self.stage = Stage::Doing(RigCommand::Track(made));
         self.open = commands.len();
         OrderStep::SendAndSample(commands)

@@ -112,7 +112,9 @@ impl Slider {
             RigCommand::EnableMotor => self.is_motor_on = true,
             RigCommand::MoveTo(wanted) => made = RigCommand::MoveTo(self.start_move(tick, wanted)?),
             RigCommand::Track(_) => {
-                return Err(refusal("the simulated axis takes no target on the way; move it from rest"));
+                return Err(refusal(
+                    "the simulated axis takes no target on the way; move it from rest",
+                ));
             }
             RigCommand::Oscillate(wanted) => {
                 made = RigCommand::Oscillate(self.start_oscillation(tick, wanted)?);

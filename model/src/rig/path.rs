@@ -26,7 +26,11 @@ pub struct PathError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
     Rest,
-    Moving { course: Course, start_tick: u64, is_stopping: bool },
+    Moving {
+        course: Course,
+        start_tick: u64,
+        is_stopping: bool,
+    },
     /// Targets change on the way, at times that are known to a few samples only. So its place is what is reported, as
     /// far as the axis can have come there.
     Tracking(TrackedSpan),

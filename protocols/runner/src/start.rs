@@ -88,11 +88,8 @@ pub(super) fn start(
     context: RigContext<'_>,
 ) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
-    if request.leader.is_none() && request.plan.needs_lead() {
-        return Err(refused(format!(
-            "the step 'follow' of {} needs a master, and this run has none; run the protocol with 'palpate haptics slave', which supplies the master",
-            request.plan.name
-        )));
+    if let (None, Some(reason)) = (&request.leader, request.plan.refusal_without_master()) {
+        return Err(refused(reason));
     }
     let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
     let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);

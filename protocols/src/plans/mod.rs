@@ -160,6 +160,16 @@ impl Plan {
         self.follow_depths().next().is_some()
     }
 
+    /// Why a run that has no master cannot make it; none where it needs none.
+    pub fn refusal_without_master(&self) -> Option<String> {
+        self.needs_lead().then(|| {
+            format!(
+                "the step 'follow' of {} needs a master, and this run has none; run the protocol with 'palpate haptics slave', which supplies the master",
+                self.name
+            )
+        })
+    }
+
     /// The checkpoints ahead of a step: index of the step before each, and its name.
     pub fn checkpoints_from(&self, step_index: usize) -> impl Iterator<Item = (usize, &str)> {
         let steps = self.steps.iter().enumerate().skip(step_index);

@@ -148,9 +148,10 @@ impl Rig for GalilRig {
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
         loop {
-            let event = self.held.take().or_else(|| {
-                self.session.take_event().map(|(at, body)| RigEvent::new(at, body))
-            });
+            let event = self
+                .held
+                .take()
+                .or_else(|| self.session.take_event().map(|(at, body)| RigEvent::new(at, body)));
             // A turn may end a little behind `until`, by the ways over the wire: what it brings waits for the next call.
             if event.as_ref().is_some_and(|event| event.at > until) {
                 self.held = event;

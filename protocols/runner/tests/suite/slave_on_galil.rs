@@ -153,8 +153,10 @@ fn slave_of_the_guide_lags_less_than_30_ms() {
     check_end(&session, "finish");
     let report = leader.lock().unwrap().report().unwrap();
     println!("{report:?}");
-    let lag = report.lag_ms.unwrap();
-    assert!(lag.median < 30.0 && lag.worst < 30.0, "{report:?}");
+    // Within a pulse the slave is where it is led, and nothing is late.
+    assert!(report.lag_ms.is_none_or(|lag| lag.median < 30.0 && lag.worst < 30.0), "{report:?}");
+    // The same in mm, wherever it is: 30 ms at 2 mm/s.
+    assert!(report.lag_mm.median < 0.03 && report.lag_mm.worst < 0.06, "{report:?}");
     // It went to where the tissue let the hand go, and more than a target in ten milliseconds came.
     assert!(report.depth_max_mm > 7.0 && report.depth_max_mm <= 10.0, "{report:?}");
     assert!(commands(&session, "track") > 3000, "{}", commands(&session, "track"));
@@ -224,11 +226,9 @@ fn led_for_ever() -> (SharedLeadSource, Receiver<()>) {
 
 #[test]
 fn operator_stops_a_slave_on_the_way_and_no_target_follows() {
-    for (choice, outcome) in [
-        (Operator::Stop, "stop"),
-        (Operator::Abort, "abort"),
-        (Operator::Halt, "halt"),
-    ] {
+    for (choice, outcome) in
+        [(Operator::Stop, "stop"), (Operator::Abort, "abort"), (Operator::Halt, "halt")]
+    {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("session");
         let (leader, moving) = led_for_ever();

@@ -6,7 +6,7 @@ use palpate_drivers::wire::Dialogue;
 use palpate_emulators::EmulatedDevice;
 use palpate_emulators::galil::{EmulatedGalilSettings, GalilModel};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};
 
 fn track(target_pulses: i64, speed: f64) -> RigCommand {
     let RigCommand::MoveTo(wanted) = to(target_pulses, speed) else {
@@ -29,7 +29,8 @@ fn lines(host: &Host) -> String {
 /// On its way to a place far off.
 fn under_way(settings: &GalilSettings) -> Host {
     let mut host = enabled(settings);
-    assert_eq!(host.tell(track(3000, 19.98)), track(3000, 19.98));
+    let wanted = track(3000, 19.98);
+    assert!(wanted.is_answered_by(&host.tell(wanted)));
     host.pass(0.6);
     assert!(!host.is_at_rest());
     host
@@ -38,10 +39,8 @@ fn under_way(settings: &GalilSettings) -> Host {
 #[test]
 fn mode_is_found_by_asking_for_it() {
     assert!(Host::new(&thesis()).connected.description.takes_targets);
-    let old = EmulatedGalilSettings {
-        model: GalilModel::Dmc2143,
-        ..EmulatedGalilSettings::default()
-    };
+    let old =
+        EmulatedGalilSettings { model: GalilModel::Dmc2143, ..EmulatedGalilSettings::default() };
     // It has no analog inputs, which is said only after the mode was asked for.
     let wire = wired(old);
     assert!(try_connect(&wire, &thesis()).is_err());
@@ -60,7 +59,7 @@ fn target_replaces_the_one_on_the_way_in_one_line_and_the_path_is_believed() {
         let mut give = |host: &mut Host, target: i64, seconds: f64| {
             let command = track(target, 9.0);
             let RigCommand::Track(wanted) = command else { panic!("no target") };
-            path.on_track(MoveTo { ..wanted });
+            path.on_track(wanted);
             host.tell(command);
             host.pass(seconds);
             for reading in host.readings.drain(..host.readings.len() - 1) {
@@ -133,7 +132,7 @@ fn axis_that_tracks_stops_when_the_computer_falls_silent_or_takes_no_samples() {
     let before = host.newest().pulses;
     let wire = host.wire.clone();
     drop(host);
-    let way = {
+    let is_running = {
         let mut wire = wire.lock();
         let end = wire.now + Nanos::from_millis(2000);
         while wire.now < end {
@@ -141,7 +140,7 @@ fn axis_that_tracks_stops_when_the_computer_falls_silent_or_takes_no_samples() {
         }
         wire.emulator.is_running(0)
     };
-    assert!(!way);
+    assert!(!is_running);
     // Without one the session does it, while no samples are taken.
     let mut host = under_way(&GalilSettings { has_watchdog: false, ..thesis() });
     host.is_attended = false;
@@ -191,8 +190,8 @@ fn path_of_a_tracking_axis_is_refused_where_it_cannot_have_come() {
     for reading in &host.readings {
         path.on_reading(reading).unwrap();
     }
-    // 9 mm/s, as it shows in whole pulses: one in 20 ms is 0.75 mm/s.
-    assert!((path.velocity().0 - 9.0).abs() < 0.75, "{:?}", path.velocity());
+    // 9 mm/s, as it shows in whole pulses: one more or less of a sample is 0.73 mm/s in a mean of 20 ms.
+    assert!((path.velocity().0 - 9.0).abs() < 1.5, "{:?}", path.velocity());
     let mut next = host.newest();
     next.tick += 1;
     // Three samples of 0.6 pulses, and a pulse; either way.
