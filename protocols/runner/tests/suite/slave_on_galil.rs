@@ -132,7 +132,7 @@ fn check_end(session: &Session, outcome: &str) {
 /// `v^2 / (2 a)` behind it, `v / (2 a)` in time: 16 ms at 2 mm/s and 61.44 mm/s^2. It is sent ahead by so much, and what is
 /// left is the age of a lead, 5 ms at most, the command, the filter of the pulses, and a whole pulse.
 #[test]
-fn slave_of_the_guide_lags_less_than_30_ms() {
+fn slave_of_the_guide_is_no_further_from_its_master_than_30_ms_at_full_speed() {
     let rig = GalilRig::new();
     let description = rig.description().clone();
     assert!(description.takes_targets);
@@ -153,9 +153,10 @@ fn slave_of_the_guide_lags_less_than_30_ms() {
     check_end(&session, "finish");
     let report = leader.lock().unwrap().report().unwrap();
     println!("{report:?}");
-    // Within a pulse the slave is where it is led, and nothing is late.
-    assert!(report.lag_ms.is_none_or(|lag| lag.median < 30.0 && lag.worst < 30.0), "{report:?}");
-    // The same in mm, wherever it is: 30 ms at 2 mm/s.
+    // The worst in ms says nothing: where the slave is ahead by more than a pulse, at a turn of the hand, it is the time
+    // since the hand was there the last time.
+    assert!(report.lag_ms.is_none_or(|lag| lag.median < 30.0), "{report:?}");
+    // In mm, ahead or behind, wherever it is: 30 ms at the 2 mm/s of the hand.
     assert!(report.lag_mm.median < 0.03 && report.lag_mm.worst < 0.06, "{report:?}");
     // It went to where the tissue let the hand go, and more than a target in ten milliseconds came.
     assert!(report.depth_max_mm > 7.0 && report.depth_max_mm <= 10.0, "{report:?}");
