@@ -3,15 +3,18 @@
 use super::arguments::{above_zero, parse_number};
 use super::haptics::body;
 use super::output::Output;
-use super::run::{RunCompanions, RunLeader, SessionArgs, labels, run_plan};
+use super::protocol::ValueArgs;
+use super::rig::OpenRig;
+use super::run::{RunCompanions, RunLeader, SessionArgs, labels, read, run_plan};
 use super::{Failure, recover, rig};
 use clap::Args;
 use palpate_analysis::haptics::HapticSettings;
 use palpate_analysis::report::haptics::slave_text;
 use palpate_haptics::Period;
 use palpate_haptics::rig::{HandPath, SimulatedHand};
+use palpate_model::metadata::SessionLabels;
 use palpate_model::units::{Depth, MmPerS, Seconds};
-use palpate_protocols::plans::Follow;
+use palpate_protocols::plans::{Follow, Plan};
 use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings};
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
@@ -28,14 +31,19 @@ pub struct SlaveArgs {
     #[arg(value_name = "SESSION|thesis|SPECIMEN")]
     source: PathBuf,
     /// Duration in s
-    #[arg(long, default_value_t = 30.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
+    #[arg(long, default_value_t = 30.0, conflicts_with = "protocol", value_parser = parse_number, allow_negative_numbers = true, value_name = "S")]
     seconds: f64,
-    /// Target depth of the hand and limit of the slave, in mm
+    /// Target depth of the hand, in mm; without --protocol also the limit of the slave
     #[arg(long, default_value_t = 10.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM")]
     depth: f64,
     /// Fastest speed of the hand, which presses in and out, in mm/s; moves of the slave go at up to three times that
     #[arg(long, default_value_t = 2.0, value_parser = parse_number, allow_negative_numbers = true, value_name = "MM_PER_S")]
     speed: f64,
+    /// Protocol file with a step 'follow', instead of the built-in plan
+    #[arg(long, value_name = "FILE")]
+    protocol: Option<String>,
+    #[command(flatten)]
+    values: ValueArgs,
     #[command(flatten)]
     session: SessionArgs,
 }
@@ -59,28 +67,48 @@ impl SlaveArgs {
     }
 }
 
-pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
+/// The plan to run, the rig for it, and the labels of its session.
+fn prepare(args: &SlaveArgs, output: &Output) -> Result<(Plan, OpenRig, SessionLabels), Failure> {
+    let values = args.values.values();
+    if let Some(name) = &args.protocol {
+        let (plan, bench, labels) = read(name, &values, &args.session, output)?;
+        if !plan.needs_lead() {
+            return Err(Failure::usage(format!(
+                "the protocol {name} has no step 'follow'; add one, or run the protocol with 'palpate run'"
+            )));
+        }
+        args.check(bench.rig.description().speed_max)?;
+        return Ok((plan, bench, labels));
+    }
+    if !values.is_empty() {
+        return Err(Failure::usage("--set sets a parameter of a protocol; add --protocol FILE"));
+    }
     if let Ok(library) = library_folder() {
         recover::recover_unfinished(&library, output);
     }
     let bench = rig::open(&args.session.rig.with_specimen(&args.session.specimen)?)?;
-    let description = bench.rig.description().clone();
+    let description = bench.rig.description();
     args.check(description.speed_max)?;
-    let depth_max = Depth(args.depth);
-    let body = body(&args.source, depth_max, output)?;
+    let (hand, duration) = (MmPerS(args.speed), Seconds(args.seconds));
+    let plan = Follow::of_hand(description, hand, Depth(args.depth), duration).plan();
+    Ok((plan, bench, labels(&args.session)?))
+}
+
+pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
+    let (plan, bench, labels) = prepare(args, output)?;
+    let depths = plan.follow_depths().map(|depth| depth.0);
+    let depth_max = Depth(depths.fold(0.0, f64::max));
+    let body = body(&args.source, Depth(args.depth), output)?;
     let mut master = HapticSettings::source(Period::MILLISECOND).simulation(body, true);
     master.plant.hand = args.hand();
-    let (hand, duration) = (MmPerS(args.speed), Seconds(args.seconds));
-    let follow = Follow::of_hand(&description, hand, depth_max, duration);
     let leader = SlaveLeader::new(SlaveSettings {
         master,
         body,
         depth_max,
         is_virtual: bench.rig.is_virtual(),
-        rig: description,
+        rig: bench.rig.description().clone(),
     });
     let slave = Arc::new(Mutex::new(leader.map_err(Failure::usage)?));
-    let labels = labels(&args.session)?;
     let leading = Arc::clone(&slave);
     let run_leader = RunLeader {
         command: "haptics-slave",
@@ -95,5 +123,5 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
         }),
     };
     let companions = RunCompanions { leader: Some(run_leader), ..RunCompanions::default() };
-    run_plan(follow.plan(), bench, &args.session, labels, companions, output)
+    run_plan(plan, bench, &args.session, labels, companions, output)
 }

@@ -212,3 +212,41 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
     let out = palpate(at.path(), &["haptics", "slave", "nothing-there"]);
     assert_eq!(out.status.code(), Some(2), "{}", stderr(&out));
 }
+
+#[test]
+fn a_protocol_that_follows_is_led_by_haptics_slave_and_refused_by_run() {
+    let at = tempfile::tempdir().unwrap();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/protocols/follow.toml");
+    let text = std::fs::read_to_string(file).unwrap();
+    std::fs::write(at.path().join("follow.toml"), &text).unwrap();
+    assert_prints(&typed(at.path(), "protocol check follow.toml"), "follow");
+    let preview = typed(at.path(), "protocol preview follow.toml");
+    assert_prints(&preview, "down to a depth of 5");
+    let words = "haptics slave thesis --protocol follow.toml --set for=8s --depth 6 --profile ideal \
+                 --time-scale max --out led --json";
+    let printed = json(&typed(at.path(), words));
+    assert_eq!(printed["ending"], "finish", "{printed}");
+    // The hand goes to 6 mm, the slave no deeper than the protocol says.
+    let deepest = printed["slave"]["depth_max_mm"].as_f64().unwrap();
+    assert!(deepest > 2.0 && deepest <= 5.0 + 1e-9, "{printed}");
+    let replayed = typed(at.path(), "replay led");
+    assert_eq!(replayed.status.code(), Some(0), "{}", stderr(&replayed));
+    // Without a master nothing moves, and nothing is recorded.
+    let alone = typed(at.path(), "run follow.toml --time-scale max --out alone");
+    assert_refused(&alone, 2, "palpate haptics slave");
+    assert!(!at.path().join("alone").exists());
+    // A master without a slave is no run either.
+    let useless = typed(at.path(), "haptics slave thesis --protocol sine --time-scale max");
+    assert_refused(&useless, 2, "no step 'follow'");
+    let both = typed(at.path(), "haptics slave thesis --protocol follow.toml --seconds 3");
+    assert_eq!(both.status.code(), Some(2), "{}", stderr(&both));
+    let set = typed(at.path(), "haptics slave thesis --set for=3s");
+    assert_refused(&set, 2, "--protocol");
+    // The reference and its mistakes: a limit is needed, and a speed within the rig's.
+    let open = text.replace(", depth_max = \"5 mm\"", "");
+    std::fs::write(at.path().join("open.toml"), open).unwrap();
+    assert_refused(&typed(at.path(), "run open.toml"), 2, "depth_max");
+    let fast = text.replace("6 mm/s", "60 mm/s");
+    std::fs::write(at.path().join("fast.toml"), fast).unwrap();
+    assert_refused(&typed(at.path(), "run fast.toml"), 2, "60");
+}

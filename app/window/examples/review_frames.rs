@@ -85,6 +85,7 @@ fn manifest(number: u32) -> Manifest {
             cell_delay: Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            takes_targets: false,
             sensors: Default::default(),
         }),
         limits: Some(Limits::for_travel(travel)),

@@ -60,6 +60,7 @@ pub fn connect(
     let board = identify(&mut console, settings)?;
     silence_controller(&mut console, settings)?;
     let acceleration = set_up_axis(&mut console, settings)?;
+    let takes_targets = has_tracking_mode(&mut console, settings.axis)?;
     set_up_input(&mut console, settings)?;
     let has_watchdog = settings.has_watchdog && start_watchdog(&mut console, settings)?;
     let tm = console.number("_TM")?;
@@ -91,7 +92,10 @@ pub fn connect(
     );
     // Values that change from one opening to the next stay out of the identity, by which repeats are compared.
     let words = format!("{safety}, {words}");
-    let description = describe(settings, &board, acceleration, (pace, plan), &words, tm);
+    let description = RigDescription {
+        takes_targets,
+        ..describe(settings, &board, acceleration, (pace, plan), &words, tm)
+    };
     Ok(ConnectedGalil {
         board,
         description,
@@ -241,6 +245,21 @@ fn set_if_readable(
     Ok(())
 }
 
+/// Whether the controller has the position tracking mode, in which the axis takes a new target on the way; it is off
+/// behind. Which firmware has it is asked of the firmware.
+fn has_tracking_mode(console: &mut GalilConsole<'_>, axis: char) -> Result<bool, GalilOpenError> {
+    let operand = format!("MG _PT{axis}");
+    let reply = console.try_ask(&operand)?;
+    let is_mode = |mode: &[f64]| matches!(mode, [mode] if *mode == 0.0 || *mode == 1.0);
+    if !reply.is_accepted || !reply.numbers().is_some_and(|numbers| is_mode(&numbers)) {
+        return Ok(false);
+    }
+    let command = format!("PT{axis}=0");
+    console.ask(&command)?;
+    console.check(&command, &format!("_PT{axis}"), &[0.0])?;
+    Ok(true)
+}
+
 fn set_up_input(
     console: &mut GalilConsole<'_>,
     settings: &GalilSettings,
@@ -314,6 +333,7 @@ fn describe(
             |plan| plan.interval as f64,
         ),
         unseen_max: settings.unseen,
+        takes_targets: false,
         sensors: Default::default(),
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
         cell_delay: Seconds(0.0),

@@ -8,9 +8,18 @@ use palpate_model::Nanos;
 use palpate_model::rig::{MoveTo, Oscillation, RigCommand, SinePath};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
+/// Speed and acceleration in counts that a controller in the position tracking mode has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrackingRates {
+    pub speed: i64,
+    pub acceleration: i64,
+}
+
 /// Software limits are this far beyond the travel and behind home, in mm: behind the limit switches of a slide, which
 /// are within 5 mm, and before its mechanical ends. They stop the axis when both palpate and a switch fail.
 pub const LIMIT_MARGIN_MM: f64 = 5.0;
+
+const NO_NUMBERS: &str = "the controller's answer does not contain the expected numbers";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -42,6 +51,8 @@ pub struct GalilOrder {
     /// The part that counts was written, so that the axis may already be doing it.
     pub is_begun: bool,
     tick: Nanos,
+    /// The mode in which the controller is, if it takes targets on the way.
+    pub tracking: Option<TrackingRates>,
     /// The increments that follow the beginning of a sine.
     pub feed: Option<SineFeed>,
 }
@@ -53,6 +64,7 @@ impl GalilOrder {
         Self {
             command,
             tick,
+            tracking: None,
             feed: None,
             stage: Stage::Setting,
             open: 0,
@@ -69,24 +81,35 @@ impl GalilOrder {
                 self.stage = Stage::Doing(self.command);
                 vec![format!("SH{a}"), format!("MG _MO{a}")]
             }
-            RigCommand::MoveTo(wanted) => {
-                let (speed, rate) =
-                    (settings.counts(wanted.speed.0), settings.counts(wanted.acceleration.0));
-                if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
-                    return OrderStep::Refused(format!(
-                        "a speed of {} is not between one pulse a second and the maximum of the rig file, {}",
-                        wanted.speed, settings.speed_max
-                    ));
+            RigCommand::MoveTo(wanted) => match move_rates(&wanted, settings) {
+                Ok(rates) => {
+                    let mut commands = rate_commands(a, rates);
+                    commands.extend([
+                        format!("PA{a}={}", settings.sign() * wanted.target_pulses),
+                        format!("MG _SP{a},_AC{a},_DC{a}"),
+                        format!("PA{a}=?"),
+                    ]);
+                    if self.tracking.is_some() {
+                        // In that mode a target would take effect before the axis is begun.
+                        commands.insert(0, format!("PT{a}=0"));
+                    }
+                    commands
                 }
-                vec![
-                    format!("SP{a}={speed}"),
-                    format!("AC{a}={rate}"),
-                    format!("DC{a}={rate}"),
-                    format!("PA{a}={}", settings.sign() * wanted.target_pulses),
-                    format!("MG _SP{a},_AC{a},_DC{a}"),
-                    format!("PA{a}=?"),
-                ]
-            }
+                Err(why) => return OrderStep::Refused(why),
+            },
+            RigCommand::Track(wanted) => match move_rates(&wanted, settings) {
+                Ok(rates) if self.tracking == Some(rates) => {
+                    let made = made_move(&wanted, rates, settings);
+                    return self.send_target(made, settings);
+                }
+                Ok(rates) => {
+                    let mut commands = rate_commands(a, rates);
+                    commands.insert(0, format!("PT{a}=1"));
+                    commands.push(format!("MG _PT{a},_SP{a},_AC{a},_DC{a}"));
+                    commands
+                }
+                Err(why) => return OrderStep::Refused(why),
+            },
             RigCommand::DefinePosition { .. } => {
                 let (forward, reverse) = software_limits(settings, 0, settings.travel.0);
                 limit_commands(a, forward, reverse)
@@ -98,7 +121,9 @@ impl GalilOrder {
                     return OrderStep::Refused(why);
                 }
                 let rate = settings.counts(wanted.acceleration.0);
-                vec![format!("AC{a}={rate}"), format!("DC{a}={rate}"), format!("MG _AC{a},_DC{a}")]
+                let mode = self.tracking.map(|_| format!("PT{a}=0"));
+                let set = [format!("AC{a}={rate}"), format!("DC{a}={rate}")];
+                mode.into_iter().chain(set).chain([format!("MG _AC{a},_DC{a}")]).collect()
             }
             RigCommand::Stop | RigCommand::Halt => {
                 return OrderStep::Refused("a stop cannot be queued behind other commands".into());
@@ -123,7 +148,7 @@ impl GalilOrder {
         }
         match self.stage {
             Stage::Setting => self.send_main_part(settings),
-            Stage::Doing(made) => self.done(made),
+            Stage::Doing(made) => self.done(made, settings),
         }
     }
 
@@ -135,25 +160,29 @@ impl GalilOrder {
             (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
                 let target = parse_register(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
-                    return OrderStep::Refused(format!(
-                        "the controller reports a target other than {} pulses",
-                        wanted.target_pulses
-                    ));
+                    return OrderStep::Refused(other_target(wanted.target_pulses));
                 }
-                // The controller rounds down to its resolution; a larger value is an error.
-                let speed_asked = settings.counts(wanted.speed.0) as f64;
-                let ac_asked = settings.counts(wanted.acceleration.0) as f64;
-                if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
-                    return OrderStep::Refused(format!(
-                        "the controller reports speed {speed}, acceleration {ac} and deceleration {dc} in counts, after speed {speed_asked} and acceleration {ac_asked} were set"
-                    ));
+                match check_rates(&wanted, [speed, ac, dc], settings) {
+                    Ok(rates) => {
+                        let made = made_move(&wanted, rates, settings);
+                        (RigCommand::MoveTo(made), vec![format!("BG{a}")])
+                    }
+                    Err(why) => return OrderStep::Refused(why),
                 }
-                let made = MoveTo {
-                    target_pulses: wanted.target_pulses,
-                    speed: MmPerS(speed * settings.mm_per_pulse),
-                    acceleration: MmPerS2(ac * settings.mm_per_pulse),
+            }
+            (RigCommand::Track(wanted), &[mode, speed, ac, dc]) => {
+                if mode != 1.0 {
+                    let why = "the controller does not enter the position tracking mode (PT)";
+                    return OrderStep::Refused(why.into());
+                }
+                return match check_rates(&wanted, [speed, ac, dc], settings) {
+                    Ok(rates) => {
+                        let asked = move_rates(&wanted, settings);
+                        self.tracking = asked.ok();
+                        self.send_target(made_move(&wanted, rates, settings), settings)
+                    }
+                    Err(why) => OrderStep::Refused(why),
                 };
-                (RigCommand::MoveTo(made), vec![format!("BG{a}")])
             }
             (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
                 let wanted = software_limits(settings, 0, settings.travel.0);
@@ -181,9 +210,7 @@ impl GalilOrder {
                 (RigCommand::Oscillate(made), feed.begin())
             }
             _ => {
-                return OrderStep::Refused(
-                    "the controller's answer does not contain the expected numbers".into(),
-                );
+                return OrderStep::Refused(NO_NUMBERS.into());
             }
         };
         self.stage = Stage::Doing(made);
@@ -191,7 +218,37 @@ impl GalilOrder {
         OrderStep::SendAndSample(commands)
     }
 
-    fn done(&self, made: RigCommand) -> OrderStep {
+    /// The target, which takes effect at once, and the questions whether it is the one that was sent and whether the mode
+    /// is still on: the watchdog's stop ends it too.
+    fn send_target(&mut self, made: MoveTo, settings: &GalilSettings) -> OrderStep {
+        let a = settings.axis;
+        let target = settings.sign() * made.target_pulses;
+        let commands = vec![format!("PA{a}={target}"), format!("PA{a}=?"), format!("MG _PT{a}")];
+        self.stage = Stage::Doing(RigCommand::Track(made));
+        self.open = commands.len();
+        OrderStep::SendAndSample(commands)
+    }
+
+    /// Whether it changes the target of an axis that may be under way.
+    pub fn is_target(&self) -> bool {
+        matches!(self.stage, Stage::Doing(RigCommand::Track(_)))
+    }
+
+    fn done(&self, made: RigCommand, settings: &GalilSettings) -> OrderStep {
+        if let RigCommand::Track(track) = made {
+            let &[target, mode] = self.numbers.as_slice() else {
+                return OrderStep::Refused(NO_NUMBERS.into());
+            };
+            if mode != 1.0 {
+                return OrderStep::Refused(
+                    "the controller has left the position tracking mode (PT); check what else commands it".into(),
+                );
+            }
+            let target = parse_register(target).map(|target| settings.sign() * target);
+            if target != Some(track.target_pulses) {
+                return OrderStep::Refused(other_target(track.target_pulses));
+            }
+        }
         // The number is `_MO`: 1 while the motor is off.
         if self.command == RigCommand::EnableMotor && self.numbers != [0.0] {
             let why = "the motor stays off after SH; check the amplifier and its enable input";
@@ -199,6 +256,58 @@ impl GalilOrder {
         }
         OrderStep::Done(made)
     }
+}
+
+/// Speed and acceleration of a move in counts, or why the rig cannot make it.
+fn move_rates(wanted: &MoveTo, settings: &GalilSettings) -> Result<TrackingRates, String> {
+    let rates = TrackingRates {
+        speed: settings.counts(wanted.speed.0),
+        acceleration: settings.counts(wanted.acceleration.0),
+    };
+    if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || rates.speed < 1 {
+        return Err(format!(
+            "a speed of {} is not between one pulse a second and the maximum of the rig file, {}",
+            wanted.speed, settings.speed_max
+        ));
+    }
+    Ok(rates)
+}
+
+fn rate_commands(axis: char, TrackingRates { speed, acceleration }: TrackingRates) -> Vec<String> {
+    vec![
+        format!("SP{axis}={speed}"),
+        format!("AC{axis}={acceleration}"),
+        format!("DC{axis}={acceleration}"),
+    ]
+}
+
+/// Speed, acceleration and deceleration as they are read back, compared with what was asked for.
+fn check_rates(
+    wanted: &MoveTo,
+    [speed, ac, dc]: [f64; 3],
+    settings: &GalilSettings,
+) -> Result<TrackingRates, String> {
+    // The controller rounds down to its resolution; a larger value is an error.
+    let speed_asked = settings.counts(wanted.speed.0) as f64;
+    let ac_asked = settings.counts(wanted.acceleration.0) as f64;
+    if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
+        return Err(format!(
+            "the controller reports speed {speed}, acceleration {ac} and deceleration {dc} in counts, after speed {speed_asked} and acceleration {ac_asked} were set"
+        ));
+    }
+    Ok(TrackingRates { speed: speed as i64, acceleration: ac as i64 })
+}
+
+fn made_move(wanted: &MoveTo, rates: TrackingRates, settings: &GalilSettings) -> MoveTo {
+    MoveTo {
+        target_pulses: wanted.target_pulses,
+        speed: MmPerS(rates.speed as f64 * settings.mm_per_pulse),
+        acceleration: MmPerS2(rates.acceleration as f64 * settings.mm_per_pulse),
+    }
+}
+
+fn other_target(pulses: i64) -> String {
+    format!("the controller reports a target other than {pulses} pulses")
 }
 
 /// Software limits in the controller's counts, forward and reverse, around places from `here_pulses` on over `way_mm`.

@@ -82,6 +82,7 @@ pub fn open(
         noise_expected: Volts(0.0),
         ticks_per_sample: 1.0,
         unseen_max: settings.unseen,
+        takes_targets: false,
         sensors: Default::default(),
         pulse_lag: LAG,
         cell_delay: Seconds(0.0),

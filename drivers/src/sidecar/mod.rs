@@ -208,6 +208,7 @@ pub fn describe(
         cell_delay: Seconds(cell.delay_ms * 1e-3),
         ticks_per_sample: (period * 1e9 / about.tick_ns as f64).max(1.0),
         unseen_max: settings.unseen,
+        takes_targets: false,
         sensors: about.rig_sensors(""),
     }
 }

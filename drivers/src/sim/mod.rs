@@ -268,6 +268,7 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
+        takes_targets: false,
         sensors: Sensors::described(settings),
     }
 }

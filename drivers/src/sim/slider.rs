@@ -111,6 +111,11 @@ impl Slider {
         match command {
             RigCommand::EnableMotor => self.is_motor_on = true,
             RigCommand::MoveTo(wanted) => made = RigCommand::MoveTo(self.start_move(tick, wanted)?),
+            RigCommand::Track(_) => {
+                return Err(refusal(
+                    "the simulated axis takes no target on the way; move it from rest",
+                ));
+            }
             RigCommand::Oscillate(wanted) => {
                 made = RigCommand::Oscillate(self.start_oscillation(tick, wanted)?);
             }

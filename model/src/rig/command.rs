@@ -36,6 +36,10 @@ pub enum RigCommand {
     EnableMotor,
     /// Move to an absolute position (Galil `PA`, `SP`, `AC`, `BG`).
     MoveTo(MoveTo),
+    /// Move to an absolute position from rest or from any motion of this kind, whose target it replaces: speed and
+    /// acceleration stay within those of the command, and the axis brakes before it turns (Galil position tracking: `PT`,
+    /// then `PA` at any time). Only a rig that takes targets on the way has it.
+    Track(MoveTo),
     /// Go in and out on a sine, by itself (Galil contour mode: `CM`, then `DT` and `CD` for increments over
     /// 2^n samples, between which the controller interpolates, from its program; DMC-1700/1800 user manual, chapter 6).
     Oscillate(Oscillation),
@@ -53,7 +57,7 @@ pub enum RigCommand {
 impl RigCommand {
     /// Whether it moves the axis.
     pub const fn is_motion(&self) -> bool {
-        matches!(self, Self::MoveTo(_) | Self::Oscillate(_))
+        matches!(self, Self::MoveTo(_) | Self::Track(_) | Self::Oscillate(_))
     }
 
     /// Whether a controller that acknowledges `set` does what this command asks. It counts speed and acceleration
@@ -62,7 +66,8 @@ impl RigCommand {
         // Far below any quantum of speed, far above the rounding of a product.
         let is_near = |requested: f64, set: f64| (requested - set).abs() <= 1e-9 * requested.abs();
         match (self, set) {
-            (Self::MoveTo(requested), Self::MoveTo(set)) => {
+            (Self::MoveTo(requested), Self::MoveTo(set))
+            | (Self::Track(requested), Self::Track(set)) => {
                 requested.target_pulses == set.target_pulses
                     && is_near(requested.speed.0, set.speed.0)
                     && is_near(requested.acceleration.0, set.acceleration.0)

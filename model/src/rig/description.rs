@@ -55,6 +55,9 @@ pub struct RigDescription {
     /// How far the probe may go while no sample comes; from 0.02 to 0.5 mm.
     #[serde(default = "usual_unseen", skip_serializing_if = "is_usual_unseen")]
     pub unseen_max: Position,
+    /// Whether its axis takes a new target while it moves.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub takes_targets: bool,
     /// What it reports apart from load cell and axis.
     #[serde(default, skip_serializing_if = "is_default")]
     pub sensors: RigSensors,

@@ -4,7 +4,7 @@
 //! course is. The tracker starts a course at the tick at which the axis first reports motion
 //! and refuses the path when it is more than one pulse away from what the controller reports.
 
-use super::command::{MoveTo, Oscillation, position_from_pulses};
+use super::command::{MoveTo, Oscillation, position_from_pulses, pulses_from_position};
 use super::course::Course;
 use super::description::RigDescription;
 use super::oscillation::SinePath;
@@ -26,14 +26,76 @@ pub struct PathError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
     Rest,
-    Moving { course: Course, start_tick: u64, is_stopping: bool },
+    Moving {
+        course: Course,
+        start_tick: u64,
+        is_stopping: bool,
+    },
+    /// Targets change on the way, at times that are known to a few samples only. So its place is what is reported, as
+    /// far as the axis can have come there.
+    Tracking(TrackedSpan),
 }
+
+/// Where an axis can be whose target changes on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TrackedSpan {
+    /// Pulses from which it set out and to which it was sent, the least and the most.
+    low: i64,
+    high: i64,
+    speed: MmPerS,
+    /// Way of the brake from full speed, in pulses: so far it may overshoot a target that came nearer.
+    braking_pulses: f64,
+    newest_tick: u64,
+    newest_pulses: i64,
+}
+
+impl TrackedSpan {
+    fn from(pulses: i64, tick: u64) -> Self {
+        Self {
+            low: pulses,
+            high: pulses,
+            speed: MmPerS(0.0),
+            braking_pulses: 0.0,
+            newest_tick: tick,
+            newest_pulses: pulses,
+        }
+    }
+
+    fn add(&mut self, command: &MoveTo, mm_per_pulse: f64) {
+        self.low = self.low.min(command.target_pulses);
+        self.high = self.high.max(command.target_pulses);
+        self.speed = MmPerS(self.speed.0.max(command.speed.0));
+        let braking = self.speed.0 * self.speed.0 / (2.0 * command.acceleration.0);
+        self.braking_pulses = self.braking_pulses.max(braking / mm_per_pulse);
+    }
+
+    /// Takes a sample; the place it should have where it cannot be, in pulses.
+    fn take(&mut self, reading: &Reading, tick: Seconds, mm_per_pulse: f64) -> Result<(), f64> {
+        // The pulses may be of the sample before or after the clock's.
+        let ticks = reading.tick.saturating_sub(self.newest_tick).saturating_add(2);
+        let way = 1.0 + self.speed.0 * ticks as f64 * tick.0 / mm_per_pulse;
+        let (before, pulses) = (self.newest_pulses as f64, reading.pulses as f64);
+        let least = (self.low as f64 - self.braking_pulses - 1.0).max(before - way);
+        let most = (self.high as f64 + self.braking_pulses + 1.0).min(before + way);
+        (self.newest_tick, self.newest_pulses) = (reading.tick, reading.pulses);
+        // 1e-6 of a pulse is rounding.
+        if (least - 1e-6..=most + 1e-6).contains(&pulses) {
+            Ok(())
+        } else {
+            Err(pulses.max(least).min(most))
+        }
+    }
+}
+
+/// Time over which a speed is averaged that is known from whole pulses only: 20 ms at 1 mm/s are more than a pulse.
+const SPEED_OVER: Seconds = Seconds(0.02);
 
 /// A motion that was sent and has not begun.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PendingMotion {
     Move(MoveTo),
     Sine(Oscillation),
+    Track(MoveTo),
 }
 
 /// Commanded position as a function of the samples and commands seen so far.
@@ -79,6 +141,14 @@ impl PathTracker {
         self.await_motion(PendingMotion::Sine(command));
     }
 
+    /// A target was sent that may replace that of the motion under way.
+    pub fn on_track(&mut self, command: MoveTo) {
+        match &mut self.motion {
+            Motion::Tracking(span) => span.add(&command, self.mm_per_pulse),
+            _ => self.await_motion(PendingMotion::Track(command)),
+        }
+    }
+
     fn await_motion(&mut self, motion: PendingMotion) {
         self.pending = Some(motion);
         self.is_pending_stopped = false;
@@ -113,6 +183,9 @@ impl PathTracker {
 
     /// Takes one sample and returns the commanded position at its tick.
     pub fn on_reading(&mut self, reading: &Reading) -> Result<Position, PathError> {
+        if let Motion::Tracking(span) = self.motion {
+            return self.on_tracked(span, reading);
+        }
         let reported = position_from_pulses(reading.pulses, self.mm_per_pulse);
         let at_rest = self.position.unwrap_or(reported);
         let is_moving = reading.status.has(AxisStatus::MOVING);
@@ -121,6 +194,14 @@ impl PathTracker {
             && matches!(self.motion, Motion::Rest)
             && let Some(pending) = self.pending.take()
         {
+            if let PendingMotion::Track(command) = pending {
+                // At rest the place is that of a whole pulse.
+                let from = pulses_from_position(at_rest, self.mm_per_pulse);
+                let before = reading.tick.saturating_sub(1);
+                let mut span = TrackedSpan::from(from, before);
+                span.add(&command, self.mm_per_pulse);
+                return self.on_tracked(span, reading);
+            }
             self.motion = Motion::Moving {
                 course: self.course_from(at_rest, pending),
                 start_tick: reading.tick,
@@ -130,7 +211,8 @@ impl PathTracker {
         let is_over = !is_moving && self.is_pending_stopped;
         let position = match &mut self.motion {
             Motion::Rest if is_over && self.pending.take().is_some() => reported,
-            Motion::Rest => at_rest,
+            // What is tracked was taken above.
+            Motion::Rest | Motion::Tracking(_) => at_rest,
             Motion::Moving { course, start_tick, is_stopping } => {
                 let mut since =
                     Seconds(reading.tick.saturating_sub(*start_tick) as f64 * self.tick.0);
@@ -164,9 +246,37 @@ impl PathTracker {
         Ok(position)
     }
 
+    /// A sample of a motion whose target changes on the way; it ends where the axis rests.
+    fn on_tracked(
+        &mut self,
+        mut span: TrackedSpan,
+        reading: &Reading,
+    ) -> Result<Position, PathError> {
+        let (before, newest) = (span.newest_pulses, span.newest_tick);
+        let taken = span.take(reading, self.tick, self.mm_per_pulse);
+        let passed = reading.tick.saturating_sub(newest) as f64 * self.tick.0;
+        let position = position_from_pulses(reading.pulses, self.mm_per_pulse);
+        if reading.status.has(AxisStatus::MOVING) {
+            let way = (reading.pulses - before) as f64 * self.mm_per_pulse;
+            if passed > 0.0 {
+                let share = passed / (passed + SPEED_OVER.0);
+                self.velocity.0 += share * (way / passed - self.velocity.0);
+            }
+            self.motion = Motion::Tracking(span);
+        } else {
+            self.velocity = MmPerS(0.0);
+            self.motion = Motion::Rest;
+        }
+        self.position = Some(position);
+        taken.map(|()| position).map_err(|expected_pulses| PathError {
+            expected_pulses,
+            reported_pulses: reading.pulses,
+        })
+    }
+
     fn course_from(&self, from: Position, pending: PendingMotion) -> Course {
         match pending {
-            PendingMotion::Move(command) => {
+            PendingMotion::Move(command) | PendingMotion::Track(command) => {
                 let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
                 let (speed, acceleration) = (command.speed, command.acceleration);
                 Course::Move(MotionProfile::to_rest(from, target, speed, acceleration))

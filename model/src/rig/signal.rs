@@ -101,6 +101,7 @@ mod tests {
             cell_delay: crate::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            takes_targets: false,
             sensors: Default::default(),
         }
     }

@@ -59,7 +59,7 @@ pub struct RunRequest {
     pub to_acknowledge: Vec<String>,
     pub after_stop: AfterStop,
     pub answers: PromptResponder,
-    /// Source of leads for a step that follows; without it such a step times out.
+    /// Source of leads for a step that follows; a plan with such a step is refused without it.
     pub leader: Option<SharedLeadSource>,
 }
 
@@ -88,6 +88,9 @@ pub(super) fn start(
     context: RigContext<'_>,
 ) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
+    if let (None, Some(reason)) = (&request.leader, request.plan.refusal_without_master()) {
+        return Err(refused(reason));
+    }
     let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
     let preview = preview(&request.plan, context.rig, &request.limits, &curve, context.is_homed);
     preview.check_start(request.is_acknowledged).map_err(refused)?;

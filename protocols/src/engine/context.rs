@@ -229,6 +229,29 @@ impl Context<'_> {
         Ok(())
     }
 
+    /// Sends the axis to a pulse count, at rest or on the way to another one, on a rig that takes targets on the way.
+    pub fn track_to_pulses(&mut self, target_pulses: i64, speed: MmPerS) -> Result<(), String> {
+        let rig = &self.state.config.rig;
+        rig.check_speed(speed)?;
+        if self.state.power != Power::Enabled {
+            return Err("motion is not enabled".into());
+        }
+        let command = MoveTo { target_pulses, speed, acceleration: rig.acceleration };
+        let from = self.state.derived.position;
+        let to = position_from_pulses(target_pulses, rig.mm_per_pulse);
+        let move_secs = MotionProfile::to_rest(from, to, speed, rig.acceleration).duration();
+        // It may have to brake and come back.
+        let turn_secs = Seconds(2.0 * speed.0 / rig.acceleration.0);
+        let deadline = self.now + Nanos::from_seconds(move_secs + turn_secs + MOVE_GRACE);
+        // Until it has braked it goes on towards the tissue.
+        let is_forward =
+            target_pulses > self.state.pulses || self.state.path.velocity() > MmPerS(0.0);
+        self.state.in_flight = Some(MoveInFlight { deadline, speed, is_forward });
+        self.state.path.on_track(command);
+        self.command(RigCommand::Track(command));
+        Ok(())
+    }
+
     pub fn oscillate(&mut self, command: Oscillation) -> Result<(), String> {
         let rig = &self.state.config.rig;
         rig.check_oscillation(&command)?;

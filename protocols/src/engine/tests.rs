@@ -48,6 +48,7 @@ fn rig() -> RigDescription {
         cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
+        takes_targets: false,
         sensors: Default::default(),
     }
 }

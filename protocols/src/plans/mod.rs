@@ -7,7 +7,7 @@ pub mod ramp_hold;
 mod slave;
 
 use palpate_model::rig::Limits;
-use palpate_model::units::{Newtons, Position};
+use palpate_model::units::{Depth, Newtons, Position};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -145,6 +145,29 @@ impl Plan {
             limits: PlanLimits::default(),
             source: None,
         }
+    }
+
+    /// The depths that its steps that follow a master may reach.
+    pub fn follow_depths(&self) -> impl Iterator<Item = Depth> {
+        self.steps.iter().filter_map(|planned| match &planned.step {
+            Step::Follow(follow) => Some(follow.depth_max),
+            _ => None,
+        })
+    }
+
+    /// Whether it has a step that follows a master.
+    pub fn needs_lead(&self) -> bool {
+        self.follow_depths().next().is_some()
+    }
+
+    /// Why a run that has no master cannot make it; none where it needs none.
+    pub fn refusal_without_master(&self) -> Option<String> {
+        self.needs_lead().then(|| {
+            format!(
+                "the step 'follow' of {} needs a master, and this run has none; run the protocol with 'palpate haptics slave', which supplies the master",
+                self.name
+            )
+        })
     }
 
     /// The checkpoints ahead of a step: index of the step before each, and its name.

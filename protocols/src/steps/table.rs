@@ -61,6 +61,7 @@ steps! {
     hold::Hold
     hold_force::HoldForce
     sine::Sine
+    follow::Follow
     unload::Unload
     retract::Retract
     rest::Rest
@@ -69,5 +70,4 @@ steps! {
     weigh::Weigh
     check_home::CheckHome
     jog::Jog
-    follow::Follow
 }

@@ -81,6 +81,7 @@ pub fn manifest() -> Manifest {
             cell_delay: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            takes_targets: false,
             sensors: Default::default(),
         }),
         limits: Some(Limits::for_travel(Position(149.999_999_999_999_97))),

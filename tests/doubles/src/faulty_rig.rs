@@ -274,7 +274,7 @@ impl<R: Rig> Rig for FaultyRig<R> {
             return;
         }
         let is_motor_off = self.reset.is_some_and(|reset| {
-            let is_motion = matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_));
+            let is_motion = command.is_motion();
             !reset.is_motor_enabled && is_motion
         });
         if is_motor_off || self.is_active(|kind| kind == FaultKind::RefuseCommands) {

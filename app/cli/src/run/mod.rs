@@ -157,7 +157,7 @@ pub(super) fn run_queued(
 }
 
 /// The plan of a protocol, the rig that it was checked for, and the labels of its session.
-fn read(
+pub(super) fn read(
     name: &str,
     values: &BTreeMap<String, String>,
     options: &SessionArgs,

@@ -93,6 +93,8 @@ pub struct GalilAxis {
     pub motion: AxisMotion,
     /// Started by `BG`.
     pub prepared: PreparedMotion,
+    /// Whether it is in the position tracking mode (`PT`): a new target takes effect at once.
+    pub is_tracking: bool,
     /// Commanded place and velocity.
     pub profile: AxisProfile,
     /// Behind the smoothing filter, in counts.
@@ -118,6 +120,7 @@ impl GalilAxis {
             is_on: false,
             motion: AxisMotion::Rest,
             prepared: PreparedMotion::Target(0.0),
+            is_tracking: false,
             profile: AxisProfile::default(),
             filtered: 0.0,
             encoder: 0.0,
@@ -205,7 +208,7 @@ impl GalilAxis {
         if !self.is_on {
             return Err(ErrorCode::MOTOR_OFF);
         }
-        if self.is_running() {
+        if self.is_running() || self.is_tracking {
             return Err(ErrorCode::BEGIN_RUNNING);
         }
         let home = self.inputs.home;
@@ -236,8 +239,24 @@ impl GalilAxis {
         Ok(())
     }
 
-    /// Brakes at a rate and ends with a stop code.
+    /// `PA` in the position tracking mode: from the next sample on the axis goes there, at rest or under way.
+    pub fn track(&mut self, target: f64, polarity: InputPolarity) -> Result<(), ErrorCode> {
+        if !self.is_on {
+            return Err(ErrorCode::MOTOR_OFF);
+        }
+        let side = target - self.profile.place;
+        if side != 0.0 && (self.is_limit_active(side, polarity) || self.is_beyond(side)) {
+            return Err(ErrorCode::LIMIT_SWITCH);
+        }
+        self.prepared = PreparedMotion::Target(target);
+        self.motion = AxisMotion::Target(target);
+        self.stop_code = 0;
+        Ok(())
+    }
+
+    /// Brakes at a rate and ends with a stop code; a stop ends the position tracking mode too.
     pub fn stop(&mut self, rate: AxisSetting, code: u8) {
+        self.is_tracking = false;
         if !matches!(self.motion, AxisMotion::Rest | AxisMotion::Stopping(..)) {
             let rate = self.get(rate);
             self.motion = AxisMotion::Stopping(self.profile.rest(rate), rate, code);
@@ -247,6 +266,7 @@ impl GalilAxis {
 
     /// `AB`: at rest at once.
     pub fn abort(&mut self, code: u8) {
+        self.is_tracking = false;
         if self.is_running() {
             self.motion = AxisMotion::Rest;
             self.profile = AxisProfile { place: self.reference(), velocity: 0.0 };

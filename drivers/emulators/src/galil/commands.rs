@@ -8,7 +8,7 @@ use super::{Answer, GalilEmulator, Origin};
 use palpate_drivers::galil::ErrorCode;
 
 /// Words whose arguments are numbers of axes, in addition to the [`AxisSetting`]s.
-const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
+const AXIS_WORDS: [&str; 7] = ["PA", "PR", "JG", "DP", "DE", "CD", "PT"];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Argument {

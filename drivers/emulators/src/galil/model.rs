@@ -42,6 +42,12 @@ impl GalilModel {
         matches!(self, Self::Dmc4040)
     }
 
+    /// Whether it has the position tracking mode (`PT`), in which a new target takes effect while the axis moves. Which
+    /// firmware of the 21x3 series has it is not confirmed: here none.
+    pub const fn tracks_targets(self) -> bool {
+        !self.is_21x3()
+    }
+
     /// What `^R^V` answers. The first as captured by users of the EPICS driver, the others of its form.
     pub const fn revision(self) -> &'static str {
         match self {

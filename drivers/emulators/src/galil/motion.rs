@@ -18,6 +18,7 @@ impl GalilEmulator {
     ) -> Option<Result<Answer, ErrorCode>> {
         Some(match word {
             "PA" | "PR" | "JG" | "DP" | "DE" => self.position_command(word, arguments),
+            "PT" => self.tracking_command(arguments),
             "BG" => self.begin(arguments),
             "ST" => self.stop(origin, arguments),
             "AB" => self.abort(arguments),
@@ -49,10 +50,13 @@ impl GalilEmulator {
             let tm = self.clock.tm();
             let state = &mut self.axes[axis];
             match word {
-                "JG" if value.abs() > STEPPER_SPEED_MAX => return Err(ErrorCode::OUT_OF_RANGE),
-                "JG" => state.jog(value, tm),
                 "DE" if !state.is_stepper() => {}
                 "DE" => state.encoder = value,
+                // The mode takes absolute targets only. The code of this refusal is not confirmed.
+                "PR" | "JG" if state.is_tracking => return Err(ErrorCode::RUNNING),
+                "PA" if state.is_tracking => state.track(value, self.polarity)?,
+                "JG" if value.abs() > STEPPER_SPEED_MAX => return Err(ErrorCode::OUT_OF_RANGE),
+                "JG" => state.jog(value, tm),
                 // A new target needs a new begin.
                 "PA" | "PR" if state.is_running() => return Err(ErrorCode::RUNNING),
                 "PA" => state.prepared = PreparedMotion::Target(value),
@@ -61,6 +65,28 @@ impl GalilEmulator {
                     let shift = state.define(value)?;
                     self.shift_counter(axis, shift);
                 }
+            }
+        }
+        Ok(join_values(values))
+    }
+
+    /// `PT 1` switches the position tracking mode on, `PT 0` off (DMC-40x0 command reference, `PT`).
+    fn tracking_command(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
+        if !self.settings.model.tracks_targets() {
+            return Err(ErrorCode::UNRECOGNIZED);
+        }
+        let mut values = Vec::new();
+        for (axis, argument) in self.axis_arguments(arguments)? {
+            let state = &mut self.axes[axis];
+            match argument {
+                Argument::Query => {
+                    let is_on = if state.is_tracking { 1.0 } else { 0.0 };
+                    values.push(self.position_format.write(is_on));
+                }
+                Argument::Number(_) if state.is_running() => return Err(ErrorCode::RUNNING),
+                Argument::Number(0.0) => state.is_tracking = false,
+                Argument::Number(1.0) => state.is_tracking = true,
+                Argument::Number(_) => return Err(ErrorCode::OUT_OF_RANGE),
             }
         }
         Ok(join_values(values))

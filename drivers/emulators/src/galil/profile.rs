@@ -12,7 +12,8 @@ impl AxisProfile {
     /// One sample towards a target, arriving at rest. Returns whether it has arrived.
     ///
     /// The next speed is the largest from which the remaining distance suffices to stop, so that accelerating, slewing and
-    /// decelerating follow without a precomputed plan, and speed and rates may change during the move.
+    /// decelerating follow without a precomputed plan, and speed, rates and target may change during the move. A target
+    /// that is too near to stop at is passed at the deceleration given, and approached again.
     pub fn towards(&mut self, target: f64, speed: f64, ac: f64, dc: f64, dt: f64) -> bool {
         let distance = target - self.place;
         let side = if distance < 0.0 { -1.0 } else { 1.0 };
@@ -28,6 +29,13 @@ impl AxisProfile {
         let half = 0.5 * dc * dt;
         let stoppable =
             if room > 0.0 { (half * half + 2.0 * dc * room).sqrt() - half } else { 0.0 };
+        let slowest = v - dc * dt;
+        // Within a thousandth of a sample's deceleration, which is rounding, the axis stops at the target.
+        if slowest > stoppable + 1e-3 * dc * dt {
+            self.place += side * 0.5 * (v + slowest) * dt;
+            self.velocity = side * slowest;
+            return false;
+        }
         let w = (v + ac * dt).min(speed.max(v - dc * dt)).min(stoppable);
         let step = 0.5 * (v + w) * dt;
         // Less than this is rounding: places stay below 2^31 counts.

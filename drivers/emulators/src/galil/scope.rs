@@ -48,6 +48,7 @@ impl GalilEmulator {
             "LR" => truth(axis.inputs.reverse),
             "HM" => truth(axis.inputs.home),
             "PA" => self.target(index),
+            "PT" if self.settings.model.tracks_targets() => truth(axis.is_tracking),
             "PR" | "JG" => match axis.prepared {
                 PreparedMotion::Relative(distance) if word == "PR" => distance,
                 PreparedMotion::Jog(speed) if word == "JG" => speed,

@@ -223,6 +223,7 @@ impl GalilSession {
         self.is_reset = true;
         self.timing = ClockAlignment::default();
         self.sine = None;
+        self.tracking = None;
         self.has_watchdog = false;
         self.beginning = None;
         let under_way = self.order.take().map(|(number, _)| number);

@@ -7,7 +7,7 @@ mod writing;
 
 use super::clock_alignment::ClockAlignment;
 use super::connect::ConnectedGalil;
-use super::order::GalilOrder;
+use super::order::{GalilOrder, TrackingRates};
 use super::protocol::{GalilMessage, GalilParser, LINE_MAX, pack_lines};
 use super::recording::{self, ArrayRecording};
 use super::sampling::Sampler;
@@ -103,6 +103,8 @@ pub struct GalilSession {
     beginning: Option<(Outgoing, Nanos)>,
     orders: VecDeque<(u64, RigCommand)>,
     order: Option<(u64, GalilOrder)>,
+    /// The position tracking mode, while the controller is in it.
+    tracking: Option<TrackingRates>,
     answers: AnswerQueue,
     is_motion_begun: bool,
     resync: Option<Resynchronisation>,
@@ -145,6 +147,7 @@ impl GalilSession {
             beginning: None,
             orders: VecDeque::new(),
             order: None,
+            tracking: None,
             answers: AnswerQueue::default(),
             is_motion_begun: false,
             resync: None,

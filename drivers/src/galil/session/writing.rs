@@ -82,6 +82,11 @@ impl GalilSession {
 
     pub(super) fn send_urgent(&mut self, command: RigCommand, expects: ExpectedReply) {
         let axis = self.settings.axis;
+        // A stop ends the position tracking mode (DMC-40x0 command reference, `PT`).
+        self.tracking = None;
+        if let Some((_, order)) = &mut self.order {
+            order.tracking = None;
+        }
         let text = match command {
             // 1: the motion alone, so that the watchdog's program goes on (DMC-40x0 command reference, `AB`).
             RigCommand::Halt => "AB 1".to_owned(),
@@ -100,15 +105,21 @@ impl GalilSession {
             OrderStep::SendAndSample(commands) => {
                 let order = self.order.as_ref();
                 let begins = order.is_some_and(|(_, order)| order.command.is_motion());
+                // A target on the way waits for nothing: when it takes effect need be known to a few samples only.
+                let is_target = order.is_some_and(|(_, order)| order.is_target());
                 let line = self.with_sample(&commands, begins, ExpectedReply::Part);
                 // The sample behind the begin is to be a new one, so that the motion begins at its tick: two samples
                 // of the controller after the last one that was asked for.
                 let pause = Nanos(2 * self.pace.tick.0);
                 let from = self.answered_at.max(self.polled_at.unwrap_or(Nanos::ZERO));
-                self.beginning = Some((line, from + pause));
+                let due = if is_target { now } else { from + pause };
+                self.beginning = Some((line, due));
             }
             OrderStep::Done(made) => {
-                if let Some((number, _)) = self.order.take() {
+                if let Some((number, order)) = self.order.take() {
+                    if order.command.is_motion() {
+                        self.tracking = order.tracking.filter(|_| order.is_target());
+                    }
                     self.acknowledge(now, number, made);
                 }
             }
@@ -172,6 +183,7 @@ impl GalilSession {
             && let Some((number, command)) = self.orders.pop_front()
         {
             let mut order = GalilOrder::new(command, self.pace.tick);
+            order.tracking = self.tracking;
             let next = order.begin(&self.settings);
             self.order = Some((number, order));
             self.apply_step(now, next);

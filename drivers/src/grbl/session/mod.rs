@@ -146,6 +146,9 @@ impl GrblSession {
                 self.acknowledge(now, number, command);
             }
             RigCommand::MoveTo(wanted) => self.begin_move(now, number, wanted),
+            RigCommand::Track(_) => {
+                self.refuse(now, number, "Grbl takes no target on the way; move the axis from rest")
+            }
             RigCommand::Oscillate(_) => self.refuse(
                 now,
                 number,

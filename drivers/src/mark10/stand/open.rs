@@ -212,6 +212,7 @@ fn describe(
         cell_delay: palpate_model::units::Seconds(0.0),
         ticks_per_sample: ticks.max(1.0) * BETWEEN,
         unseen_max: settings.unseen,
+        takes_targets: false,
         sensors: Default::default(),
     }
 }

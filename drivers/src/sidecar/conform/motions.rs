@@ -106,6 +106,7 @@ impl MotionPlan {
             cell_delay: Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            takes_targets: false,
             sensors: RigSensors::default(),
         }
     }

@@ -285,6 +285,9 @@ impl SidecarSession {
                 cycles: sine.cycles,
                 acceleration: sine.acceleration,
             }),
+            RigCommand::Track(_) => {
+                Err("the sidecar takes no target on the way; move the axis from rest".into())
+            }
             RigCommand::Oscillate(_) => {
                 Err("the sidecar cannot follow a sine; choose a protocol with ramps only".into())
             }

@@ -47,6 +47,7 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
                     seen.moves += 1;
                     tracker.on_move(made);
                 }
+                RigCommand::Track(made) => tracker.on_track(made),
                 RigCommand::Oscillate(made) => {
                     seen.oscillations += 1;
                     tracker.on_oscillate(made);

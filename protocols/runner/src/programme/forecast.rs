@@ -56,7 +56,8 @@ pub fn forecast_programme(
                 return;
             };
             let own = preview(&plan, rig, limits, curve, false);
-            let refused = own.refusals.iter().map(for_task);
+            let no_master = plan.refusal_without_master();
+            let refused = own.refusals.iter().chain(&no_master).map(for_task);
             let refused = refused.map(|reason| ProtocolProblem::error(task.line, reason));
             refusals.extend(refused);
             let warned = |reason| ProtocolProblem::warning(task.line, for_task(reason));

@@ -44,6 +44,12 @@ fn describe_effect(effect: &Effect) -> String {
             RigCommand::MoveTo(to) => {
                 format!("move to pulse {} at {}", to.target_pulses, to.speed)
             }
+            RigCommand::Track(to) => {
+                format!(
+                    "go to pulse {} at up to {} from wherever it is",
+                    to.target_pulses, to.speed
+                )
+            }
             RigCommand::Oscillate(sine) => format!(
                 "oscillate with an amplitude of {} pulses and a period of {} ticks, {} cycles",
                 sine.amplitude_pulses, sine.period_ticks, sine.cycles

@@ -198,3 +198,69 @@ fn the_probe_feels_the_tissue_on_analog_input_one() {
     assert!(bench.emulator.plant().force().0 > 0.3);
     assert!(bench.number("@AN[1]") > free + 0.02);
 }
+
+/// The closed form of an axis under way whose target changes, in counts: to the end of the brake, then from rest.
+#[test]
+fn new_target_on_the_way_is_gone_to_by_the_closed_form() {
+    let mut bench = ready();
+    bench.tell("PTA=1");
+    assert_eq!(bench.number("_PTA"), 1.0);
+    bench.tell("PAA=3000");
+    for _ in 0..1024 {
+        bench.sample();
+    }
+    // After a second at 4096 counts/s^2 it goes at 1332 counts/s; a target behind it makes it brake and come back.
+    let accelerating = 1332.0 / 4096.0;
+    let turned_at = 1332.0 * (1.0 - 0.5 * accelerating);
+    assert!((bench.number("_RPA") - turned_at).abs() <= 3.0);
+    bench.tell("PAA=1000");
+    let turn = turned_at + 0.5 * 1332.0 * accelerating;
+    let back =
+        MotionProfile::to_rest(Position(turn), Position(1000.0), MmPerS(1332.0), MmPerS2(4096.0));
+    let mut furthest = 0.0_f64;
+    for at in 1..3000 {
+        bench.sample();
+        let place = bench.number("_RPA");
+        furthest = furthest.max(place);
+        let passed = f64::from(at) * SAMPLE;
+        if passed > accelerating + 2.0 * SAMPLE {
+            let exact = back.position(Seconds(passed - accelerating)).0;
+            // A sample at full speed is 1.3 counts, and counts are whole.
+            assert!((place - exact).abs() <= 3.0, "{at}: {place} {exact}");
+        }
+    }
+    assert!((furthest - turn).abs() <= 2.0, "{furthest} {turn}");
+    assert_eq!(bench.number("_TDA"), 1000.0);
+    // A target further on the same way is gone to without a pause.
+    bench.tell("PAA=2000");
+    bench.wait(0.4);
+    bench.tell("PAA=5000");
+    bench.wait(0.6);
+    assert_eq!(bench.number("_TVA").abs(), 1332.0);
+}
+
+#[test]
+fn stop_ends_tracking_and_an_older_model_has_none() {
+    let mut bench = ready();
+    bench.tell("PTA=1");
+    bench.tell("PAA=3000");
+    bench.wait(0.5);
+    assert!(bench.ask("PRA=10").contains('?') && bench.ask("BGA").contains('?'));
+    bench.tell("STA");
+    bench.settle();
+    assert_eq!((bench.number("_PTA"), bench.number("_SCA")), (0.0, 4.0));
+    // A target waits for its begin again.
+    let here = bench.number("_TDA");
+    bench.tell("PAA=0");
+    bench.wait(0.5);
+    assert_eq!(bench.number("_TDA"), here);
+    // A software limit is met on the way, and stands before any target.
+    bench.tell(&format!("FLA={};PTA=1;PAA=100000", here + 500.0));
+    bench.settle();
+    let beyond = bench.number("_TDA") - here - 500.0;
+    // The brake of 1332 counts/s, and a count.
+    assert!((0.0..=218.0).contains(&beyond), "{beyond}");
+    assert!(bench.ask("PTA=1;PAA=100000").ends_with('?'));
+    let mut older = Bench::serial(GalilModel::Dmc2143);
+    assert!(older.ask("PTA=1").contains('?') && older.ask("MG _PTA").contains('?'));
+}

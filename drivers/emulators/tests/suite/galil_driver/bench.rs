@@ -33,7 +33,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    fn pass(&mut self, by: Nanos) {
+    pub fn pass(&mut self, by: Nanos) {
         self.now = self.now + by;
         self.emulator.advance(self.now);
         let bytes = self.emulator.transmit(0);

@@ -8,4 +8,5 @@ mod opening;
 mod pace;
 mod recording;
 mod sines;
+mod tracking;
 mod wires;

@@ -254,6 +254,7 @@ impl Host {
                 RigEventBody::Ack(ack) => {
                     match ack.command {
                         RigCommand::MoveTo(to) => self.path.on_move(to),
+                        RigCommand::Track(to) => self.path.on_track(to),
                         RigCommand::Oscillate(sine) => self.path.on_oscillate(sine),
                         RigCommand::DefinePosition { pulses } => self.path.on_define(pulses),
                         RigCommand::Stop | RigCommand::Halt => self.path.on_stop_accepted(),

@@ -210,11 +210,11 @@ impl StandSession {
 
     fn begin(&mut self, now: Nanos, command: RigCommand) {
         let RigCommand::MoveTo(to) = command else {
-            return self.finish_order(
-                now,
-                command,
-                "the stand cannot follow a sine; choose a protocol with ramps only",
-            );
+            let why = match command {
+                RigCommand::Track(_) => "the stand takes no target on the way; move it from rest",
+                _ => "the stand cannot follow a sine; choose a protocol with ramps only",
+            };
+            return self.finish_order(now, command, why);
         };
         let target = self.settings.pulses(to.target_pulses - self.offset);
         let tenths = (to.speed.0 * 600.0).round() as i64;

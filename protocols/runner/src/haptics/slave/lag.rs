@@ -61,7 +61,7 @@ pub struct SlaveReport {
     pub model_less_cell: ForceDifference,
     /// The handle minus the cell: the same, plus the lag of the slave.
     pub handle_less_cell: ForceDifference,
-    /// How long ago the master was where the slave is, in ms; none if it hardly moved.
+    /// How long ago the master was where the slave is, in ms, while it is more than a pulse from it; none if it never is.
     pub lag_ms: Option<LagSpread>,
     /// How far the slave is from the master, in mm.
     pub lag_mm: LagSpread,
