@@ -182,21 +182,17 @@ fn others(mesh: &TriangleMesh) -> Box<[[u32; 2]]> {
     others.into()
 }
 
-/// Whether [`unfold`] gives `limit` or more, without its roots and divisions: by the law of cosines its square, times that of the edge, is
-/// `sides + 2 source corner + 2 sqrt(source_high corner_high)`. Most ways back to a corner that was passed before end here.
+/// Whether [`unfold`] gives `limit` or more, as far as that is seen without roots and divisions: the way across is no shorter than the
+/// hypotenuse over the heights of the source and the third corner above the edge.
 #[inline(always)]
 fn is_too_long(a: Vector, b: Vector, [to_a, to_b]: [f64; 2], limit: f64) -> bool {
-    const LESS: f64 = 1.0 - CLEARLY_ACROSS;
     let ab = minus(b, a);
     let squared = dot(ab, ab);
-    let (far, near) = (to_a * to_a, dot(a, a));
-    // Feet of source and corner on the edge, and the squares of their heights.
-    let (source, corner) = (0.5 * (squared + far - to_b * to_b), dot(a, ab));
-    let source_high = (far * squared * LESS - source * source).max(0.0);
-    let corner_high = (near * squared * LESS - corner * corner).max(0.0);
-    let lacking = (limit * limit - (far + near) * LESS) * squared - 2.0 * source * corner;
-    let is_long = lacking <= 0.0 || 4.0 * source_high * corner_high >= lacking * lacking;
-    is_long && 1e6 * squared > far
+    // Feet of both on the edge, times its length.
+    let (source, corner) = (0.5 * (squared + to_a * to_a - to_b * to_b), dot(a, ab));
+    let sides = to_a * to_a + dot(a, a);
+    let heights = (sides * (1.0 - CLEARLY_ACROSS) - limit * limit) * squared;
+    heights > source * source + corner * corner && 1e6 * squared > to_a * to_a
 }
 
 /// The distance of the third corner where the straight way from the source to it crosses the edge of the first two, whose ways from the
@@ -250,7 +246,7 @@ mod tests {
             ways += 1;
             seen += usize::from(is_seen);
         }
-        // Half of the limits are below the way, and many of those are seen.
-        assert!(ways > 30_000 && seen > ways / 5, "{seen} of {ways}");
+        // Some are seen without a root.
+        assert!(ways > 30_000 && seen > ways / 100, "{seen} of {ways}");
     }
 }
