@@ -246,7 +246,7 @@ fn set_if_readable(
 }
 
 /// Whether the controller has the position tracking mode, in which the axis takes a new target on the way; it is off
-/// behind. Which firmware has it is asked of the firmware.
+/// behind. The firmware itself says so.
 fn has_tracking_mode(console: &mut GalilConsole<'_>, axis: char) -> Result<bool, GalilOpenError> {
     let operand = format!("MG _PT{axis}");
     let reply = console.try_ask(&operand)?;

@@ -177,8 +177,8 @@ impl GalilOrder {
                 }
                 return match check_rates(&wanted, [speed, ac, dc], settings) {
                     Ok(rates) => {
-                        let asked = move_rates(&wanted, settings);
-                        self.tracking = asked.ok();
+                        let requested = move_rates(&wanted, settings);
+                        self.tracking = requested.ok();
                         self.send_target(made_move(&wanted, rates, settings), settings)
                     }
                     Err(why) => OrderStep::Refused(why),
@@ -281,7 +281,7 @@ fn rate_commands(axis: char, TrackingRates { speed, acceleration }: TrackingRate
     ]
 }
 
-/// Speed, acceleration and deceleration as they are read back, compared with what was asked for.
+/// Speed, acceleration and deceleration as they are read back, compared with the request.
 fn check_rates(
     wanted: &MoveTo,
     [speed, ac, dc]: [f64; 3],

@@ -77,7 +77,7 @@ pub struct GalilRig {
     wire: SharedWire,
     session: GalilSession,
     description: RigDescription,
-    /// What came later than it was asked for.
+    /// What came too late for its call.
     held: Option<RigEvent>,
 }
 
