@@ -61,7 +61,7 @@ pub struct SlaveReport {
     pub model_less_cell: ForceDifference,
     /// The handle minus the cell: the same, plus the lag of the slave.
     pub handle_less_cell: ForceDifference,
-    /// How long ago the master was where the slave is, in ms, while it is more than a pulse from it; none if it never is.
+    /// How long ago the master was where the slave is, in ms, while the slave is more than a pulse behind; none if it never is.
     pub lag_ms: Option<LagSpread>,
     /// How far the slave is from the master, in mm.
     pub lag_mm: LagSpread,
@@ -110,6 +110,14 @@ impl DifferenceSums {
     }
 }
 
+/// Where both were at one time, in mm.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    at: Nanos,
+    master: f64,
+    slave: f64,
+}
+
 #[derive(Debug)]
 pub(super) struct SlaveMeter {
     body: ModifiedKelvin,
@@ -124,7 +132,7 @@ pub(super) struct SlaveMeter {
     handle_less_cell: DifferenceSums,
     at: Option<Nanos>,
     lag_at: Option<Nanos>,
-    places: VecDeque<(Nanos, f64)>,
+    places: VecDeque<Places>,
     lags_mm: Vec<f32>,
     lags_ms: Vec<f32>,
     samples: u64,
@@ -193,27 +201,42 @@ impl SlaveMeter {
         }
     }
 
-    /// Where the master was when it was where the slave is now: the last time it passed that place.
+    /// Takes how far apart they are, and how long ago the master last passed the place of a slave that is behind.
     fn take_lag(&mut self, sample: &SlaveSample, master: f64) {
         if self.places.len() == PLACES_MAX {
             self.places.pop_front();
         }
-        self.places.push_back((sample.at, master));
+        let slave = sample.depth.0;
+        self.places.push_back(Places { at: sample.at, master, slave });
         if self.lags_mm.len() == LAGS_MAX {
             return;
         }
-        let behind = master - sample.depth.0;
+        let behind = master - slave;
         self.lags_mm.push(behind.abs() as f32);
         // Within a pulse it is there.
         if behind.abs() <= self.mm_per_pulse {
             return;
         }
-        let mut before = self.places.iter().rev();
-        let passed = before.find(|(_, place)| (place - sample.depth.0) * behind <= 0.0);
-        if let Some((at, _)) = passed {
-            let lag: Seconds = sample.at.since(*at).seconds();
+        if let Some(at) = self.unanswered(slave, behind) {
+            let lag: Seconds = sample.at.since(at).seconds();
             self.lags_ms.push((1e3 * lag.0) as f32);
         }
+    }
+
+    /// When the master last passed `slave`; `None` if it has not, or if the slave has followed it past there since and so is
+    /// ahead now, as at a turn.
+    fn unanswered(&self, slave: f64, behind: f64) -> Option<Nanos> {
+        let [mut low, mut high] = [slave; 2];
+        for places in self.places.iter().rev() {
+            if (places.master - slave) * behind <= 0.0 {
+                let was_on_both_sides =
+                    low < slave - self.mm_per_pulse && high > slave + self.mm_per_pulse;
+                return (!was_on_both_sides).then_some(places.at);
+            }
+            low = low.min(places.slave);
+            high = high.max(places.slave);
+        }
+        None
     }
 
     pub fn report(&self) -> Option<SlaveReport> {
