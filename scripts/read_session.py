@@ -14,7 +14,7 @@ from mcap.exceptions import EndOfFile
 from mcap.records import Channel, Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-RECORD_VERSION = 3  # The newest that is known here.
+RECORD_VERSION = 4  # The newest that is known here.
 PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh "
           "check-home paused imported follow").split()
 

@@ -14,7 +14,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// 2: imported sessions, which have no rig and no limits, and whose samples may lack volts and pulses.
 ///
 /// 3: rigs may have channels of sensors, whose values are inputs.
-pub const RECORD_VERSION: u32 = 3;
+///
+/// 4: an axis may get a new target on the way to another one, the command `track`.
+pub const RECORD_VERSION: u32 = 4;
 
 /// Ticks per second of an imported session: fine enough for every digit of a file's times, and 63 bits span 106 days.
 pub const IMPORTED_TICKS_PER_S: f64 = 1e12;

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// Every version of the format that was ever released has a recorded session in `tests/sessions`. When `RECORD_VERSION`
 /// rises, record a session with the new version and add it here; the old ones stay.
-const RECORDED: [(u32, &str); 3] =
-    [(1, "ramp-hold-lab"), (2, "every-motion"), (3, "sidecar-channels")];
+const RECORDED: [(u32, &str); 4] =
+    [(1, "ramp-hold-lab"), (2, "every-motion"), (3, "sidecar-channels"), (4, "tracking-slave")];
 
 fn sessions() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions")

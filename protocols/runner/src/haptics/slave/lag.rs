@@ -118,6 +118,23 @@ struct Places {
     slave: f64,
 }
 
+/// When the master last passed the newest place of the slave; `None` if it has not, or if the slave has followed it past there
+/// since and so is ahead now, as at a turn.
+fn unanswered(places: &VecDeque<Places>, pulse_mm: f64) -> Option<Nanos> {
+    let Places { master, slave, .. } = *places.back()?;
+    let behind = master - slave;
+    let [mut low, mut high] = [slave; 2];
+    for before in places.iter().rev().skip(1) {
+        if (before.master - slave) * behind <= 0.0 {
+            let was_on_both_sides = low < slave - pulse_mm && high > slave + pulse_mm;
+            return (!was_on_both_sides).then_some(before.at);
+        }
+        low = low.min(before.slave);
+        high = high.max(before.slave);
+    }
+    None
+}
+
 #[derive(Debug)]
 pub(super) struct SlaveMeter {
     body: ModifiedKelvin,
@@ -217,26 +234,10 @@ impl SlaveMeter {
         if behind.abs() <= self.mm_per_pulse {
             return;
         }
-        if let Some(at) = self.unanswered(slave, behind) {
+        if let Some(at) = unanswered(&self.places, self.mm_per_pulse) {
             let lag: Seconds = sample.at.since(at).seconds();
             self.lags_ms.push((1e3 * lag.0) as f32);
         }
-    }
-
-    /// When the master last passed `slave`; `None` if it has not, or if the slave has followed it past there since and so is
-    /// ahead now, as at a turn.
-    fn unanswered(&self, slave: f64, behind: f64) -> Option<Nanos> {
-        let [mut low, mut high] = [slave; 2];
-        for places in self.places.iter().rev() {
-            if (places.master - slave) * behind <= 0.0 {
-                let was_on_both_sides =
-                    low < slave - self.mm_per_pulse && high > slave + self.mm_per_pulse;
-                return (!was_on_both_sides).then_some(places.at);
-            }
-            low = low.min(places.slave);
-            high = high.max(places.slave);
-        }
-        None
     }
 
     pub fn report(&self) -> Option<SlaveReport> {
@@ -267,5 +268,61 @@ impl SlaveMeter {
             damping_has: 1e3 * self.watch.device.damping,
             master_loop: None,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PULSE_MM: f64 = 0.015;
+    const PERIOD_S: f64 = 4.0;
+
+    /// Lags in ms, each millisecond of three periods, of a slave that goes as `slave` says.
+    fn lags(slave: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut places = VecDeque::new();
+        let mut lags = Vec::new();
+        for tick in 0..12_000 {
+            let t = f64::from(tick) * 1e-3;
+            let now = Places {
+                at: Nanos(u64::from(tick as u32) * 1_000_000),
+                master: master(t),
+                slave: slave(t),
+            };
+            places.push_back(now);
+            if (now.master - now.slave).abs() > PULSE_MM
+                && let Some(at) = unanswered(&places, PULSE_MM)
+            {
+                lags.push(1e3 * now.at.since(at).seconds().0);
+            }
+        }
+        lags
+    }
+
+    /// From the surface to 3 mm and back.
+    fn master(t: f64) -> f64 {
+        1.5 - 1.5 * (std::f64::consts::TAU * t / PERIOD_S).cos()
+    }
+
+    #[test]
+    fn a_slave_that_comes_later_is_behind_by_that_time() {
+        for delay in [0.02, 0.1, 0.3] {
+            let mut lags = lags(|t| master((t - delay).max(0.0)));
+            assert!(lags.len() > 8_000, "{}", lags.len());
+            lags.sort_unstable_by(f64::total_cmp);
+            // A place is passed between two milliseconds.
+            assert!((lags[lags.len() / 2] - 1e3 * delay).abs() <= 1.0);
+            assert!(*lags.last().unwrap() <= 1e3 * delay + 1.0);
+        }
+    }
+
+    #[test]
+    fn a_slave_that_is_ahead_has_no_lag() {
+        // By 20 ms, and by a pulse and a half at the turns.
+        assert_eq!(lags(|t| master(t + 0.02)), [0.0; 0]);
+        let beyond = |t: f64| 1.5 + (master(t + 0.02) - 1.5) * 1.015;
+        let worst = lags(beyond).into_iter().fold(0.0, f64::max);
+        // On the way back from beyond a turn it is behind, by less than the master needs from there: no cycle ago.
+        assert!(worst < 300.0, "{worst}");
     }
 }
