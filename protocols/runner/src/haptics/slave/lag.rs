@@ -118,19 +118,21 @@ struct Places {
     slave: f64,
 }
 
-/// When the master last passed the newest place of the slave; `None` if it has not, or if the slave has followed it past there
-/// since and so is ahead now, as at a turn.
+/// When the master last passed the newest place of the slave; `None` if it has not, or if the slave has followed it there since,
+/// has left again, and so is ahead now, as at a turn.
 fn unanswered(places: &VecDeque<Places>, pulse_mm: f64) -> Option<Nanos> {
     let Places { master, slave, .. } = *places.back()?;
     let behind = master - slave;
-    let [mut low, mut high] = [slave; 2];
+    let mut has_left = false;
     for before in places.iter().rev().skip(1) {
         if (before.master - slave) * behind <= 0.0 {
-            let was_on_both_sides = low < slave - pulse_mm && high > slave + pulse_mm;
-            return (!was_on_both_sides).then_some(before.at);
+            return Some(before.at);
         }
-        low = low.min(before.slave);
-        high = high.max(before.slave);
+        let is_there = (before.slave - slave).abs() <= pulse_mm;
+        if is_there && has_left {
+            return None;
+        }
+        has_left |= !is_there;
     }
     None
 }
@@ -278,8 +280,8 @@ mod tests {
     const PULSE_MM: f64 = 0.015;
     const PERIOD_S: f64 = 4.0;
 
-    /// Lags in ms, each millisecond of three periods, of a slave that goes as `slave` says.
-    fn lags(slave: impl Fn(f64) -> f64) -> Vec<f64> {
+    /// Lags in ms, each millisecond of three periods, of a slave behind a master.
+    fn lags(master: impl Fn(f64) -> f64, slave: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut places = VecDeque::new();
         let mut lags = Vec::new();
         for tick in 0..12_000 {
@@ -307,7 +309,7 @@ mod tests {
     #[test]
     fn a_slave_that_comes_later_is_behind_by_that_time() {
         for delay in [0.02, 0.1, 0.3] {
-            let mut lags = lags(|t| master((t - delay).max(0.0)));
+            let mut lags = lags(master, |t| master((t - delay).max(0.0)));
             assert!(lags.len() > 8_000, "{}", lags.len());
             lags.sort_unstable_by(f64::total_cmp);
             // A place is passed between two milliseconds.
@@ -318,11 +320,14 @@ mod tests {
 
     #[test]
     fn a_slave_that_is_ahead_has_no_lag() {
-        // By 20 ms, and by a pulse and a half at the turns.
-        assert_eq!(lags(|t| master(t + 0.02)), [0.0; 0]);
-        let beyond = |t: f64| 1.5 + (master(t + 0.02) - 1.5) * 1.015;
-        let worst = lags(beyond).into_iter().fold(0.0, f64::max);
-        // On the way back from beyond a turn it is behind, by less than the master needs from there: no cycle ago.
+        assert_eq!(lags(master, |t| master(t + 0.02)), [0.0; 0]);
+        // Each cycle goes 5 % less deep, so that each turn is where the master was in the cycle before.
+        let shrinking = |t: f64| master(t) * (1.0 - 0.05 * t / PERIOD_S);
+        assert_eq!(lags(shrinking, |t| shrinking(t + 0.02)), [0.0; 0]);
+        // By a pulse and a half beyond the turns.
+        let beyond = |t: f64| 1.5 + (shrinking(t + 0.02) - 1.5) * 1.015;
+        let worst = lags(shrinking, beyond).into_iter().fold(0.0, f64::max);
+        // On the way back from there it is behind, by less than the master needs from the turn to there: no cycle.
         assert!(worst < 300.0, "{worst}");
     }
 }
