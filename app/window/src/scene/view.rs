@@ -115,7 +115,11 @@ impl SceneView {
     fn fit(&mut self, rect: Rect) {
         let now = PictureShape::new([rect.width(), rect.height()].map(f64::from), self.eyes());
         self.camera = match self.shape.replace(now) {
-            None => self.camera.fitted(self.bounds(), now),
+            None => match self.hand.ground() {
+                ToolGround::Square(_) => self.camera.fitted(self.bounds(), now),
+                // An organ leaves the corners of its box free.
+                ToolGround::Mesh(mesh) => self.camera.fitted_to(mesh.points(), now),
+            },
             Some(before) if before != now => self.camera.reshaped(self.bounds(), [before, now]),
             Some(_) => self.camera,
         };

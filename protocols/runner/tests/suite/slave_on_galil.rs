@@ -153,14 +153,15 @@ fn slave_of_the_guide_is_no_further_from_its_master_than_30_ms_at_full_speed() {
     check_end(&session, "finish");
     let report = leader.lock().unwrap().report().unwrap();
     println!("{report:?}");
-    // The worst in ms says nothing: where the slave is ahead by more than a pulse, at a turn of the hand, it is the time
-    // since the hand was there the last time.
-    assert!(report.lag_ms.is_none_or(|lag| lag.median < 30.0), "{report:?}");
+    // Near a turn of the hand a single pulse takes it as long as the worst: 0.1 s at a twelfth of its speed.
+    let lag = report.lag_ms.unwrap();
+    assert!(lag.median < 30.0 && lag.worst < 100.0, "{report:?}");
     // In mm, ahead or behind, wherever it is: 30 ms at the 2 mm/s of the hand.
     assert!(report.lag_mm.median < 0.03 && report.lag_mm.worst < 0.06, "{report:?}");
     // It went to where the tissue let the hand go, and more than a target in ten milliseconds came.
     assert!(report.depth_max_mm > 7.0 && report.depth_max_mm <= 10.0, "{report:?}");
-    assert!(commands(&session, "track") > 3000, "{}", commands(&session, "track"));
+    // In 30 s the master passes 2500 pulses: there is a target for most of them.
+    assert!(commands(&session, "track") > 2000, "{}", commands(&session, "track"));
 }
 
 #[test]
