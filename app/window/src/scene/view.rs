@@ -3,7 +3,7 @@
 use super::camera::Lens;
 use super::detail::PictureDetail;
 use super::graphics::PictureGraphics;
-use super::hand::{ToolGround, ToolTarget, stylus};
+use super::hand::{ToolGround, ToolTarget};
 use super::look::{PicturedTissue, SceneLook, SeenRanges};
 use super::overlay::OverlayPainter;
 use crate::widgets::{NamedControl, quiet_ui, tokens_of};
@@ -12,6 +12,7 @@ use eframe::egui::{
     Stroke, StrokeKind, TextStyle, Ui, WidgetInfo, vec2,
 };
 use eframe::egui_wgpu::Callback;
+use palpate_haptics::scene::stylus_axis;
 use palpate_tissue_view::{
     AdapterAbilities, Camera, DetailLevel, EyeLayout, Picture, PictureShape, Probe, TissueCallback,
     Vec3,
@@ -204,7 +205,7 @@ impl SceneView {
     ) -> Result<Picture, String> {
         let surface = self.look.surface(shown.tissue).map_err(|err| err.to_string())?;
         self.seen.take(self.look.colours, shown.tissue, &surface);
-        let [length, _] = stylus(shown.turn);
+        let length = stylus_axis(shown.turn);
         let drawn = self.look.probe;
         let probe = Probe::new([0.0; 3], drawn.radius_mm(self.side_mm()))
             .and_then(|probe| probe.of_kind(drawn.kind()).with_axis(length))

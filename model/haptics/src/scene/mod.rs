@@ -21,7 +21,7 @@ pub use mesh::{HandLedMeshScene, MeshScene, MeshSceneError, MeshSceneSettings};
 pub use no_force_reason::NoForceReason;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
-pub use start::{SceneStart, StartPlace};
+pub use start::{SceneStart, StartPlace, stylus_axis};
 
 use crate::Flags;
 use crate::surface::{

@@ -90,7 +90,17 @@ impl SceneStart {
         // Where nothing is turned, a square's own path keeps its bits.
         let at = [0, 1, 2]
             .map(|axis| pose.at[axis] + (self.at[axis] - usual[axis]) + (turned[axis] - way[axis]));
-        HandPose { at, ..pose }
+        HandPose { at, turn: self.turned_stylus(pose.turn) }
+    }
+
+    /// Yaw, pitch and roll in rad of a stylus that over level tissue is held as `turn` says. Its roll about its own length is lost
+    /// where the tissue is not level.
+    fn turned_stylus(&self, turn: [f64; 3]) -> [f64; 3] {
+        if self.out == UP {
+            return turn;
+        }
+        let [x, y, z] = self.turned(stylus_axis(turn));
+        [y.atan2(x), z.clamp(-1.0, 1.0).acos(), 0.0]
     }
 
     /// A vector by the shortest turn that brings up to `out`; where that is down, about x.
@@ -107,6 +117,15 @@ impl SceneStart {
 
 fn before(place: [f64; 3], height: f64, out: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|axis| place[axis] + height * out[axis])
+}
+
+/// Unit vector from the tip of a stylus up its length, turned by yaw about z, pitch about y and roll about x, in rad.
+#[must_use]
+pub fn stylus_axis([yaw, pitch, roll]: [f64; 3]) -> [f64; 3] {
+    let (sin_y, cos_y) = yaw.sin_cos();
+    let (sin_p, cos_p) = pitch.sin_cos();
+    let (sin_r, cos_r) = roll.sin_cos();
+    [cos_y * sin_p * cos_r + sin_y * sin_r, sin_y * sin_p * cos_r - cos_y * sin_r, cos_p * cos_r]
 }
 
 #[cfg(test)]
@@ -130,7 +149,13 @@ mod tests {
                 for t in [0.0, 0.7, 1.5] {
                     let usual = path.at(t, &square);
                     let moved = start.moved(usual, &square);
-                    assert_eq!(moved.turn, usual.turn);
+                    let [held, wanted] =
+                        [stylus_axis(moved.turn), start.turned(stylus_axis(usual.turn))];
+                    // Near a pole the arc cosine loses half of the digits.
+                    assert!(
+                        (0..3).all(|axis| (held[axis] - wanted[axis]).abs() < 1e-7),
+                        "{vertex}"
+                    );
                     let way = [0, 1, 2].map(|axis| moved.at[axis] - place[axis]);
                     let [x, y, _] = square.middle();
                     let aside = [usual.at[0] - x, usual.at[1] - y, usual.at[2]];
@@ -143,6 +168,23 @@ mod tests {
         let start = SceneStart::of_square(&square);
         let usual = ScenePath::Drag.at(1.234, &square);
         assert_eq!(start.moved(usual, &square), usual);
+    }
+
+    #[test]
+    fn a_stylus_turns_about_each_axis() {
+        let quarter = std::f64::consts::FRAC_PI_2;
+        for (turn, up) in [
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+            ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, quarter, 0.0], [1.0, 0.0, 0.0]),
+            ([quarter, quarter, 0.0], [0.0, 1.0, 0.0]),
+            ([0.0, 0.0, quarter], [0.0, -1.0, 0.0]),
+        ] {
+            let axis = stylus_axis(turn);
+            assert!(axis.into_iter().zip(up).all(|(part, wanted)| (part - wanted).abs() < 1e-12));
+        }
+        let axis = stylus_axis([0.3, -1.1, 2.0]);
+        assert!((dot(axis, axis) - 1.0).abs() < 1e-12);
     }
 
     #[test]
