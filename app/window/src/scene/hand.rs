@@ -1,4 +1,4 @@
-//! Where the pointer and the keys want the tool, and how a stylus stands.
+//! Where the pointer and the keys want the tool.
 
 use super::camera::along;
 use eframe::egui::Key;

@@ -96,7 +96,9 @@ impl SceneStart {
     /// Yaw, pitch and roll in rad of a stylus that over level tissue is held as `turn` says. Its roll about its own length is lost
     /// where the tissue is not level.
     fn turned_stylus(&self, turn: [f64; 3]) -> [f64; 3] {
-        if self.out == UP {
+        // A unit vector.
+        let [_, _, up] = self.out;
+        if up >= 1.0 {
             return turn;
         }
         let [x, y, z] = self.turned(stylus_axis(turn));
