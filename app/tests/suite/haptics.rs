@@ -236,7 +236,10 @@ fn a_protocol_that_follows_is_led_by_haptics_slave_and_refused_by_run() {
     assert_refused(&alone, 2, "palpate haptics slave");
     assert!(!at.path().join("alone").exists());
     // A master without a slave is no run either.
-    let useless = typed(at.path(), "haptics slave thesis --protocol sine --time-scale max");
+    let step = "{ do = \"follow\", for = \"$for\", speed = \"6 mm/s\", depth_max = \"5 mm\" }";
+    let ramp = "{ do = \"ramp\", speed = \"3 mm/s\", depth = \"3 mm\" },\n  { do = \"hold\", for = \"$for\" }";
+    std::fs::write(at.path().join("ramp.toml"), text.replace(step, ramp)).unwrap();
+    let useless = typed(at.path(), "haptics slave thesis --protocol ramp.toml --time-scale max");
     assert_refused(&useless, 2, "no step 'follow'");
     let both = typed(at.path(), "haptics slave thesis --protocol follow.toml --seconds 3");
     assert_eq!(both.status.code(), Some(2), "{}", stderr(&both));
