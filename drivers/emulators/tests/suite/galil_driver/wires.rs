@@ -107,10 +107,15 @@ impl Runner {
         }
     }
 
-    /// The same, but the link may be lost: on a computer with much else to do the controller answers too late.
+    /// The same, but the link may be lost: on a computer with much else to do the controller answers too late, or its line loses
+    /// bytes.
     pub fn until_late(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) -> Result<(), String> {
         let is_lost = |runner: &Self| {
-            runner.faults().iter().any(|fault| matches!(fault, Fault::LinkLost { .. }))
+            runner.faults().iter().any(|fault| match fault {
+                Fault::LinkLost { .. } => true,
+                Fault::CommandRefused { detail } => detail.contains("was garbled"),
+                _ => false,
+            })
         };
         self.until(what, |runner| is_so(runner) || is_lost(runner));
         if is_so(self) { Ok(()) } else { Err(format!("{what}: {:?}", self.faults())) }
