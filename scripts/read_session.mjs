@@ -8,7 +8,7 @@ import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { decompress } from "fzstd";
 
 const decompressHandlers = { zstd: (data, size) => decompress(data, new Uint8Array(Number(size))) };
-const RECORD_VERSION = 3; // The newest that is known here.
+const RECORD_VERSION = 4; // The newest that is known here.
 const PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh " +
   "check-home paused imported follow").split(" ");
 

@@ -130,9 +130,9 @@ fn a_slave_on_wires_follows_a_master_in_real_time() {
     println!("{slaved:?}");
     let deepest = deepest_followed(&session);
     assert!(deepest > 1.0, "{deepest}");
-    // A move of the hand's 3.8 mm/s takes a quarter of a second, and more on a busy computer.
-    let lag = slaved.lag_ms.unwrap().median;
-    assert!(lag > 50.0, "{lag}");
+    // The controller takes targets on the way: from rest to rest there would be four a second.
+    let targets = session.entries.iter().filter(|entry| entry.body["command"] == "track").count();
+    assert!(targets > 100, "{targets}");
     let lost = session.entries.iter();
     let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
     assert_eq!(lost.count(), 0);

@@ -98,7 +98,18 @@ impl SceneView {
 
     pub fn reset(&mut self) {
         self.camera = first_camera(self.hand.ground());
-        self.shape = None;
+        if let Some(shape) = self.shape {
+            self.camera = self.fitted(shape);
+        }
+    }
+
+    /// The camera from which all of the tissue is in a picture of this shape.
+    fn fitted(&self, shape: PictureShape) -> Camera {
+        match self.hand.ground() {
+            ToolGround::Square(_) => self.camera.fitted(self.bounds(), shape),
+            // An organ leaves the corners of its box free.
+            ToolGround::Mesh(mesh) => self.camera.fitted_to(mesh.points(), shape),
+        }
     }
 
     /// The box of what is drawn, lowest and highest corner in mm: of a square with its sides.
@@ -116,11 +127,7 @@ impl SceneView {
     fn fit(&mut self, rect: Rect) {
         let now = PictureShape::new([rect.width(), rect.height()].map(f64::from), self.eyes());
         self.camera = match self.shape.replace(now) {
-            None => match self.hand.ground() {
-                ToolGround::Square(_) => self.camera.fitted(self.bounds(), now),
-                // An organ leaves the corners of its box free.
-                ToolGround::Mesh(mesh) => self.camera.fitted_to(mesh.points(), now),
-            },
+            None => self.fitted(now),
             Some(before) if before != now => self.camera.reshaped(self.bounds(), [before, now]),
             Some(_) => self.camera,
         };

@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn packets_are_those_of_haplys_package() {
-        // Written by HaplyHAPI 1.0.1 on a port that keeps its bytes.
+        // Written by `HaplyHAPI` 1.0.1 on a port that keeps its bytes.
         let mut packet = Vec::new();
         write_setup(&mut packet, &BoardSetup::default());
         assert_eq!(hex(&packet), "0105030101030101000000004041008098450000284300809845");

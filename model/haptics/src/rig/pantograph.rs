@@ -167,7 +167,7 @@ mod tests {
 
     #[test]
     fn places_and_torques_are_those_of_haplys_package() {
-        // Angles in degrees; place in m and torques in N m of 0.5 N along x and -1.25 N along y, computed by HaplyHAPI 1.0.1.
+        // Angles in degrees; place in m and torques in N m of 0.5 N along x and -1.25 N along y, computed by `HaplyHAPI` 1.0.1.
         let cases = [
             (
                 [168.0, 12.0],
