@@ -405,6 +405,17 @@ mod tests {
         let mesh = MeshTissue::of(&file).unwrap().unwrap();
         assert_eq!(mesh.models, vec![elastic_model(&file.body); 256]);
         // Half of a diagonal of 4 mm steps.
-        assert_is_a_poke(2.83, || TissueScene::of(&file, Some(&mesh)).unwrap());
+        let scene = || TissueScene::of(&file, Some(&mesh)).unwrap();
+        assert_is_a_poke(2.83, scene);
+        let poke = compute_path(scene(), ScenePath::Poke, &mut |_| true).unwrap();
+        let ShownTissue::Mesh(sunk) = poke.deepest.tissue else { panic!("it is a mesh") };
+        // The pad is level, so a vertex is as far below zero as it has sunk, over its own place.
+        assert!(!sunk.is_empty());
+        for one in sunk {
+            let [x, y, z] = one.place;
+            let (column, row) = (one.vertex % 16, one.vertex / 16);
+            assert_eq!([x, y], [4.0 * f64::from(column), 4.0 * f64::from(row)]);
+            assert!((z + one.depth).abs() < 1e-9, "{one:?}");
+        }
     }
 }
