@@ -103,6 +103,15 @@ impl FieldData {
         Ok(self)
     }
 
+    /// The same where all of it is at height zero at rest.
+    #[must_use]
+    pub fn with_level_rest(mut self) -> Self {
+        for both in &mut self.heights {
+            both[1] = -both[0];
+        }
+        self
+    }
+
     /// With a number for each node that colours stand for: a force, a stress, a stiffness.
     pub fn with_values(mut self, values: Vec<f32>) -> Result<Self, SurfaceError> {
         check_count("values", values.len(), self.heights.len())?;
@@ -197,6 +206,9 @@ mod tests {
         let field = field.with_rest(&[1.0, 1.0, 0.0, 0.0]).unwrap().with_depth_as_values();
         assert_eq!(field.values, [0.0, 1.0, 2.0, -0.5]);
         assert_eq!(field.extent(), [0.5, 0.5]);
+        let field = FieldData::new(2, 0.5, &[1.0, 0.0, -2.0, 0.5]).unwrap();
+        let level = field.clone().with_level_rest();
+        assert_eq!(level, field.with_rest(&[0.0; 4]).unwrap());
     }
 
     #[test]

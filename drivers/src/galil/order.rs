@@ -104,7 +104,11 @@ impl GalilOrder {
                 }
                 Ok(rates) => {
                     let mut commands = rate_commands(a, rates);
-                    commands.insert(0, format!("PT{a}=1"));
+                    if self.tracking.is_none() {
+                        // A target that a stop left behind must not count when the mode begins.
+                        commands.push(format!("PA{a}={}", settings.sign() * wanted.target_pulses));
+                    }
+                    commands.push(format!("PT{a}=1"));
                     commands.push(format!("MG _PT{a},_SP{a},_AC{a},_DC{a}"));
                     commands
                 }

@@ -170,10 +170,10 @@ impl SceneLook {
     /// The tissue where it is, and what the colours stand for.
     pub fn surface(&self, shown: PicturedTissue) -> Result<SurfaceData, SurfaceError> {
         match shown {
-            PicturedTissue::Square { now, rest, model } => {
+            PicturedTissue::Square { now, model } => {
                 let grid = now.grid();
                 let field =
-                    FieldData::new(grid.columns(), grid.spacing(), now.all())?.with_rest(rest)?;
+                    FieldData::new(grid.columns(), grid.spacing(), now.all())?.with_level_rest();
                 Ok(SurfaceData::Field(match (self.colours, self.colours.quantity()) {
                     (_, Some(quantity)) => field.with_model_as_values(quantity, &model),
                     (SceneColours::Tissue, None) => field,
@@ -210,8 +210,8 @@ impl SceneLook {
 /// The tissue of a picture.
 #[derive(Clone, Copy, Debug)]
 pub enum PicturedTissue<'a> {
-    /// Heights now and at rest, in mm.
-    Square { now: Heights<'a>, rest: &'a [f64], model: ElasticModel },
+    /// Heights in mm; at rest they are zero.
+    Square { now: Heights<'a>, model: ElasticModel },
     /// What of a mesh is not at rest.
     Mesh { tissue: &'a MeshTissue, sunk: &'a [SunkVertex] },
 }
@@ -220,10 +220,7 @@ impl PicturedTissue<'_> {
     /// The deepest place below rest, in mm.
     fn deepest(&self) -> f64 {
         match self {
-            Self::Square { now, rest, .. } => {
-                let depths = now.all().iter().zip(*rest).map(|(height, rest)| rest - height);
-                depths.fold(0.0, f64::max)
-            }
+            Self::Square { now, .. } => now.all().iter().map(|height| -height).fold(0.0, f64::max),
             Self::Mesh { sunk, .. } => sunk.iter().map(|one| one.depth).fold(0.0, f64::max),
         }
     }
@@ -286,7 +283,7 @@ mod tests {
         let mut heights = [0.0; 9];
         heights[4] = -deep;
         let now = Heights::new(grid, &heights).unwrap();
-        take(PicturedTissue::Square { now, rest: &[0.0; 9], model: MODEL });
+        take(PicturedTissue::Square { now, model: MODEL });
     }
 
     fn seen(look: &SceneLook, depths: &[f64]) -> SeenRanges {

@@ -349,7 +349,6 @@ mod tests {
         let shown = ScenePicture {
             tissue: PicturedTissue::Square {
                 now: Heights::new(grid, &heights).unwrap(),
-                rest: &heights,
                 model: ElasticModel::default(),
             },
             device: view.hand().at(),

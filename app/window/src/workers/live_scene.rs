@@ -10,6 +10,7 @@ use palpate_haptics::margin::{LoopDevice, Margin, MarginSettings};
 use palpate_haptics::scene::{HandPose, ScenePath, SceneSettings, SceneTick};
 use palpate_haptics::{LawSettings, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_runner::haptics::scene::SceneRecorder;
 use palpate_runner::haptics::timing::LoopTiming;
 use palpate_runner::haptics::{LoopScene, SceneLoop};
@@ -43,16 +44,26 @@ pub fn force_of(tick: &SceneTick) -> f64 {
     x.hypot(y).hypot(z)
 }
 
-/// The margin of a scene's loop through `device` where it is now.
+/// The margin of a scene's loop through `device` where it is now: that of the material that needs the most damping.
 #[must_use]
-pub fn margin_of(settings: &SceneSettings, device: LoopDevice, tick: &SceneTick) -> Margin {
-    let watch = MarginSettings {
-        body: LawSettings::of(settings.body, settings.period).body,
-        scheme: settings.scheme,
-        period: settings.period,
-        device,
+pub fn margin_of(
+    settings: &SceneSettings,
+    bodies: &[ModifiedKelvin],
+    device: LoopDevice,
+    tick: &SceneTick,
+) -> Margin {
+    let of = |body: ModifiedKelvin| {
+        let watch = MarginSettings {
+            body: LawSettings::of(body, settings.period).body,
+            scheme: settings.scheme,
+            period: settings.period,
+            device,
+        };
+        watch.at(Depth(tick.depth), MmPerS(tick.speed))
     };
-    watch.at(Depth(tick.depth), MmPerS(tick.speed))
+    let needs = |one: &Margin, other: &Margin| one.needed.total_cmp(&other.needed);
+    let worst = bodies.iter().copied().map(of).max_by(needs);
+    worst.unwrap_or_else(|| of(settings.body))
 }
 
 /// The simulated device of a scene in its loop: nothing delays it.
@@ -378,6 +389,21 @@ mod tests {
     fn a_computed_poke_is_as_deep_as_the_hand_and_ends_above() {
         let file = SceneFile { nodes: Some(41), slope: 1.0, ..SceneFile::default() };
         assert_is_a_poke(1.5, || TissueScene::of(&file, None).unwrap());
+    }
+
+    #[test]
+    fn the_margin_is_that_of_the_material_that_needs_the_most() {
+        let settings = SceneSettings::default();
+        let soft = settings.body;
+        let hard = ModifiedKelvin { mu: soft.mu.map(|mu| 5.0 * mu), ..soft };
+        let tick = SceneTick { depth: 1.0, ..SceneTick::default() };
+        let of = |bodies: &[ModifiedKelvin]| {
+            margin_of(&settings, bodies, simulated_loop(&settings), &tick).needed
+        };
+        assert!(of(&[hard]) > of(&[soft]));
+        for bodies in [[soft, hard], [hard, soft]] {
+            assert_eq!(of(&bodies), of(&[hard]));
+        }
     }
 
     #[test]

@@ -1,18 +1,18 @@
 //! The tissue of a scene in the window: a square of heights, or a mesh with what its pictures need.
 
 use palpate_analysis::scene_mesh::ReadMesh;
-use palpate_haptics::scene::{MeshScene, Scene, SceneTick};
+use palpate_haptics::scene::{MeshScene, Scene, SceneSettings, SceneStart, SceneTick};
 use palpate_haptics::surface::{Grid, MeshError};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_runner::haptics::scene_file::SceneFile;
-use palpate_runner::haptics::{MeshFrame, SceneFrame, SunkVertex};
+use palpate_runner::haptics::{LoopScene, MeshFrame, SceneFrame, SunkVertex};
 use palpate_tissue_view::{ElasticModel, MeshShape};
 
 /// The tissue of a scene at one moment.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShownTissue {
     /// Heights in mm; at rest they are zero.
-    Square { grid: Grid, heights: Vec<f64>, rest: Vec<f64> },
+    Square { grid: Grid, heights: Vec<f64> },
     /// What of the mesh is not at rest.
     Mesh(Vec<SunkVertex>),
 }
@@ -60,6 +60,22 @@ pub enum TissueScene {
 }
 
 impl TissueScene {
+    /// Where it begins.
+    pub fn start(&self) -> SceneStart {
+        match self {
+            Self::Square(scene) => LoopScene::start(&**scene),
+            Self::Mesh(scene) => LoopScene::start(&**scene),
+        }
+    }
+
+    /// Device, loop and guards, and the size of a square.
+    pub fn settings(&self) -> &SceneSettings {
+        match self {
+            Self::Square(scene) => LoopScene::settings(&**scene),
+            Self::Mesh(scene) => LoopScene::settings(&**scene),
+        }
+    }
+
     /// Of a file, at rest.
     pub fn of(file: &SceneFile, mesh: Option<&MeshTissue>) -> Result<Self, String> {
         match mesh {
@@ -85,8 +101,6 @@ impl ShownFrame for SceneFrame {
         Ok(ShownTissue::Square {
             grid: Grid::new(self.nodes, self.nodes, spacing)?,
             heights: self.heights.iter().copied().map(f64::from).collect(),
-            // A scene's square is flat at rest.
-            rest: vec![0.0; self.heights.len()],
         })
     }
 }

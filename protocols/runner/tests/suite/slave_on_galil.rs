@@ -153,9 +153,10 @@ fn slave_of_the_guide_is_no_further_from_its_master_than_30_ms_at_full_speed() {
     check_end(&session, "finish");
     let report = leader.lock().unwrap().report().unwrap();
     println!("{report:?}");
-    // Near a turn of the hand a single pulse takes it as long as the worst: 0.1 s at a twelfth of its speed.
+    // At a turn the hand accelerates by v^2 over its amplitude of 5 mm: a pulse from there takes it sqrt(2 pulse / 0.8 mm/s^2).
+    let turn_ms = 1e3 * (2.0 * PULSE / 0.8).sqrt();
     let lag = report.lag_ms.unwrap();
-    assert!(lag.median < 30.0 && lag.worst < 100.0, "{report:?}");
+    assert!(lag.median < 30.0 && lag.worst < turn_ms, "{report:?}");
     // In mm, ahead or behind, wherever it is: 30 ms at the 2 mm/s of the hand.
     assert!(report.lag_mm.median < 0.03 && report.lag_mm.worst < 0.06, "{report:?}");
     // It went to where the tissue let the hand go, and more than a target in ten milliseconds came.

@@ -112,9 +112,7 @@ impl SceneScreen {
         };
         let tissue = match (heights, &instant.tissue, &self.viewed) {
             (Err(reason), ..) => return alarm_ui(ui, reason.to_string()),
-            (Ok(Some(now)), ShownTissue::Square { rest, .. }, _) => {
-                PicturedTissue::Square { now, rest, model: elastic_model(&body) }
-            }
+            (Ok(Some(now)), ..) => PicturedTissue::Square { now, model: elastic_model(&body) },
             (Ok(_), ShownTissue::Mesh(sunk), ViewedTissue::Mesh(tissue)) => {
                 PicturedTissue::Mesh { tissue, sunk }
             }

@@ -26,6 +26,7 @@ use palpate_analysis::scene_device::{DeviceReport, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
 use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::scene::{HandPose, SceneSettings};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_runner::haptics::scene::{COLUMNS, SENSED_COLUMNS, SceneRecorder};
 use palpate_runner::haptics::scene_file::SceneFile;
 use plan::PlannedScene;
@@ -82,10 +83,6 @@ enum ViewedTissue {
 }
 
 impl ViewedTissue {
-    fn of(settings: &SceneSettings, mesh: Option<&Arc<MeshTissue>>) -> Self {
-        mesh.map_or(Self::Square(settings.side_mm), |mesh| Self::Mesh(Arc::clone(mesh)))
-    }
-
     fn is(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Square(one), Self::Square(other)) => one.to_bits() == other.to_bits(),
@@ -99,6 +96,8 @@ impl ViewedTissue {
 struct SeenScene<'a> {
     settings: &'a SceneSettings,
     instant: &'a SceneInstant,
+    /// Of each material.
+    bodies: Vec<ModifiedKelvin>,
     device: LoopDevice,
 }
 
@@ -153,6 +152,7 @@ impl SceneScreen {
     fn compute_verdict(&self) -> Result<(), String> {
         require(!self.is_running(), "the scene runs")?;
         require(!self.opening.is_busy(), OPENING)?;
+        require(!self.reading.is_busy(), "the scene file is being read")?;
         self.form.settings().map(|_| ())
     }
 
@@ -162,7 +162,7 @@ impl SceneScreen {
 
     /// Reads the file that is named, on a thread: a body may have to be fitted.
     fn read(&mut self, ctx: &Context) {
-        if self.is_running() {
+        if self.is_running() || self.opening.is_busy() {
             return;
         }
         let named = self.form.file.trim().to_owned();
@@ -176,14 +176,17 @@ impl SceneScreen {
     /// Computes the scene of the form along its path.
     fn compute(&mut self, ctx: &Context) {
         let Ok(file) = self.form.scene_file() else { return };
-        let (path, mesh) = (self.form.path(), self.mesh.clone());
-        if let Err(reason) = self.look_at(&file) {
-            self.refusal = Some(reason);
-            return;
-        }
+        let scene = match TissueScene::of(&file, self.mesh.as_deref()) {
+            Ok(scene) => scene,
+            Err(reason) => {
+                self.refusal = Some(reason);
+                return;
+            }
+        };
+        self.look_at(&scene);
         self.side = PictureSource::Computed;
+        let path = self.form.path();
         self.computed.start("scene-path", ctx, move |progress| {
-            let scene = TissueScene::of(&file, mesh.as_deref())?;
             compute_path(scene, path, &mut |share| progress.share(share, "the path"))
         });
     }
@@ -217,8 +220,8 @@ impl SceneScreen {
                     SENSED_COLUMNS
                 }
             };
-            self.look_at(&file)?;
             let scene = TissueScene::of(&file, self.mesh.as_deref())?;
+            self.look_at(&scene);
             let text = file.text();
             let begin = |folder: &Path| SceneRecorder::start(folder, &text, columns);
             let recorder = self.tape.begin(ctx, begin)?;
@@ -240,20 +243,26 @@ impl SceneScreen {
     }
 
     /// Looks at the tissue of a scene from the start, where it is not the one in the picture.
-    fn look_at(&mut self, file: &SceneFile) -> Result<(), String> {
-        let settings = file.settings(SceneSettings::default().nodes)?;
-        let tissue = ViewedTissue::of(&settings, self.mesh.as_ref());
-        if !tissue.is(&self.viewed) {
-            self.view.take_tissue(match &self.mesh {
-                None => ToolTarget::above([settings.side_mm; 2]),
-                Some(mesh) => {
-                    let scene = mesh.read.scene(file)?;
-                    ToolTarget::over(Arc::clone(&mesh.read.mesh), scene.start())
-                }
-            });
-            self.viewed = tissue;
+    fn look_at(&mut self, scene: &TissueScene) {
+        let side_mm = scene.settings().side_mm;
+        let tissue = self
+            .mesh
+            .as_ref()
+            .map_or(ViewedTissue::Square(side_mm), |mesh| ViewedTissue::Mesh(Arc::clone(mesh)));
+        if tissue.is(&self.viewed) {
+            return;
         }
-        Ok(())
+        self.view.take_tissue(match &tissue {
+            ViewedTissue::Square(side_mm) => ToolTarget::above([*side_mm; 2]),
+            ViewedTissue::Mesh(mesh) => {
+                ToolTarget::over(Arc::clone(&mesh.read.mesh), scene.start())
+            }
+        });
+        self.viewed = tissue;
+    }
+
+    fn bodies(&self, settings: &SceneSettings) -> Vec<ModifiedKelvin> {
+        self.mesh.as_ref().map_or_else(|| vec![settings.body], |mesh| mesh.read.bodies.clone())
     }
 
     /// What is on the screen: the scene that runs or ran, or the computed path.
@@ -262,11 +271,13 @@ impl SceneScreen {
             (PictureSource::Live, Some(live), _) => Some(SeenScene {
                 settings: live.settings(),
                 instant: live.moment(),
+                bodies: self.bodies(live.settings()),
                 device: live.loop_device(),
             }),
             (PictureSource::Computed, _, Some(Ok(computed))) => Some(SeenScene {
                 settings: &computed.settings,
                 instant: &computed.deepest,
+                bodies: self.bodies(&computed.settings),
                 device: simulated_loop(&computed.settings),
             }),
             _ => None,
@@ -334,6 +345,9 @@ impl Screen for SceneScreen {
             match self.reading.take_answer() {
                 Some(Ok(ReadScene { file, notes, mesh })) => {
                     self.refusal = None;
+                    // What was computed or ran was of other tissue.
+                    self.live = None;
+                    self.computed = BackgroundTask::default();
                     self.mesh = mesh.map(Arc::new);
                     self.form.fill(file, notes);
                     self.compute(ctx);

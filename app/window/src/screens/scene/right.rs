@@ -43,7 +43,7 @@ fn guard_ui(ui: &mut Ui, seen: &SeenScene<'_>) {
     let tokens = tokens_of(ui);
     section_ui(ui, "Margin and guard");
     if tick.is_contact() {
-        let margin = margin_text(&margin_of(settings, seen.device, tick));
+        let margin = margin_text(&margin_of(settings, &seen.bodies, seen.device, tick));
         ui.add(Label::new(margin).wrap());
     } else {
         ui.label("no margin without contact");
@@ -68,8 +68,10 @@ fn device_ui(ui: &mut Ui, device: &PlayedDevice) {
     section_ui(ui, "Device");
     let used = device.used();
     fact_ui(ui, "now", used.stop);
-    let counts =
-        format!("{} reports, {} impossible, {} losses", used.reports, used.faults, used.losses);
+    let counts = format!(
+        "{} reports, {} of them impossible; lost {} times",
+        used.reports, used.faults, used.losses
+    );
     fact_ui(ui, "connection", counts);
     for line in device_lines(&device.report) {
         small_ui(ui, line);

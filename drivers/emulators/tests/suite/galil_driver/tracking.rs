@@ -80,6 +80,10 @@ fn target_replaces_the_one_on_the_way_in_one_line_and_the_path_is_believed() {
         assert_eq!(host.faults, []);
         let bench = lines(&host);
         assert!(bench.contains("PTA=1") && bench.contains("PTA=0;SPA"), "{bench}");
+        // When the mode begins, the target is the new one, whatever a stop left behind.
+        let begun = &bench[..bench.find("PTA=1").unwrap()];
+        let target = begun.rfind("PAA=").unwrap();
+        assert!(begun[target..].starts_with("PAA=2000"), "{bench}");
     }
 }
 
