@@ -345,9 +345,11 @@ impl Screen for SceneScreen {
             match self.reading.take_answer() {
                 Some(Ok(ReadScene { file, notes, mesh })) => {
                     self.refusal = None;
-                    // What was computed or ran was of other tissue.
-                    self.live = None;
                     self.computed = BackgroundTask::default();
+                    // What ran on a mesh cannot be drawn on another.
+                    if self.mesh.is_some() || mesh.is_some() {
+                        self.live = None;
+                    }
                     self.mesh = mesh.map(Arc::new);
                     self.form.fill(file, notes);
                     self.compute(ctx);

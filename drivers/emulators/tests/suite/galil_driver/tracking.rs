@@ -83,7 +83,8 @@ fn target_replaces_the_one_on_the_way_in_one_line_and_the_path_is_believed() {
         // When the mode begins, the target is the new one, whatever a stop left behind.
         let begun = &bench[..bench.find("PTA=1").unwrap()];
         let target = begun.rfind("PAA=").unwrap();
-        assert!(begun[target..].starts_with("PAA=2000"), "{bench}");
+        let first = if is_reversed { "PAA=-2000" } else { "PAA=2000" };
+        assert!(begun[target..].starts_with(first), "{bench}");
     }
 }
 
