@@ -3,7 +3,7 @@
 use palpate_drivers::wire::DeviceAddress;
 use palpate_haptic_devices::inverse::DeadMan;
 use palpate_haptic_devices::{
-    DeviceMonitor, HapiDevice, HapiOptions, InverseDevice, InverseOptions, LinkReport, RoundTrip,
+    DeviceMonitor, HapiOptions, InverseOptions, LinkReport, open_hapi, open_inverse,
 };
 use palpate_haptics::HapticDevice;
 use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
@@ -145,68 +145,39 @@ pub fn open_device(
     choice: &DeviceChoice,
     scene: &SceneToTouch,
 ) -> Result<(OpenDevice, DeviceReport), String> {
-    match choice {
+    let SceneToTouch { settings, start, .. } = scene;
+    let (device, description, warnings) = match choice {
         DeviceChoice::Inverse { address, name, dead_man } => {
             let options = InverseOptions {
                 address: *address,
                 device: name.clone(),
                 dead_man: *dead_man,
-                ..InverseOptions::new(scene.start.place, scene.settings.period)
+                ..InverseOptions::new(start.place, settings.period)
             };
-            open_inverse(&options, scene)
+            let (device, found) =
+                open_inverse(&options, driver_clock()).map_err(|err| err.to_string())?;
+            let grip = found.grip.map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
+            let description = format!("device {}, {grip}, service {}", found.name, found.version);
+            (device, description, Vec::new())
         }
         DeviceChoice::Hapi(address) => {
-            let options =
-                HapiOptions::new(address.clone(), scene.start.place, scene.settings.period);
-            open_hapi(&options, scene)
+            let options = HapiOptions::new(address.clone(), start.place, settings.period);
+            let device = open_hapi(&options, driver_clock()).map_err(|err| err.to_string())?;
+            (device, format!("2DIY at {address}"), HAPI_WARNINGS.to_vec())
         }
-    }
-}
-
-fn open_inverse(
-    options: &InverseOptions,
-    scene: &SceneToTouch,
-) -> Result<(OpenDevice, DeviceReport), String> {
-    let device = InverseDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
-    let found = device.found();
-    let grip = found.grip.as_ref().map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
-    let description = format!("device {}, {grip}, service {}", found.name, found.version);
-    let looped = device.loop_device();
-    let report = judge(description, &device.round_trip(), looped, scene);
-    let monitor = device.monitor();
-    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
-}
-
-fn open_hapi(
-    options: &HapiOptions,
-    scene: &SceneToTouch,
-) -> Result<(OpenDevice, DeviceReport), String> {
-    let device = HapiDevice::open(options, driver_clock()).map_err(|err| err.to_string())?;
-    let description = format!("2DIY at {}", device.port());
-    let looped = device.loop_device();
-    let report = judge(description, &device.round_trip(), looped, scene);
-    let report = DeviceReport { warnings: HAPI_WARNINGS.to_vec(), ..report };
-    let monitor = device.monitor();
-    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
-}
-
-/// The margin of a scene on a device.
-fn judge(
-    description: String,
-    trip: &RoundTrip,
-    looped: LoopDevice,
-    scene: &SceneToTouch,
-) -> DeviceReport {
-    let margin = worst_margin(&scene.settings, &scene.bodies, looped);
-    DeviceReport {
+    };
+    let (trip, looped, monitor) = (device.round_trip(), device.loop_device(), device.monitor());
+    let margin = worst_margin(settings, &scene.bodies, looped);
+    let report = DeviceReport {
         description,
-        warnings: Vec::new(),
+        warnings,
         round_trip_median_ms: 1e3 * trip.median.seconds().0,
         round_trip_p99_ms: 1e3 * trip.p99.seconds().0,
         delay_ticks: looped.delay_ticks,
         sentences: margin.sentences(),
         margin,
-    }
+    };
+    Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
 }
 
 /// The margin of the material that needs the most damping of the device.

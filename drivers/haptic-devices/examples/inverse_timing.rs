@@ -12,7 +12,7 @@ use palpate_emulators::ServedDevice;
 use palpate_emulators::inverse::{
     EmulatedInverse, InverseFault, InverseLie, InversePanel, InverseServiceSettings,
 };
-use palpate_haptic_devices::{ForceLimits, InverseDevice, InverseOptions};
+use palpate_haptic_devices::{ForceLimits, InverseOptions, LinkedDevice, open_inverse};
 use palpate_haptics::scene::{Scene, SceneSettings};
 use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
@@ -64,7 +64,7 @@ fn time_ticks(
     clock: &HostClock,
     seconds: u64,
 ) -> Result<(), Box<dyn Error>> {
-    let mut device = InverseDevice::open(options, clock.clone())?;
+    let (mut device, _) = open_inverse(options, clock.clone())?;
     let found = device.round_trip();
     println!(
         "round trip at the start: median {:.3}, p99 {:.3}, max {:.3} ms of {}",
@@ -110,12 +110,12 @@ enum Case {
 
 /// One fault: time from it to zero force on the emulated hand.
 fn time_fault(
-    device: &mut InverseDevice,
+    device: &mut LinkedDevice,
     panel: &InversePanel,
     (case, random): (Case, &mut Random),
 ) -> Result<f64, Box<dyn Error>> {
     let mut beat = Beat::new();
-    let mut ticks = |device: &mut InverseDevice, count: u64| {
+    let mut ticks = |device: &mut LinkedDevice, count: u64| {
         for _ in 0..count {
             beat.wait();
             device.sense(1);
@@ -180,7 +180,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     time_ticks(&options, &clock, seconds)?;
 
     let limits = ForceLimits { ramp: Nanos::from_millis(20), ..options.limits };
-    let mut device = InverseDevice::open(&InverseOptions { limits, ..options }, clock.clone())?;
+    let (mut device, _) = open_inverse(&InverseOptions { limits, ..options }, clock.clone())?;
     let mut random = Random::new(1, RandomStream::Fault);
     for kind in ["the scene stops", "link cut", "stalled", "lying"] {
         let (mut times, mut in_time) = (Vec::new(), 0_u64);

@@ -15,10 +15,12 @@ mod hand_over;
 pub mod hapi;
 mod http;
 pub mod inverse;
+mod linked;
 
 pub use figures::{DeviceFigures, RoundTrip};
 pub use fit::{DeviceAxis, FitError, WorkspaceFit};
 pub use gate::{ForceGate, ForceLimits, ForceStop};
 pub use hand_over::{DeviceMonitor, LinkReport, NO_POSE, SensedPose};
-pub use hapi::{HapiDevice, HapiError, HapiOptions};
-pub use inverse::{InverseDevice, InverseError, InverseOptions};
+pub use hapi::{HapiError, HapiOptions, open_hapi};
+pub use inverse::{InverseError, InverseOptions, open_inverse};
+pub use linked::LinkedDevice;

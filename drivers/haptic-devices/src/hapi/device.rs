@@ -5,13 +5,13 @@ use super::message::{BoardSetup, write_first, write_zero};
 use crate::figures::{DeviceFigures, RoundTrip};
 use crate::fit::{DeviceAxis, FitError, WorkspaceFit};
 use crate::gate::ForceLimits;
-use crate::hand_over::{DeviceMonitor, SceneEnd, ThreadEnd, hand_over};
+use crate::hand_over::{ThreadEnd, hand_over};
+use crate::linked::LinkedDevice;
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::wire::{DeviceAddress, HostClock, Link, WireError};
-use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::rig::Pantograph;
-use palpate_haptics::scene::{DeviceSettings, Pose};
-use palpate_haptics::{HapticDevice, Period, SettingError};
+use palpate_haptics::scene::DeviceSettings;
+use palpate_haptics::{Period, SettingError};
 use palpate_model::Nanos;
 use std::io;
 use std::thread::sleep;
@@ -106,80 +106,26 @@ pub enum HapiError {
     Figures(#[from] SettingError),
 }
 
-/// A 2DIY in use. Dropping it sends zero torque and closes the port.
-#[derive(Debug)]
-pub struct HapiDevice {
-    scene: SceneEnd,
-    port: String,
-    round_trip: RoundTrip,
-    loop_device: LoopDevice,
-}
-
-impl HapiDevice {
-    /// Sets the board up, which takes the arm's place for its home; measures the delay with zero force, and starts the thread.
-    pub fn open(options: &HapiOptions, clock: HostClock) -> Result<Self, HapiError> {
-        let fit = options.fit.checked()?;
-        let device = options.figures.device;
-        let force_max_n = device.force_max_n.min(options.limits.force_max_n);
-        let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
-        let limits = ForceLimits { force_max_n, ..options.limits };
-        let port = options.address.to_string();
-        let mut opened = Opened { link: Port(options.address.open()?), clock, port };
-        let fresh = || {
-            let board = (options.linkage, options.setup);
-            Exchange::new(board, fit, options.middle, limits)
-        };
-        let mut exchange = opened.set_up(&options.setup, fresh)?;
-        let round_trip = opened.measure(&mut exchange, &limits)?;
-        let Opened { link, clock, port } = opened;
-        let (mut scene, thread) = hand_over(settings, options.period, clock);
-        let board = Board { address: options.address.clone(), exchange, scene: thread };
-        scene.start(move || board.run(link)).map_err(HapiError::Thread)?;
-        Ok(Self {
-            loop_device: options.figures.loop_device(&settings, &round_trip, options.period),
-            scene,
-            port,
-            round_trip,
-        })
-    }
-
-    /// Where the board is.
-    #[must_use]
-    pub fn port(&self) -> &str {
-        &self.port
-    }
-
-    /// Round trips measured at the start.
-    #[must_use]
-    pub fn round_trip(&self) -> RoundTrip {
-        self.round_trip
-    }
-
-    /// What the margin before play needs, with this device's delay.
-    #[must_use]
-    pub fn loop_device(&self) -> LoopDevice {
-        self.loop_device
-    }
-
-    /// A look at it for another thread.
-    #[must_use]
-    pub fn monitor(&self) -> DeviceMonitor {
-        self.scene.monitor.clone()
-    }
-}
-
-impl HapticDevice for HapiDevice {
-    fn settings(&self) -> &DeviceSettings {
-        &self.scene.settings
-    }
-
-    fn sense(&mut self, elapsed: u64) -> Pose {
-        self.scene.sense(elapsed)
-    }
-
-    fn give(&mut self, force: [f64; 3]) {
-        self.scene.give(force);
-    }
+/// Sets the board up, which takes the arm's place for its home; measures the delay with zero force, and starts the thread.
+pub fn open_hapi(options: &HapiOptions, clock: HostClock) -> Result<LinkedDevice, HapiError> {
+    let fit = options.fit.checked()?;
+    let device = options.figures.device;
+    let force_max_n = device.force_max_n.min(options.limits.force_max_n);
+    let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
+    let limits = ForceLimits { force_max_n, ..options.limits };
+    let port = options.address.to_string();
+    let mut opened = Opened { link: Port(options.address.open()?), clock, port };
+    let fresh = || {
+        let board = (options.linkage, options.setup);
+        Exchange::new(board, fit, options.middle, limits)
+    };
+    let mut exchange = opened.set_up(&options.setup, fresh)?;
+    let round_trip = opened.measure(&mut exchange, &limits)?;
+    let Opened { link, clock, .. } = opened;
+    let (mut scene, thread) = hand_over(settings, options.period, clock);
+    let board = Board { address: options.address.clone(), exchange, scene: thread };
+    scene.start(move || board.run(link)).map_err(HapiError::Thread)?;
+    Ok(LinkedDevice::new(scene, &options.figures, round_trip, options.period))
 }
 
 /// An open port. Whatever ends its use, a panic included, the last packet is a zero.

@@ -16,6 +16,6 @@ mod device;
 mod exchange;
 mod message;
 
-pub use device::{HapiDevice, HapiError, HapiOptions};
+pub use device::{HapiError, HapiOptions, open_hapi};
 pub use exchange::{Exchange, HapiFault, LineState};
 pub use message::{BoardSetup, TORQUE_MAX_N_M, write_setup, write_zero};

@@ -6,12 +6,12 @@ use super::link::Link;
 use crate::figures::{DeviceFigures, RoundTrip};
 use crate::fit::WorkspaceFit;
 use crate::gate::ForceLimits;
-use crate::hand_over::{DeviceMonitor, SceneEnd, ThreadEnd, hand_over};
+use crate::hand_over::{ThreadEnd, hand_over};
+use crate::linked::LinkedDevice;
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::wire::HostClock;
-use palpate_haptics::margin::LoopDevice;
-use palpate_haptics::scene::{DeviceSettings, Pose};
-use palpate_haptics::{HapticDevice, Period};
+use palpate_haptics::Period;
+use palpate_haptics::scene::DeviceSettings;
 use palpate_model::Nanos;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::thread::{park_timeout, sleep};
@@ -65,76 +65,25 @@ impl InverseOptions {
     }
 }
 
-/// An Inverse3 in use. Dropping it sends zero force and ends the session.
-#[derive(Debug)]
-pub struct InverseDevice {
-    scene: SceneEnd,
-    found: FoundDevice,
-    round_trip: RoundTrip,
-    loop_device: LoopDevice,
-}
-
-impl InverseDevice {
-    /// Finds the device, measures the delay of its wire with zero force, and starts its thread.
-    pub fn open(options: &InverseOptions, clock: HostClock) -> Result<Self, InverseError> {
-        let fit = options.fit.checked()?;
-        let device = options.figures.device;
-        let force_max_n = device.force_max_n.min(options.limits.force_max_n);
-        let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
-        let limits = ForceLimits { force_max_n, ..options.limits };
-        let found = find(options.address, options.device.as_deref(), options.dead_man)?;
-        let names = (found.name.clone(), found.grip.clone());
-        let mut exchange = Exchange::new(names, fit, options.middle, limits);
-        let mut link = connect(options.address, &mut exchange)?;
-        let round_trip = measure(&mut link, &mut exchange, &clock)?;
-        let (mut scene, thread) = hand_over(settings, options.period, clock);
-        let service = Service { address: options.address, exchange, scene: thread };
-        scene.start(move || service.run(link)).map_err(InverseError::Thread)?;
-        Ok(Self {
-            loop_device: options.figures.loop_device(&settings, &round_trip, options.period),
-            scene,
-            found,
-            round_trip,
-        })
-    }
-
-    /// Which device and service were found.
-    #[must_use]
-    pub fn found(&self) -> &FoundDevice {
-        &self.found
-    }
-
-    /// Round trips measured at the start.
-    #[must_use]
-    pub fn round_trip(&self) -> RoundTrip {
-        self.round_trip
-    }
-
-    /// What the margin before play needs, with this device's delay.
-    #[must_use]
-    pub fn loop_device(&self) -> LoopDevice {
-        self.loop_device
-    }
-
-    /// A look at it for another thread.
-    #[must_use]
-    pub fn monitor(&self) -> DeviceMonitor {
-        self.scene.monitor.clone()
-    }
-}
-
-impl HapticDevice for InverseDevice {
-    fn settings(&self) -> &DeviceSettings {
-        &self.scene.settings
-    }
-
-    fn sense(&mut self, elapsed: u64) -> Pose {
-        self.scene.sense(elapsed)
-    }
-
-    fn give(&mut self, force: [f64; 3]) {
-        self.scene.give(force);
-    }
+/// Finds the device, measures the delay of its wire with zero force, and starts its thread. Dropping it ends the session of the service.
+pub fn open_inverse(
+    options: &InverseOptions,
+    clock: HostClock,
+) -> Result<(LinkedDevice, FoundDevice), InverseError> {
+    let fit = options.fit.checked()?;
+    let device = options.figures.device;
+    let force_max_n = device.force_max_n.min(options.limits.force_max_n);
+    let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
+    let limits = ForceLimits { force_max_n, ..options.limits };
+    let found = find(options.address, options.device.as_deref(), options.dead_man)?;
+    let names = (found.name.clone(), found.grip.clone());
+    let mut exchange = Exchange::new(names, fit, options.middle, limits);
+    let mut link = connect(options.address, &mut exchange)?;
+    let round_trip = measure(&mut link, &mut exchange, &clock)?;
+    let (mut scene, thread) = hand_over(settings, options.period, clock);
+    let service = Service { address: options.address, exchange, scene: thread };
+    scene.start(move || service.run(link)).map_err(InverseError::Thread)?;
+    Ok((LinkedDevice::new(scene, &options.figures, round_trip, options.period), found))
 }
 
 /// A connection with the device in its inventory.

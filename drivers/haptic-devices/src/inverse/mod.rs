@@ -9,7 +9,7 @@ mod exchange;
 mod link;
 mod message;
 
-pub use device::{InverseDevice, InverseOptions};
+pub use device::{InverseOptions, open_inverse};
 pub use discover::{DeadMan, FoundDevice, InverseError, find};
 pub use exchange::{BEAT, Exchange};
 pub use message::{ArmReport, ArmStatus, ReportFault, ServiceReport, write_force};

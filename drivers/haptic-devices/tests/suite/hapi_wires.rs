@@ -1,10 +1,12 @@
 //! The device on a real port, in real time. Waits are generous: nothing here is about speed.
 
-use super::served::{ServedHapi, clock};
+use super::served::{
+    ServedHapi, assert_ticks_allocate_nothing, clock, finite_pose, no_pose, tick_until,
+};
 use palpate_drivers::wire::DeviceAddress;
 use palpate_emulators::hapi::{HapiBoardSettings, HapiFault, HapiLie};
 use palpate_haptic_devices::{
-    DeviceMonitor, ForceLimits, ForceStop, HapiDevice, HapiError, HapiOptions, LinkReport,
+    ForceLimits, ForceStop, HapiError, HapiOptions, LinkedDevice, open_hapi,
 };
 use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::Pose;
@@ -21,29 +23,8 @@ fn patient(served: &ServedHapi) -> HapiOptions {
     HapiOptions { limits, ..served.options() }
 }
 
-fn open(options: &HapiOptions) -> Result<HapiDevice, HapiError> {
-    HapiDevice::open(options, clock())
-}
-
-/// Ticks until the connection is as wanted.
-fn tick_until(
-    device: &mut HapiDevice,
-    monitor: &DeviceMonitor,
-    is_so: impl Fn(&LinkReport) -> bool,
-) -> LinkReport {
-    let mut tick = || {
-        device.sense(1);
-        device.give([0.0, 0.0, 0.5]);
-        let report = monitor.report();
-        is_so(&report).then_some(report)
-    };
-    until(&mut tick, || format!("{:?}", monitor.report()))
-}
-
-/// A pose that is one. On a busy computer an answer may be late for some ticks.
-fn finite_pose(device: &mut HapiDevice) -> Pose {
-    let mut sense = || Some(device.sense(1)).filter(|pose| pose.at[0].is_finite());
-    until(&mut sense, || "no pose".into())
+fn open(options: &HapiOptions) -> Result<LinkedDevice, HapiError> {
+    open_hapi(options, clock())
 }
 
 /// Half a newton out of the tissue: against the plane's y axis.
@@ -107,7 +88,7 @@ fn board_that_keeps_its_home_position_is_found_again_and_the_force_comes_back() 
     // After 1.5 s without an answer the port is opened again.
     let lost = tick_until(&mut device, &monitor, |report| report.losses > 0);
     assert_ne!(lost.stop, ForceStop::None);
-    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+    no_pose(&mut device);
     served.panel.set_fault(None);
     tick_until(&mut device, &monitor, |_| is_pushed(&served));
     finite_pose(&mut device);
@@ -125,7 +106,7 @@ fn board_that_has_restarted_gives_no_force_until_it_is_opened_again() {
     let report = tick_until(&mut device, &monitor, |report| report.stop == ForceStop::NotReady);
     assert!(report.fault.unwrap().contains("home position"), "{report:?}");
     assert_eq!(served.panel.torques(), [0.0; 2]);
-    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+    no_pose(&mut device);
 }
 
 #[test]
@@ -138,18 +119,12 @@ fn lies_are_reported_and_no_pose_is_taken_from_them() {
     let report = tick_until(&mut device, &monitor, |report| report.stop == ForceStop::BadReport);
     assert!(report.faults > 0 && report.fault.is_some(), "{report:?}");
     until(|| (served.panel.torques() == [0.0; 2]).then_some(()), || "torque".into());
-    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+    no_pose(&mut device);
 }
 
 #[test]
 fn tick_of_the_scene_allocates_nothing() {
     let served = ServedHapi::start(HapiBoardSettings::default());
     let mut device = open(&patient(&served)).unwrap();
-    let counted = allocation_counter::measure(|| {
-        for _ in 0..1000 {
-            std::hint::black_box(device.sense(1));
-            device.give([0.1, 0.2, 0.3]);
-        }
-    });
-    assert_eq!(counted.count_total, 0, "{counted:?}");
+    assert_ticks_allocate_nothing(&mut device);
 }

@@ -5,9 +5,13 @@ use palpate_drivers::wire::{DeviceAddress, HostClock};
 use palpate_emulators::ServedDevice;
 use palpate_emulators::hapi::{EmulatedHapi, HapiBoardSettings, HapiPanel};
 use palpate_emulators::inverse::{EmulatedInverse, InversePanel, InverseServiceSettings};
-use palpate_haptic_devices::{HapiOptions, InverseOptions};
-use palpate_haptics::Period;
+use palpate_haptic_devices::{
+    DeviceMonitor, HapiOptions, InverseOptions, LinkReport, LinkedDevice,
+};
+use palpate_haptics::scene::Pose;
+use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
+use palpate_test_support::wait::until;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -66,4 +70,42 @@ impl ServedHapi {
 pub fn clock() -> HostClock {
     let start = Instant::now();
     Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
+}
+
+/// The force in N that [`tick_until`] gives.
+pub const GIVEN: [f64; 3] = [0.0, 0.0, 0.5];
+
+/// Ticks until the connection is as wanted.
+pub fn tick_until(
+    device: &mut LinkedDevice,
+    monitor: &DeviceMonitor,
+    is_so: impl Fn(&LinkReport) -> bool,
+) -> LinkReport {
+    let mut tick = || {
+        device.sense(1);
+        device.give(GIVEN);
+        let report = monitor.report();
+        is_so(&report).then_some(report)
+    };
+    until(&mut tick, || format!("{:?}", monitor.report()))
+}
+
+/// A pose that is one. On a busy computer an answer may be late for some ticks.
+pub fn finite_pose(device: &mut LinkedDevice) -> Pose {
+    let mut sense = || Some(device.sense(1)).filter(|pose| pose.at[0].is_finite());
+    until(&mut sense, || "no pose".into())
+}
+
+pub fn no_pose(device: &mut LinkedDevice) {
+    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+}
+
+pub fn assert_ticks_allocate_nothing(device: &mut LinkedDevice) {
+    let counted = allocation_counter::measure(|| {
+        for _ in 0..1000 {
+            std::hint::black_box(device.sense(1));
+            device.give([0.1, 0.2, 0.3]);
+        }
+    });
+    assert_eq!(counted.count_total, 0, "{counted:?}");
 }

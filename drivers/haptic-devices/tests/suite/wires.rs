@@ -1,10 +1,12 @@
 //! The device on a real socket, in real time. Waits are generous: nothing here is about speed.
 
-use super::served::{ServedInverse, clock};
+use super::served::{
+    GIVEN, ServedInverse, assert_ticks_allocate_nothing, clock, finite_pose, no_pose, tick_until,
+};
 use palpate_emulators::inverse::{InverseFault, InverseLie, InverseServiceSettings};
 use palpate_haptic_devices::inverse::DeadMan;
 use palpate_haptic_devices::{
-    DeviceMonitor, ForceLimits, ForceStop, InverseDevice, InverseError, InverseOptions, LinkReport,
+    ForceLimits, ForceStop, InverseError, InverseOptions, LinkedDevice, open_inverse,
 };
 use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::Pose;
@@ -22,42 +24,21 @@ fn patient(served: &ServedInverse) -> InverseOptions {
     InverseOptions { limits, ..served.options() }
 }
 
-fn open(options: &InverseOptions) -> Result<InverseDevice, InverseError> {
-    InverseDevice::open(options, clock())
-}
-
-/// Ticks until the connection is as wanted.
-fn tick_until(
-    device: &mut InverseDevice,
-    monitor: &DeviceMonitor,
-    is_so: impl Fn(&LinkReport) -> bool,
-) -> LinkReport {
-    let mut tick = || {
-        device.sense(1);
-        device.give([0.0, 0.0, 1.0]);
-        let report = monitor.report();
-        is_so(&report).then_some(report)
-    };
-    until(&mut tick, || format!("{:?}", monitor.report()))
-}
-
-/// A pose that is one. On a busy computer a report may be late for some ticks.
-fn finite_pose(device: &mut InverseDevice) -> Pose {
-    let mut sense = || Some(device.sense(1)).filter(|pose| pose.at[0].is_finite());
-    until(&mut sense, || "no pose".into())
+fn open(options: &InverseOptions) -> Result<LinkedDevice, InverseError> {
+    open_inverse(options, clock()).map(|(device, _)| device)
 }
 
 #[test]
 fn device_is_found_and_its_force_reaches_the_hand() {
     let served = ServedInverse::start(InverseServiceSettings::default());
-    let mut device = open(&patient(&served)).unwrap();
-    assert_eq!(device.found().name, "049D");
-    assert_eq!(device.found().grip.as_deref(), Some("61576"));
-    assert_eq!(device.found().version, "3.5.0.0");
+    let (mut device, found) = open_inverse(&patient(&served), clock()).unwrap();
+    assert_eq!(found.name, "049D");
+    assert_eq!(found.grip.as_deref(), Some("61576"));
+    assert_eq!(found.version, "3.5.0.0");
     assert_eq!(device.round_trip().count, 200);
     assert!(device.loop_device().delay_ticks > 2.0);
     let monitor = device.monitor();
-    tick_until(&mut device, &monitor, |_| served.panel.force() == [0.0, 0.0, 1.0]);
+    tick_until(&mut device, &monitor, |_| served.panel.force() == GIVEN);
     let pose = finite_pose(&mut device);
     // The hand swings 8 mm around the middle of the reach, which is the middle of the tissue.
     let [x, y, z] = pose.at;
@@ -126,9 +107,9 @@ fn lost_connection_is_opened_again_and_the_force_comes_back() {
     served.panel.set_fault(Some(InverseFault::Cut));
     let lost = tick_until(&mut device, &monitor, |report| !report.is_connected);
     assert_eq!((lost.stop, lost.losses), (ForceStop::LinkLost, 1));
-    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+    no_pose(&mut device);
     served.panel.set_fault(None);
-    tick_until(&mut device, &monitor, |_| served.panel.force() == [0.0, 0.0, 1.0]);
+    tick_until(&mut device, &monitor, |_| served.panel.force() == GIVEN);
     finite_pose(&mut device);
 }
 
@@ -142,7 +123,7 @@ fn lies_are_reported_and_no_pose_is_taken_from_them() {
     let report = tick_until(&mut device, &monitor, |report| report.stop == ForceStop::BadReport);
     assert!(report.faults > 0 && report.fault.is_some(), "{report:?}");
     until(|| (served.panel.force() == [0.0; 3]).then_some(()), || "force".into());
-    until(|| device.sense(1).at[0].is_nan().then_some(()), || "a pose".into());
+    no_pose(&mut device);
 }
 
 #[test]
@@ -161,13 +142,7 @@ fn released_button_ends_the_force_and_the_pose_stays() {
 fn tick_of_the_scene_allocates_nothing() {
     let served = ServedInverse::start(InverseServiceSettings::default());
     let mut device = open(&patient(&served)).unwrap();
-    let counted = allocation_counter::measure(|| {
-        for _ in 0..1000 {
-            std::hint::black_box(device.sense(1));
-            device.give([0.1, 0.2, 0.3]);
-        }
-    });
-    assert_eq!(counted.count_total, 0, "{counted:?}");
+    assert_ticks_allocate_nothing(&mut device);
 }
 
 #[test]
@@ -177,7 +152,7 @@ fn pose_of_a_thread_that_does_not_run_is_not_taken() {
     let monitor = device.monitor();
     tick_until(&mut device, &monitor, |report| report.stop == ForceStop::None);
     // Nothing between the calls: the scene's ticks passed, and no report came. A report may come between two of them.
-    let is_gone = |device: &mut InverseDevice| {
+    let is_gone = |device: &mut LinkedDevice| {
         device.sense(1);
         device.sense(1000).at[0].is_nan()
     };
