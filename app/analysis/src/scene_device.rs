@@ -1,9 +1,8 @@
 //! A real haptic device for a scene: opened, judged before play, and how it did.
 
 use palpate_drivers::wire::DeviceAddress;
-use palpate_haptic_devices::inverse::DeadMan;
 use palpate_haptic_devices::{
-    DeviceMonitor, HapiOptions, InverseOptions, LinkReport, open_hapi, open_inverse,
+    DeviceMonitor, ForceLimits, HapiOptions, InverseOptions, LinkReport, open_hapi, open_inverse,
 };
 use palpate_haptics::HapticDevice;
 use palpate_haptics::margin::{LoopDevice, MarginReport, MarginSettings};
@@ -28,7 +27,6 @@ pub enum DeviceChoice {
         address: SocketAddr,
         /// Its name in the service; the only one where there is none.
         name: Option<String>,
-        dead_man: DeadMan,
     },
     /// A 2DIY on a hAPI board.
     Hapi(DeviceAddress),
@@ -69,9 +67,7 @@ impl DeviceName {
     #[must_use]
     pub fn at(self, service: SocketAddr) -> DeviceChoice {
         match self {
-            Self::Inverse(name) => {
-                DeviceChoice::Inverse { address: service, name, dead_man: DeadMan::IfPresent }
-            }
+            Self::Inverse(name) => DeviceChoice::Inverse { address: service, name },
             Self::Hapi(address) => DeviceChoice::Hapi(address),
         }
     }
@@ -146,22 +142,31 @@ pub fn open_device(
     scene: &SceneToTouch,
 ) -> Result<(OpenDevice, DeviceReport), String> {
     let SceneToTouch { settings, start, .. } = scene;
+    if settings.controller.is_none() {
+        return Err(
+            "the scene has no guards and no controller, which a real device needs; set loop.guards to true, or use the simulated device"
+                .into(),
+        );
+    }
     let (device, description, warnings) = match choice {
-        DeviceChoice::Inverse { address, name, dead_man } => {
+        DeviceChoice::Inverse { address, name } => {
             let options = InverseOptions {
                 address: *address,
                 device: name.clone(),
-                dead_man: *dead_man,
                 ..InverseOptions::new(start.place, settings.period)
             };
+            let limits = limited(options.limits, settings);
+            let options = InverseOptions { limits, ..options };
             let (device, found) =
                 open_inverse(&options, driver_clock()).map_err(|err| err.to_string())?;
-            let grip = found.grip.map_or("no grip".to_owned(), |grip| format!("grip {grip}"));
-            let description = format!("device {}, {grip}, service {}", found.name, found.version);
+            let description =
+                format!("device {}, grip {}, service {}", found.name, found.grip, found.version);
             (device, description, Vec::new())
         }
         DeviceChoice::Hapi(address) => {
             let options = HapiOptions::new(address.clone(), start.place, settings.period);
+            let limits = limited(options.limits, settings);
+            let options = HapiOptions { limits, ..options };
             let device = open_hapi(&options, driver_clock()).map_err(|err| err.to_string())?;
             (device, format!("2DIY at {address}"), HAPI_WARNINGS.to_vec())
         }
@@ -178,6 +183,11 @@ pub fn open_device(
         margin,
     };
     Ok((OpenDevice { device: Box::new(device), looped, monitor }, report))
+}
+
+/// No more force than the scene's file allows its device.
+fn limited(limits: ForceLimits, scene: &SceneSettings) -> ForceLimits {
+    ForceLimits { force_max_n: limits.force_max_n.min(scene.device.force_max_n), ..limits }
 }
 
 /// The margin of the material that needs the most damping of the device.

@@ -1,11 +1,33 @@
 //! What the margin before play needs to know about a device: its mechanics, and the delay measured on its own wire.
 
-use palpate_haptics::Period;
+use crate::fit::{FitError, WorkspaceFit};
+use crate::gate::ForceLimits;
 use palpate_haptics::margin::LoopDevice;
 use palpate_haptics::scene::DeviceSettings;
+use palpate_haptics::{Period, SettingError};
 use palpate_model::Nanos;
 use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A tick of the scene may be this late before the force ends.
+const TICK_LATE: Nanos = Nanos(500_000);
+
+/// Why a device cannot be used in a scene.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum UseError {
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// Figures of the device that no device has.
+    #[error(transparent)]
+    Figures(#[from] SettingError),
+    /// Between two ticks the force would end.
+    #[error(
+        "a scene of {hz:.0} ticks a second is too slow for a haptic device, whose force ends after {:.1} ms without a tick; give at least {:.0}",
+        1e3 * .silence.seconds().0, (1.0 / silence.since(TICK_LATE).seconds().0).ceil()
+    )]
+    SlowScene { hz: f64, silence: Nanos },
+}
 
 /// Round trips of messages to a device's service and back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,6 +116,24 @@ impl DeviceFigures {
             // Half an exchange of a USB device that is served each millisecond, for amplifier and motor.
             hidden_delay_s: 0.0005,
         }
+    }
+
+    /// How a device lies in a scene, what the scene knows of it, and the limits of its force; refused where a scene could not use it.
+    pub(crate) fn in_scene(
+        &self,
+        fit: &WorkspaceFit,
+        limits: &ForceLimits,
+        period: Period,
+    ) -> Result<(WorkspaceFit, DeviceSettings, ForceLimits), UseError> {
+        let silence = limits.scene_silence;
+        if period.nanos() > silence.since(TICK_LATE).0 {
+            return Err(UseError::SlowScene { hz: period.hz(), silence });
+        }
+        let fit = fit.checked()?;
+        let force_max_n = self.device.force_max_n.min(limits.force_max_n);
+        let device = DeviceSettings { force_max_n, ..self.device };
+        let settings = fit.scene_settings(&device).checked()?;
+        Ok((fit, settings, ForceLimits { force_max_n, ..*limits }))
     }
 
     /// What the margin sees of a device with `settings` in the scene. A pose is taken at one tick and used at the next, and

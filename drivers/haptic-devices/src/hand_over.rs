@@ -10,7 +10,7 @@ use palpate_model::Nanos;
 use std::fmt;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 use triple_buffer::{Input, Output, triple_buffer};
 
@@ -205,7 +205,13 @@ impl ThreadEnd {
             self.poses.write(SensedPose { number: report.reports, pose: NO_POSE });
         }
         let report = LinkReport { losses: self.losses, ..report };
-        *self.monitor.0.lock().unwrap_or_else(PoisonError::into_inner) = report;
+        // A look by a thread of lower priority must not delay a zero; the next message shows the same. Without a connection there is
+        // neither a force nor a next message.
+        match self.monitor.0.try_lock() {
+            Err(TryLockError::WouldBlock) if report.is_connected => {}
+            Ok(mut shown) => *shown = report,
+            Err(_) => *self.monitor.0.lock().unwrap_or_else(PoisonError::into_inner) = report,
+        }
     }
 
     /// The connection is lost once more.

@@ -10,9 +10,16 @@ use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
 /// Speed and acceleration in counts that a controller in the position tracking mode has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TrackingRates {
-    pub speed: i64,
-    pub acceleration: i64,
+struct TrackingRates {
+    speed: i64,
+    acceleration: i64,
+}
+
+/// The position tracking mode as it was set, and as the controller made it of that.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrackingMode {
+    asked: TrackingRates,
+    made: TrackingRates,
 }
 
 /// Software limits are this far beyond the travel and behind home, in mm: behind the limit switches of a slide, which
@@ -52,7 +59,7 @@ pub struct GalilOrder {
     pub is_begun: bool,
     tick: Nanos,
     /// The mode in which the controller is, if it takes targets on the way.
-    pub tracking: Option<TrackingRates>,
+    pub tracking: Option<TrackingMode>,
     /// The increments that follow the beginning of a sine.
     pub feed: Option<SineFeed>,
 }
@@ -98,11 +105,11 @@ impl GalilOrder {
                 Err(why) => return OrderStep::Refused(why),
             },
             RigCommand::Track(wanted) => match move_rates(&wanted, settings) {
-                Ok(rates) if self.tracking == Some(rates) => {
-                    let made = made_move(&wanted, rates, settings);
-                    return self.send_target(made, settings);
-                }
                 Ok(rates) => {
+                    if let Some(mode) = self.tracking.filter(|mode| mode.asked == rates) {
+                        let made = made_move(&wanted, mode.made, settings);
+                        return self.send_target(made, settings);
+                    }
                     let mut commands = rate_commands(a, rates);
                     if self.tracking.is_none() {
                         // A target that a stop left behind must not count when the mode begins.
@@ -180,10 +187,10 @@ impl GalilOrder {
                     return OrderStep::Refused(why.into());
                 }
                 return match check_rates(&wanted, [speed, ac, dc], settings) {
-                    Ok(rates) => {
-                        let requested = move_rates(&wanted, settings);
-                        self.tracking = requested.ok();
-                        self.send_target(made_move(&wanted, rates, settings), settings)
+                    Ok(made) => {
+                        let asked = move_rates(&wanted, settings);
+                        self.tracking = asked.ok().map(|asked| TrackingMode { asked, made });
+                        self.send_target(made_move(&wanted, made, settings), settings)
                     }
                     Err(why) => OrderStep::Refused(why),
                 };
@@ -294,7 +301,7 @@ fn check_rates(
     // The controller rounds down to its resolution; a larger value is an error.
     let speed_asked = settings.counts(wanted.speed.0) as f64;
     let ac_asked = settings.counts(wanted.acceleration.0) as f64;
-    if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
+    if ac != dc || speed <= 0.0 || speed > speed_asked || ac <= 0.0 || ac > ac_asked {
         return Err(format!(
             "the controller reports speed {speed}, acceleration {ac} and deceleration {dc} in counts, after speed {speed_asked} and acceleration {ac_asked} were set"
         ));

@@ -2,16 +2,15 @@
 
 use super::exchange::{BEAT, Exchange, HapiFault, LineState};
 use super::message::{BoardSetup, write_first, write_zero};
-use crate::figures::{DeviceFigures, RoundTrip};
-use crate::fit::{DeviceAxis, FitError, WorkspaceFit};
+use crate::figures::{DeviceFigures, RoundTrip, UseError};
+use crate::fit::{DeviceAxis, WorkspaceFit};
 use crate::gate::ForceLimits;
 use crate::hand_over::{ThreadEnd, hand_over};
 use crate::linked::LinkedDevice;
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::wire::{DeviceAddress, HostClock, Link, WireError};
+use palpate_haptics::Period;
 use palpate_haptics::rig::Pantograph;
-use palpate_haptics::scene::DeviceSettings;
-use palpate_haptics::{Period, SettingError};
 use palpate_model::Nanos;
 use std::io;
 use std::thread::sleep;
@@ -100,19 +99,13 @@ pub enum HapiError {
     #[error("the thread of the haptic device cannot be started ({0}); close other programs")]
     Thread(io::Error),
     #[error(transparent)]
-    Fit(#[from] FitError),
-    /// Figures of the device that no device has.
-    #[error(transparent)]
-    Figures(#[from] SettingError),
+    Use(#[from] UseError),
 }
 
 /// Sets the board up, which takes the arm's place for its home; measures the delay with zero force, and starts the thread.
 pub fn open_hapi(options: &HapiOptions, clock: HostClock) -> Result<LinkedDevice, HapiError> {
-    let fit = options.fit.checked()?;
-    let device = options.figures.device;
-    let force_max_n = device.force_max_n.min(options.limits.force_max_n);
-    let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
-    let limits = ForceLimits { force_max_n, ..options.limits };
+    let (fit, settings, limits) =
+        options.figures.in_scene(&options.fit, &options.limits, options.period)?;
     let port = options.address.to_string();
     let mut opened = Opened { link: Port(options.address.open()?), clock, port };
     let fresh = || {

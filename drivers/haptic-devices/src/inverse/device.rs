@@ -1,6 +1,6 @@
 //! The device: a thread with the connection, and the ends of it in the scene's loop.
 
-use super::discover::{DeadMan, FoundDevice, InverseError, find};
+use super::discover::{FoundDevice, InverseError, find};
 use super::exchange::{BEAT, Exchange};
 use super::link::Link;
 use crate::figures::{DeviceFigures, RoundTrip};
@@ -11,7 +11,6 @@ use crate::linked::LinkedDevice;
 use palpate_drivers::priority::request_real_time;
 use palpate_drivers::wire::HostClock;
 use palpate_haptics::Period;
-use palpate_haptics::scene::DeviceSettings;
 use palpate_model::Nanos;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::thread::{park_timeout, sleep};
@@ -38,7 +37,6 @@ pub struct InverseOptions {
     pub address: SocketAddr,
     /// Name of the device in the service; the only one if `None`.
     pub device: Option<String>,
-    pub dead_man: DeadMan,
     pub fit: WorkspaceFit,
     pub limits: ForceLimits,
     pub figures: DeviceFigures,
@@ -55,7 +53,6 @@ impl InverseOptions {
         Self {
             address: SocketAddr::from((Ipv4Addr::LOCALHOST, 10001)),
             device: None,
-            dead_man: DeadMan::IfPresent,
             fit: WorkspaceFit::default(),
             limits: ForceLimits::default(),
             figures: DeviceFigures::inverse3(),
@@ -70,12 +67,9 @@ pub fn open_inverse(
     options: &InverseOptions,
     clock: HostClock,
 ) -> Result<(LinkedDevice, FoundDevice), InverseError> {
-    let fit = options.fit.checked()?;
-    let device = options.figures.device;
-    let force_max_n = device.force_max_n.min(options.limits.force_max_n);
-    let settings = fit.scene_settings(&DeviceSettings { force_max_n, ..device }).checked()?;
-    let limits = ForceLimits { force_max_n, ..options.limits };
-    let found = find(options.address, options.device.as_deref(), options.dead_man)?;
+    let (fit, settings, limits) =
+        options.figures.in_scene(&options.fit, &options.limits, options.period)?;
+    let found = find(options.address, options.device.as_deref())?;
     let names = (found.name.clone(), found.grip.clone());
     let mut exchange = Exchange::new(names, fit, options.middle, limits);
     let mut link = connect(options.address, &mut exchange)?;
@@ -200,7 +194,7 @@ impl Service {
     fn reconnect(&mut self) -> Option<Link> {
         let link = connect(self.address, &mut self.exchange).ok();
         if link.is_none() {
-            park_timeout(RETRY);
+            sleep(RETRY);
         }
         link
     }
@@ -213,7 +207,8 @@ impl Service {
         self.publish(true);
         // Closing with reports unread sends a reset, which may overtake the zero; so its answer is waited for a little.
         for _ in 0..GOODBYE_TURNS {
-            while let Ok(Some(text)) = link.receive() {
+            for _ in 0..RECEIVED_MAX {
+                let Ok(Some(text)) = link.receive() else { break };
                 self.exchange.receive(self.scene.now(), &text);
             }
             if !self.exchange.is_waiting() {

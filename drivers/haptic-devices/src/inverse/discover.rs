@@ -1,9 +1,8 @@
 //! Which service and which device: versions and lists over HTTP, and every reason to refuse.
 
 use super::message::{ArmStatus, ServiceReport, is_plain_name};
-use crate::fit::FitError;
+use crate::figures::UseError;
 use crate::http::{self, HttpError};
-use palpate_haptics::SettingError;
 use serde::Deserialize;
 use std::net::SocketAddr;
 use thiserror::Error;
@@ -65,10 +64,7 @@ pub enum InverseError {
     #[error("the thread of the haptic device cannot be started ({0}); close other programs")]
     Thread(std::io::Error),
     #[error(transparent)]
-    Fit(#[from] FitError),
-    /// Figures of the device that no device has.
-    #[error(transparent)]
-    Figures(#[from] SettingError),
+    Use(#[from] UseError),
 }
 
 /// A device that can be used.
@@ -76,28 +72,14 @@ pub enum InverseError {
 pub struct FoundDevice {
     /// Its name in the service.
     pub name: String,
-    /// The grip on it.
-    pub grip: Option<String>,
+    /// The grip on it, whose button a hand must press.
+    pub grip: String,
     /// Version of the service.
     pub version: String,
 }
 
-/// Whether a device may be used without a grip that has a button.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DeadMan {
-    /// A grip that is there must be held; without one the force needs no button.
-    #[default]
-    IfPresent,
-    /// There must be a grip.
-    Required,
-}
-
 /// Asks a service for its version and its devices, and takes the one named, or the only one.
-pub fn find(
-    address: SocketAddr,
-    name: Option<&str>,
-    dead_man: DeadMan,
-) -> Result<FoundDevice, InverseError> {
+pub fn find(address: SocketAddr, name: Option<&str>) -> Result<FoundDevice, InverseError> {
     let no_service = |source| InverseError::NoService { address, source };
     let version = http::get(address, "/version").map_err(|err| match err {
         HttpError::Connect(_) | HttpError::Read(_) => no_service(err),
@@ -109,10 +91,10 @@ pub fn find(
     let (name, status) = chosen(&devices, name)?;
     check_status(&name, status)?;
     let grip = devices.first_grip().filter(|grip| is_plain_name(grip)).map(str::to_owned);
-    if grip.is_none() && dead_man == DeadMan::Required {
-        return Err(InverseError::NoGrip(name));
+    match grip {
+        Some(grip) => Ok(FoundDevice { name, grip, version }),
+        None => Err(InverseError::NoGrip(name)),
     }
-    Ok(FoundDevice { name, grip, version })
 }
 
 /// The version in an answer of `/version`, if palpate knows it.

@@ -23,7 +23,7 @@ const JUMP_MM: f64 = 2.0;
 #[derive(Debug)]
 pub struct Exchange {
     device: String,
-    grip: Option<String>,
+    grip: String,
     fit: WorkspaceFit,
     middle: [f64; 3],
     gate: ForceGate,
@@ -46,7 +46,7 @@ impl Exchange {
     /// With a device by its name in the service, and the grip on it. The tissue's middle is at `middle` in mm.
     #[must_use]
     pub fn new(
-        (device, grip): (String, Option<String>),
+        (device, grip): (String, String),
         fit: WorkspaceFit,
         middle: [f64; 3],
         limits: ForceLimits,
@@ -131,7 +131,7 @@ impl Exchange {
         if report.session() != self.session {
             return Err(ReportFault::OtherSession);
         }
-        let arm = report.arm(&self.device, self.grip.as_deref())?;
+        let arm = report.arm(&self.device, Some(&self.grip))?;
         let last = self.last.replace((now, arm.position_m));
         if self.since_link >= SETTLING
             && let Some((then, place)) = last

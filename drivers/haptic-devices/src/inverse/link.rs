@@ -8,6 +8,9 @@ use tungstenite::{Error, Message, WebSocket};
 /// Longest time to connect, to agree on WebSocket and to get the inventory.
 const OPENING_MAX: Duration = Duration::from_millis(500);
 
+/// Frames in which the inventory must be.
+const OPENING_FRAMES: usize = 16;
+
 /// An open connection.
 pub struct Link {
     socket: WebSocket<TcpStream>,
@@ -26,25 +29,27 @@ impl Link {
         stream.set_write_timeout(Some(OPENING_MAX))?;
         let url = format!("ws://{address}/");
         let (mut socket, _) = tungstenite::client(url, stream).map_err(wrong)?;
-        let inventory = loop {
+        let mut first = None;
+        for _ in 0..OPENING_FRAMES {
             if let Message::Text(text) = socket.read().map_err(wrong)? {
-                break text.to_string();
+                first = Some(text.to_string());
+                break;
             }
-        };
+        }
+        let inventory = first.ok_or_else(|| wrong("no inventory comes"))?;
         socket.get_ref().set_nonblocking(true)?;
         Ok((Self { socket }, inventory))
     }
 
-    /// The next message if one is there.
+    /// The next message if one is there. Of a frame that is none nothing is waited for: a service that pings without end must not keep a
+    /// zero from being sent.
     pub fn receive(&mut self) -> io::Result<Option<String>> {
-        loop {
-            match self.socket.read() {
-                Ok(Message::Text(text)) => return Ok(Some(text.to_string())),
-                Ok(Message::Close(_)) => return Err(ErrorKind::ConnectionAborted.into()),
-                Ok(_) => {}
-                Err(Error::Io(err)) if err.kind() == ErrorKind::WouldBlock => return Ok(None),
-                Err(err) => return Err(wrong(err)),
-            }
+        match self.socket.read() {
+            Ok(Message::Text(text)) => Ok(Some(text.to_string())),
+            Ok(Message::Close(_)) => Err(ErrorKind::ConnectionAborted.into()),
+            Ok(_) => Ok(None),
+            Err(Error::Io(err)) if err.kind() == ErrorKind::WouldBlock => Ok(None),
+            Err(err) => Err(wrong(err)),
         }
     }
 

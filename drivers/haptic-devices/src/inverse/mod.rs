@@ -10,6 +10,6 @@ mod link;
 mod message;
 
 pub use device::{InverseOptions, open_inverse};
-pub use discover::{DeadMan, FoundDevice, InverseError, find};
+pub use discover::{FoundDevice, InverseError, find};
 pub use exchange::{BEAT, Exchange};
 pub use message::{ArmReport, ArmStatus, ReportFault, ServiceReport, write_force};

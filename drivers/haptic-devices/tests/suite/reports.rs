@@ -119,7 +119,7 @@ fn damaged_reports_never_panic_and_never_make_a_force_that_is_too_large() {
     let mut service = InverseService::new(InverseServiceSettings::default()).unwrap();
     let mut random = Random::new(5, RandomStream::Fault);
     let limits = ForceLimits { ramp: Nanos(1), ..ForceLimits::default() };
-    let names = ("049D".to_owned(), Some("61576".to_owned()));
+    let names = ("049D".to_owned(), "61576".to_owned());
     let mut exchange = Exchange::new(names, WorkspaceFit::default(), [0.0; 3], limits);
     let inventory = service.open(Nanos::ZERO, 0);
     exchange.begin(&inventory).unwrap();

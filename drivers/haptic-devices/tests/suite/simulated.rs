@@ -67,7 +67,7 @@ const CHANNEL: usize = 0;
 impl Bench {
     fn new(seed: u64) -> Self {
         let mut service = InverseService::new(InverseServiceSettings::default()).unwrap();
-        let names = ("049D".to_owned(), Some("61576".to_owned()));
+        let names = ("049D".to_owned(), "61576".to_owned());
         let limits = ForceLimits { ramp: RAMP, ..ForceLimits::default() };
         let mut exchange = Exchange::new(names, WorkspaceFit::default(), [30.0, 30.0, 0.0], limits);
         let inventory = service.open(Nanos::ZERO, CHANNEL);

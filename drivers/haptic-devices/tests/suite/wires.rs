@@ -4,12 +4,11 @@ use super::served::{
     GIVEN, ServedInverse, assert_ticks_allocate_nothing, clock, finite_pose, no_pose, tick_until,
 };
 use palpate_emulators::inverse::{InverseFault, InverseLie, InverseServiceSettings};
-use palpate_haptic_devices::inverse::DeadMan;
 use palpate_haptic_devices::{
     ForceLimits, ForceStop, InverseError, InverseOptions, LinkedDevice, open_inverse,
 };
-use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::Pose;
+use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
 use palpate_test_support::wait::until;
 use std::net::TcpListener;
@@ -33,7 +32,7 @@ fn device_is_found_and_its_force_reaches_the_hand() {
     let served = ServedInverse::start(InverseServiceSettings::default());
     let (mut device, found) = open_inverse(&patient(&served), clock()).unwrap();
     assert_eq!(found.name, "049D");
-    assert_eq!(found.grip.as_deref(), Some("61576"));
+    assert_eq!(found.grip, "61576");
     assert_eq!(found.version, "3.5.0.0");
     assert_eq!(device.round_trip().count, 200);
     assert!(device.loop_device().delay_ticks > 2.0);
@@ -49,10 +48,9 @@ fn device_is_found_and_its_force_reaches_the_hand() {
 
 #[test]
 fn every_refusal_is_one_sentence() {
-    let served = ServedInverse::start(InverseServiceSettings {
-        has_grip: false,
-        ..InverseServiceSettings::default()
-    });
+    let served = ServedInverse::start(InverseServiceSettings::default());
+    let bare = InverseServiceSettings { has_grip: false, ..InverseServiceSettings::default() };
+    let bare = ServedInverse::start(bare);
     let set_fault = |fault| {
         served.panel.set_fault(fault);
         let is_set = || served.panel.fault_at().is_some() == Option::is_some(&fault);
@@ -64,6 +62,7 @@ fn every_refusal_is_one_sentence() {
         open(options).unwrap_err()
     };
     let usual = served.options();
+    let slow = Period::of_rate(400.0).unwrap();
     let cases: Vec<(InverseError, &str)> = vec![
         (refused(Some(InverseFault::Old), &usual), "version 3.1.1.0"),
         (refused(Some(InverseFault::New), &usual), "version 4.0.0.0"),
@@ -75,10 +74,8 @@ fn every_refusal_is_one_sentence() {
             refused(None, &InverseOptions { device: Some("0000".into()), ..usual.clone() }),
             "no device named '0000'; it has 049D",
         ),
-        (
-            refused(None, &InverseOptions { dead_man: DeadMan::Required, ..usual.clone() }),
-            "no grip",
-        ),
+        (refused(None, &bare.options()), "no grip"),
+        (refused(None, &InverseOptions { period: slow, ..usual.clone() }), "too slow"),
     ];
     for (err, part) in cases {
         let text = err.to_string();

@@ -7,7 +7,7 @@ mod writing;
 
 use super::clock_alignment::ClockAlignment;
 use super::connect::ConnectedGalil;
-use super::order::{GalilOrder, TrackingRates};
+use super::order::{GalilOrder, TrackingMode};
 use super::protocol::{GalilMessage, GalilParser, LINE_MAX, pack_lines};
 use super::recording::{self, ArrayRecording};
 use super::sampling::Sampler;
@@ -104,7 +104,7 @@ pub struct GalilSession {
     orders: VecDeque<(u64, RigCommand)>,
     order: Option<(u64, GalilOrder)>,
     /// The position tracking mode, while the controller is in it.
-    tracking: Option<TrackingRates>,
+    tracking: Option<TrackingMode>,
     answers: AnswerQueue,
     is_motion_begun: bool,
     resync: Option<Resynchronisation>,

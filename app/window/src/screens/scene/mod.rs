@@ -309,7 +309,7 @@ impl Screen for SceneScreen {
                 "The device is being opened; its delay is measured with zero force."
             }
             (_, Some(_)) => {
-                "The device moves the stylus. Read what stands on the right, then press the button of the grip."
+                "The device moves the stylus. One with a grip gives a force while its button is pressed, one without from the start. F12 ends the scene."
             }
             (Some(true), None) => {
                 "The path moves the hand; at its end the pointer and the keys take over."
