@@ -8,7 +8,6 @@ use palpate_emulators::hapi::{HapiBoardSettings, HapiFault, HapiLie};
 use palpate_haptic_devices::{
     ForceLimits, ForceStop, HapiError, HapiOptions, LinkedDevice, open_hapi,
 };
-use palpate_haptics::HapticDevice;
 use palpate_haptics::scene::Pose;
 use palpate_model::Nanos;
 use palpate_test_support::wait::until;

@@ -1,13 +1,12 @@
 //! The device on a real socket, in real time. Waits are generous: nothing here is about speed.
 
 use super::served::{
-    GIVEN, ServedInverse, assert_ticks_allocate_nothing, clock, finite_pose, no_pose, tick_until,
+    ServedInverse, assert_ticks_allocate_nothing, clock, finite_pose, is_given, no_pose, tick_until,
 };
 use palpate_emulators::inverse::{InverseFault, InverseLie, InverseServiceSettings};
 use palpate_haptic_devices::{
     ForceLimits, ForceStop, InverseError, InverseOptions, LinkedDevice, open_inverse,
 };
-use palpate_haptics::scene::Pose;
 use palpate_haptics::{HapticDevice, Period};
 use palpate_model::Nanos;
 use palpate_test_support::wait::until;
@@ -37,7 +36,7 @@ fn device_is_found_and_its_force_reaches_the_hand() {
     assert_eq!(device.round_trip().count, 200);
     assert!(device.loop_device().delay_ticks > 2.0);
     let monitor = device.monitor();
-    tick_until(&mut device, &monitor, |_| served.panel.force() == GIVEN);
+    tick_until(&mut device, &monitor, |_| is_given(served.panel.force()));
     let pose = finite_pose(&mut device);
     // The hand swings 8 mm around the middle of the reach, which is the middle of the tissue.
     let [x, y, z] = pose.at;
@@ -106,7 +105,7 @@ fn lost_connection_is_opened_again_and_the_force_comes_back() {
     assert_eq!((lost.stop, lost.losses), (ForceStop::LinkLost, 1));
     no_pose(&mut device);
     served.panel.set_fault(None);
-    tick_until(&mut device, &monitor, |_| served.panel.force() == GIVEN);
+    tick_until(&mut device, &monitor, |_| is_given(served.panel.force()));
     finite_pose(&mut device);
 }
 
