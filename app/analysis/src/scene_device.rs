@@ -88,6 +88,8 @@ pub struct OpenDevice {
 pub struct DeviceReport {
     /// What it is, and with what.
     pub description: String,
+    /// Whether its force waits for a button. Where there is none, a person must read the report before the scene starts.
+    pub has_button: bool,
     /// What a person has to know before the first touch.
     pub warnings: Vec<&'static str>,
     /// Round trips of messages with zero force.
@@ -175,6 +177,7 @@ pub fn open_device(
     let margin = worst_margin(settings, &scene.bodies, looped);
     let report = DeviceReport {
         description,
+        has_button: matches!(choice, DeviceChoice::Inverse { .. }),
         warnings,
         round_trip_median_ms: 1e3 * trip.median.seconds().0,
         round_trip_p99_ms: 1e3 * trip.p99.seconds().0,

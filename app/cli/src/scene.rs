@@ -19,6 +19,7 @@ use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
 use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
+use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
@@ -237,6 +238,14 @@ fn device(
     let choice = name.clone().at(args.service);
     let (opened, report) = open_device(&choice, scene).map_err(Failure::failed)?;
     device_lines(&report).iter().for_each(|line| output.note(line));
+    // Until the scene ticks there is no force.
+    if !report.has_button && std::io::stdin().is_terminal() {
+        output.note("press Enter to start; there is no force before");
+        let mut line = String::new();
+        std::io::stdin().read_line(&mut line).map_err(|err| {
+            Failure::failed(format!("cannot read the terminal ({err}); start again"))
+        })?;
+    }
     Ok(opened)
 }
 

@@ -3,6 +3,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_emulators::ServedDevice;
+use palpate_emulators::hapi::{EmulatedHapi, HapiBoardSettings};
 use palpate_emulators::inverse::{EmulatedInverse, InverseServiceSettings};
 use palpate_haptics::scene::NoForceReason;
 use palpate_runner::TimeScale;
@@ -165,6 +166,36 @@ fn a_real_device_is_opened_judged_with_its_delay_and_leads_the_stylus() {
     flow.click("Replay recording");
     flow.wait("the replay", |window| replayed(window).is_some());
     assert_eq!(replayed(&flow.window), Some(Ok(true)));
+}
+
+#[test]
+fn a_device_without_a_button_gives_no_force_until_its_report_was_read() {
+    let (board, panel) = EmulatedHapi::new(HapiBoardSettings::default()).unwrap();
+    let served = ServedDevice::start(board, ServedDevice::free_port()).unwrap();
+    let mut flow = open();
+    flow.wait("the path", |window| screen_of::<SceneScreen>(window).computed_path().is_some());
+    flow.type_into("nodes", "51");
+    flow.click("haptic device");
+    flow.type_into("device", &format!("hapi:{}", served.address));
+    flow.click("Start the scene");
+    flow.wait_for_words("The device is open and gives no force");
+    flow.wait_for_words("keep the switch of the motors' power supply within reach");
+    flow.window.check_accessibility();
+    // Escape closes it again.
+    flow.window.key_press(Key::Escape);
+    flow.wait_for_words("hold the left button to press");
+    flow.click("Start the scene");
+    flow.wait_for_words("The device is open and gives no force");
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
+    assert_eq!(panel.torques(), [0.0; 2]);
+    flow.click("Start the scene");
+    flow.wait("the scene", |window| screen_of::<SceneScreen>(window).is_running());
+    flow.wait("reports of the device", |window| {
+        let live = screen_of::<SceneScreen>(window).live_scene().unwrap();
+        live.device().unwrap().used().reports > 10
+    });
+    flow.click("Stop the scene");
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
 }
 
 /// A square pad of 60 mm in steps of 4 mm, as Wavefront OBJ.

@@ -11,7 +11,7 @@ use super::tape::{TapePanel, loop_button_ui};
 use crate::scene::hand::ToolTarget;
 use crate::scene::look::SceneLook;
 use crate::scene::view::SceneView;
-use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, work_ui};
+use crate::widgets::{alarm_ui, quiet_ui, require, section_ui, small_ui, work_ui};
 use crate::workers::live_scene::{
     ComputedPath, LiveScene, SceneLead, compute_path, simulated_loop,
 };
@@ -21,6 +21,7 @@ use eframe::egui::{Context, Key, Ui};
 use form::{HandChoice, SceneForm};
 use middle::PictureSource;
 use palpate_analysis::progress::Progress;
+use palpate_analysis::report::scene::device_lines;
 use palpate_analysis::scene::{check_scene, read_scene, replay};
 use palpate_analysis::scene_device::{DeviceReport, OpenDevice, open_device};
 use palpate_analysis::tick_replay::ReplayResult;
@@ -54,6 +55,8 @@ pub struct SceneScreen {
     computed: BackgroundTask<ComputedPath>,
     /// A device that is being opened for the scene of the form.
     opening: BackgroundTask<(OpenDevice, DeviceReport)>,
+    /// A device without a button that is open, without force, until a person has read the report and starts the scene.
+    opened: Option<(OpenDevice, DeviceReport)>,
     is_shown: bool,
     live: Option<LiveScene>,
     /// What it is made of.
@@ -111,6 +114,7 @@ impl Default for SceneScreen {
             mesh: None,
             computed: BackgroundTask::default(),
             opening: BackgroundTask::default(),
+            opened: None,
             is_shown: false,
             live: None,
             live_file: SceneFile::default(),
@@ -127,6 +131,11 @@ impl Default for SceneScreen {
 impl SceneScreen {
     pub fn is_running(&self) -> bool {
         self.live.as_ref().is_some_and(LiveScene::is_running)
+    }
+
+    /// Whether the settings of the scene must stay: it runs, or a device is open for it.
+    fn is_settled(&self) -> bool {
+        self.is_running() || self.opening.is_busy() || self.opened.is_some()
     }
 
     /// The scene that runs or ran last.
@@ -162,7 +171,7 @@ impl SceneScreen {
 
     /// Reads the file that is named, on a thread: a body may have to be fitted.
     fn read(&mut self, ctx: &Context) {
-        if self.is_running() || self.opening.is_busy() {
+        if self.is_settled() {
             return;
         }
         let named = self.form.file.trim().to_owned();
@@ -194,6 +203,10 @@ impl SceneScreen {
     /// Starts the scene, unless it runs, and records it if a folder is named. A device is opened first.
     fn start(&mut self, ctx: &Context) {
         if self.is_running() {
+            return;
+        }
+        if let Some((device, report)) = self.opened.take() {
+            self.begin(ctx, SceneLead::Device(device, Box::new(report)));
             return;
         }
         match self.form.hand {
@@ -289,7 +302,8 @@ impl Screen for SceneScreen {
     fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         // A running scene keeps its settings, and one whose device is being opened.
         let is_running = self.is_running() || self.opening.is_busy();
-        ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
+        let is_settled = self.is_settled();
+        ui.add_enabled_ui(!is_settled, |ui| match self.form.ui(ui) {
             Some(form::FileAction::Dialog) => commands.push(UiCommand::Choose(PathPurpose::Scene)),
             Some(form::FileAction::Read) => commands.push(UiCommand::OpenScene),
             None => {}
@@ -308,6 +322,9 @@ impl Screen for SceneScreen {
             _ if self.opening.is_busy() => {
                 "The device is being opened; its delay is measured with zero force."
             }
+            _ if self.opened.is_some() => {
+                "The device is open and gives no force. It has no button: read what follows, then start the scene. Esc closes the device."
+            }
             (_, Some(_)) => {
                 "The device moves the stylus. One with a grip gives a force while its button is pressed, one without from the start. F12 ends the scene."
             }
@@ -321,11 +338,16 @@ impl Screen for SceneScreen {
             }
         };
         quiet_ui(ui, words);
+        if let Some((_, report)) = &self.opened {
+            for line in device_lines(report) {
+                small_ui(ui, line);
+            }
+        }
         section_ui(ui, "Picture");
         let side_mm = self.view.side_mm();
         self.view.look.ui(ui, side_mm);
-        ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
-        self.plan_ui(ui, is_running, commands);
+        ui.add_enabled_ui(!is_settled, |ui| self.form.parts_ui(ui));
+        self.plan_ui(ui, is_settled, commands);
         self.tape.ui(ui, is_running, replay);
     }
 
@@ -360,9 +382,10 @@ impl Screen for SceneScreen {
         }
         if self.opening.poll() {
             match self.opening.take_answer() {
-                Some(Ok((device, report))) => {
-                    self.begin(ctx, SceneLead::Device(device, Box::new(report)))
+                Some(Ok((device, report))) if report.has_button => {
+                    self.begin(ctx, SceneLead::Device(device, Box::new(report)));
                 }
+                Some(Ok(opened)) => self.opened = Some(opened),
                 Some(Err(reason)) => self.refusal = Some(reason),
                 None => {}
             }
@@ -413,22 +436,21 @@ impl Screen for SceneScreen {
     }
 
     fn is_busy(&self) -> bool {
-        self.computed.is_busy()
-            || self.opening.is_busy()
-            || self.tape.is_busy()
-            || self.is_running()
+        self.computed.is_busy() || self.tape.is_busy() || self.is_settled()
     }
 
     fn running(&self) -> Option<&'static str> {
-        match self.opening.is_busy() {
-            true => Some(OPENING),
-            false => self.is_running().then_some("the scene runs"),
+        match (self.opening.is_busy(), &self.opened) {
+            (true, _) => Some(OPENING),
+            (false, Some(_)) => Some("a device is open for the scene"),
+            (false, None) => self.is_running().then_some("the scene runs"),
         }
     }
 
     fn stop(&mut self) {
         // A device that is still being opened is closed as soon as it is open.
         self.opening = BackgroundTask::default();
+        self.opened = None;
         if let Some(live) = self.live.as_mut().and_then(LiveScene::stop) {
             self.tape.end(move || live.finish());
         }
@@ -448,8 +470,7 @@ impl Screen for SceneScreen {
     }
 
     fn actions(&self, workbench: &Workbench) -> Vec<PaletteAction> {
-        let is_running = self.is_running() || self.opening.is_busy();
-        let can_stop = require(is_running, "the scene is not running");
+        let can_stop = require(self.is_settled(), "the scene is not running");
         let can_start = self.verdict(workbench);
         vec![
             PaletteAction::new("Start the scene", "", UiCommand::SceneStart).if_ok(can_start),
