@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_faster_than_asked_for_is_begun() {
+    fn nothing_faster_than_asked_for_and_nothing_without_a_rate_is_begun() {
         let wanted =
             MoveTo { target_pulses: 1000, speed: MmPerS(0.75), acceleration: MmPerS2(61.44) };
         for (readback, is_begun) in [
@@ -373,6 +373,8 @@ mod tests {
             (" 52 4096 4096", false),
             (" 500 4096 4096", false),
             (" 50 5120 5120", false),
+            // An axis without acceleration would not begin.
+            (" 50 0 0", false),
         ] {
             let next = read_back(RigCommand::MoveTo(wanted), &[readback, " 1000"]);
             let begins = matches!(next, OrderStep::SendAndSample(_));
