@@ -146,7 +146,7 @@ pub fn open_device(
     let SceneToTouch { settings, start, .. } = scene;
     if settings.controller.is_none() {
         return Err(
-            "the scene has no guards and no controller, which a real device needs; set loop.guards to true, or use the simulated device"
+            "the scene has no guards and no controller, which a real device needs; switch them on (guards = true under [loop]), or use the simulated device"
                 .into(),
         );
     }

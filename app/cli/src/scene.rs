@@ -241,10 +241,11 @@ fn device(
     // Until the scene ticks there is no force.
     if !report.has_button && std::io::stdin().is_terminal() {
         output.note("press Enter to start; there is no force before");
-        let mut line = String::new();
-        std::io::stdin().read_line(&mut line).map_err(|err| {
-            Failure::failed(format!("cannot read the terminal ({err}); start again"))
-        })?;
+        let pressed = std::io::stdin().read_line(&mut String::new());
+        if !pressed.is_ok_and(|bytes| bytes > 0) {
+            let why = "the terminal was closed before Enter was pressed; the scene was not started";
+            return Err(Failure::failed(why));
+        }
     }
     Ok(opened)
 }

@@ -23,7 +23,7 @@ pub enum UseError {
     Figures(#[from] SettingError),
     /// Between two ticks the force would end.
     #[error(
-        "a scene of {hz:.0} ticks a second is too slow for a haptic device, whose force ends after {:.1} ms without a tick; give at least {:.0}",
+        "a scene of {hz:.0} ticks a second is too slow for a haptic device, whose force ends after {:.1} ms without a tick; set at least {:.0} (rate_hz under [loop])",
         1e3 * .silence.seconds().0, (1.0 / silence.since(TICK_LATE).seconds().0).ceil()
     )]
     SlowScene { hz: f64, silence: Nanos },
