@@ -242,6 +242,22 @@ fn a_recorded_specimen_is_touched_by_the_simulated_hand_and_through_a_device() {
     let felt = palpate(at.path(), &split_words(&line));
     assert!(stderr(&felt).contains("home position"), "{}", stderr(&felt));
     assert!(json(&felt)["device"]["reports"].as_u64().unwrap() > 0);
+    // The file's largest force holds on a real device too, and what a device cannot be used with is refused.
+    let put = |name: &str, text: &str| std::fs::write(at.path().join(name), text).unwrap();
+    put("soft.toml", "[mesh]\nnodes = 51\n[device]\nforce_max_n = 0.5\n");
+    let line = format!(
+        "scene record soft.toml --device inverse --service {service} --seconds 1 --to soft --json"
+    );
+    let soft = json(&palpate(at.path(), &split_words(&line)));
+    assert!(soft["force_max_n"].as_f64().unwrap() <= 0.5, "{soft}");
+    let used = std::fs::read_to_string(at.path().join("soft/settings.toml")).unwrap();
+    assert!(used.contains("force_max_n = 0.5\n"), "{used}");
+    put("open.toml", "[mesh]\nnodes = 51\n[loop]\nguards = false\n");
+    put("slow.toml", "[mesh]\nnodes = 51\n[loop]\nrate_hz = 400.0\n");
+    for (file, words) in [("open.toml", "no guards"), ("slow.toml", "too slow")] {
+        let line = format!("scene run {file} --device inverse --service {service}");
+        assert_refused(&palpate(at.path(), &split_words(&line)), 1, words);
+    }
     // Another is not there.
     let line = format!("scene run --device inverse:left --service {service}");
     assert_refused(&palpate(at.path(), &split_words(&line)), 1, "left");
