@@ -68,3 +68,38 @@ impl Link {
         let _ = self.socket.flush();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    /// All has arrived before the first look, and yet each look takes one frame.
+    #[test]
+    fn a_look_takes_one_frame_whatever_a_service_sends() {
+        const PINGS: usize = 100;
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        let service = std::thread::spawn(move || {
+            let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
+            socket.send(Message::text("inventory")).unwrap();
+            for _ in 0..PINGS {
+                socket.send(Message::Ping(Vec::new().into())).unwrap();
+            }
+            socket.send(Message::text("report")).unwrap();
+            socket
+        });
+        let (mut link, inventory) = Link::open(address).unwrap();
+        assert_eq!(inventory, "inventory");
+        let _socket = service.join().unwrap();
+        let mut empty = 0;
+        let report = loop {
+            match link.receive().unwrap() {
+                Some(report) => break report,
+                None => empty += 1,
+            }
+        };
+        assert_eq!(report, "report");
+        assert!(empty >= PINGS, "{empty}");
+    }
+}
