@@ -80,7 +80,8 @@ mod tests {
         const PINGS: usize = 100;
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
-        let service = std::thread::spawn(move || {
+        let thread = std::thread::Builder::new().name("pinging service".into());
+        let service = thread.spawn(move || {
             let mut socket = tungstenite::accept(listener.accept().unwrap().0).unwrap();
             socket.send(Message::text("inventory")).unwrap();
             for _ in 0..PINGS {
@@ -89,6 +90,7 @@ mod tests {
             socket.send(Message::text("report")).unwrap();
             socket
         });
+        let service = service.unwrap();
         let (mut link, inventory) = Link::open(address).unwrap();
         assert_eq!(inventory, "inventory");
         let _socket = service.join().unwrap();
